@@ -1,4 +1,4 @@
-//! Odometry with a search of your own: a gyroscope says the rotation, the radar finds the
+//! Odometry with a search of your own: a gyroscope measures the rotation, the radar finds the
 //! translation.
 //!
 //! ```sh
@@ -82,7 +82,7 @@ pub(crate) fn drive(simulator: &Simulator) -> Result<Vec<Registered>, Box<dyn Er
         .collect()
 }
 
-/// Returns what a gyroscope without errors measures from the first scan to the last.
+/// Returns the rotations of an ideal gyroscope from the first scan to the last.
 fn read_gyroscope(simulator: &Simulator) -> Vec<Reading> {
     let (first, last) = (simulator.time(0), simulator.time(simulator.scans()));
     let heading_rad = |stamp_ns: i64| {

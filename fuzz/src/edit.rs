@@ -21,7 +21,7 @@ pub enum ByteEdit {
     Truncate(u32),
 }
 
-/// A number at which programs err.
+/// A number that often reveals faults of programs.
 #[derive(Clone, Copy, Debug, TypeGenerator)]
 pub enum Number {
     /// Any bits.
@@ -34,7 +34,7 @@ pub enum Number {
     Float(u8),
 }
 
-/// Floating-point numbers at which programs err.
+/// Floating-point numbers that often reveal faults of programs.
 pub const FLOATS: [f64; 12] = [
     0.0,
     -0.0,
@@ -51,7 +51,6 @@ pub const FLOATS: [f64; 12] = [
 ];
 
 impl Number {
-    /// Returns its bits.
     pub fn bits(self) -> u64 {
         match self {
             Self::Any(bits) => bits,
@@ -73,7 +72,6 @@ impl Number {
     }
 }
 
-/// Edits bytes.
 pub fn edit_bytes(bytes: &mut Vec<u8>, edits: &[ByteEdit]) {
     for edit in edits {
         let len = bytes.len();
@@ -123,13 +121,11 @@ pub enum TextEdit {
     Number(u16, u8, Number),
     /// Inserts a line of such a word.
     Line(u16, u8),
-    /// Removes a line.
     RemoveLine(u16),
-    /// Repeats a line.
     RepeatLine(u16),
     /// Swaps two lines.
     SwapLines(u16, u16),
-    /// Edits the bytes; what is no UTF-8 then is replaced.
+    /// Edits the bytes; invalid UTF-8 is then replaced.
     Bytes(ByteEdit),
     /// Writes the text as another program does: see `WAYS`.
     Way(u8),
@@ -148,7 +144,7 @@ const WAYS: [(&str, &str); 7] = [
 /// A byte order mark, before a text.
 const MARK: char = '\u{feff}';
 
-/// Words at which parsers err.
+/// Words that often reveal faults of parsers.
 const WORDS: [&str; 40] = [
     "",
     "0",
@@ -192,7 +188,6 @@ const WORDS: [&str; 40] = [
     "\u{202e}",
 ];
 
-/// Edits a text.
 pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for edit in edits {

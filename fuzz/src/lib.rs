@@ -3,7 +3,7 @@
 //!
 //! - nothing panics,
 //! - memory stays within the target's limit,
-//! - what is refused is refused in one sentence.
+//! - each rejection is one sentence.
 //!
 //! `cargo test` runs each target for a second. For longer, by name, one at a time:
 //!
@@ -118,7 +118,7 @@ pub fn assert_sentence(error: &impl Display) {
     );
     // Other control characters of names and words are replaced where the sentence is printed.
     assert!(!text.contains(['\n', '\r']), "{text:?}");
-    // What is quoted is the input's own.
+    // Quoted text is part of the input.
     let said: String = text.replace(r#"\""#, "").split('"').step_by(2).collect();
     for mark in ["Some(", "Ok(", "Err(", " { "] {
         assert!(!said.contains(mark), "{text}");

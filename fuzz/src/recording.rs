@@ -28,9 +28,7 @@ pub struct Image {
 /// A recording of a few scans.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// The format.
     pub format: Format,
-    /// The images.
     pub images: Vec<Image>,
     /// Texts beside them: names and contents.
     pub texts: Vec<(String, String)>,
@@ -79,9 +77,6 @@ impl Recording {
     }
 
     /// Writes it into an empty folder.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> std::io::Result<()> {
         for image in &self.images {
             write(folder, &image.name, &image.png())?;
@@ -111,9 +106,6 @@ impl Image {
 }
 
 /// Writes a file and the folders that lead to it.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(folder: &Path, name: &str, bytes: &[u8]) -> std::io::Result<()> {
     let path = folder.join(name);
     if let Some(parent) = path.parent() {

@@ -86,7 +86,7 @@ fn scan(turn: usize) -> OwnedScan {
 struct Form {
     /// Azimuth by azimuth, otherwise turn by turn.
     by_azimuth: bool,
-    /// The encoder's counts per turn, where they are not those that the radar says.
+    /// The encoder's counts per turn, if they differ from the radar's own statement.
     encoder_size: Option<u16>,
     /// Times of rows in microseconds.
     has_microseconds: bool,
@@ -124,7 +124,7 @@ fn messages(form: Form) -> Vec<Message> {
     messages
 }
 
-/// Writes a bag without compression and checksums, so that edits of the file reach what is in it.
+/// Writes a bag without compression and checksums, so that edits of the file reach its messages.
 fn write(path: &Path, messages: &[Message], chunks: bool) {
     let options = WriteOptions::new()
         .profile("ros2")
@@ -150,10 +150,10 @@ fn write(path: &Path, messages: &[Message], chunks: bool) {
     mcap.finish().unwrap();
 }
 
-/// Opens a bag and reads all its scans, from the last to the first. What it accepts must be
+/// Opens a bag and reads all its scans, from the last to the first. An accepted bag must be
 /// consistent.
 fn use_bag(path: &Path) -> Result<(), Failure> {
-    let mut dataset = gyre_bags::open(path, &DatasetOptions::default())?;
+    let mut dataset = gyre_recording::bags::open(path, &DatasetOptions::default())?;
     let mut refused = None;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     for index in (0..dataset.len()).rev() {
@@ -286,14 +286,14 @@ fn a_bag_without_edits_is_accepted() {
             let path = folder.path().join("bag.mcap");
             write(&path, &messages(form), chunks);
             use_bag(&path).unwrap();
-            let dataset = gyre_bags::open(&path, &DatasetOptions::default()).unwrap();
+            let dataset = gyre_recording::bags::open(&path, &DatasetOptions::default()).unwrap();
             assert_eq!(dataset.len(), TURNS, "{form:?}");
         }
         let parts = folder.path().join("parts");
         fs::create_dir(&parts).unwrap();
         write_parts(&parts, messages(form), &[(2, 10), (1, 9)]);
         use_bag(&parts).unwrap();
-        let dataset = gyre_bags::open(&parts, &DatasetOptions::default()).unwrap();
+        let dataset = gyre_recording::bags::open(&parts, &DatasetOptions::default()).unwrap();
         assert_eq!(
             (dataset.len(), dataset.files().len()),
             (TURNS, 3),

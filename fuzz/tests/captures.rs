@@ -1,4 +1,4 @@
-//! Captures: files with what a radar has sent, by TCP or as datagrams.
+//! Captures: files with the messages of a radar, by TCP or as datagrams.
 
 use std::{fs, path::Path};
 
@@ -7,7 +7,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_radar_server::capture::{Capture, MAGIC, MAX_RECORD_BYTES};
+use gyre_tools::radar_server::capture::{Capture, MAGIC, MAX_RECORD_BYTES};
 
 use crate::{
     recordings::folder,
@@ -21,7 +21,7 @@ const PERIOD_NS: u64 = 2_000_000;
 enum CaptureEdit {
     /// The time of a record.
     Time(u8, Number),
-    /// The number of bytes that a record says.
+    /// The number of bytes in the head of a record.
     Count(u8, Number),
     /// The bytes of a record.
     Record(u8, Vec<ByteEdit>),
@@ -29,7 +29,7 @@ enum CaptureEdit {
     Lost(u8),
 }
 
-/// A record: its time, the number of bytes that it says, and its bytes.
+/// A record: its time, the number of bytes in its head, and its bytes.
 struct Record(u64, u32, Vec<u8>);
 
 fn edit_records(records: &mut Vec<Record>, edits: &[CaptureEdit]) {

@@ -40,7 +40,7 @@ fn pose(seq: u64) -> PoseHeader {
     }
 }
 
-/// Checks a journal, cuts what is torn, and goes on.
+/// Checks a journal, cuts its torn end, and continues.
 fn use_journal(file: &Path) -> Result<(), Failure> {
     let content = journal::check(file)?;
     if content.torn > 0 {
@@ -152,7 +152,7 @@ fn refinement_maps() {
                     let slot = bytes.get_mut(slot).unwrap_or_default();
                     let words = slot.len() / 8;
                     if words > 1 {
-                        // The first words say most; the others are cells.
+                        // The first words matter most; the others are cells.
                         let at = 8 * (1 + usize::from(*at) % (words - 1).min(60));
                         slot[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
                         let checksum = 1 << 32 | u64::from(crc32fast::hash(&slot[8..]));

@@ -40,7 +40,7 @@ fn keyframe(seq: usize) -> Keyframe {
     }
 }
 
-/// Reads all keyframes, cuts what is torn, and goes on.
+/// Reads all keyframes, cuts the torn end, and continues.
 fn use_log(out: &Path) -> Result<(), Failure> {
     let mut reader = RecordReader::open(out)?;
     let found = reader.len();

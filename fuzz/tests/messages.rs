@@ -1,5 +1,4 @@
-//! Messages that a stage of somebody else's may send: any header and any payload, against what the
-//! next stages do with them.
+//! Messages that a foreign stage may send: the next stages receive any header and any payload.
 
 use bolero::{TypeGenerator, check};
 use gyre_fuzz::{Failure, Target, edit::Number};
@@ -10,7 +9,7 @@ use gyre_messages::{
 };
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_scan_matching::{
-    ExhaustiveConfig, ExhaustiveSearch, RefinementConfig, Refiner, RotationConfig,
+    ExhaustiveConfig, ExhaustiveSearch, MotionMatch, RefinementConfig, Refiner, RotationConfig,
     SequentialRotation, TranslationConfig, TranslationSearch,
 };
 use ndarray::Array2;
@@ -197,6 +196,24 @@ fn rotation(numbers: [Number; 5]) -> RotationEstimate {
     }
 }
 
+/// For any cells, the results of the searches are finite.
+fn assert_finite(angle: &RotationEstimate, motion: &MotionMatch) {
+    let numbers = [
+        angle.angle_rad,
+        angle.variance_rad2,
+        angle.score,
+        motion.x_m,
+        motion.y_m,
+        motion.yaw_rad,
+        motion.score,
+    ];
+    let all = numbers.iter().chain(motion.covariance.iter());
+    assert!(
+        all.clone().all(|it| it.is_finite()),
+        "{angle:?}, {motion:?}"
+    );
+}
+
 #[test]
 fn masked_rasters() {
     let target = Target::new("masked_rasters", 64);
@@ -232,8 +249,11 @@ fn masked_rasters() {
                     .unwrap_or_default();
                 let angle = angle.map_or(estimate, rotation);
                 if let Some(earlier) = pair.earlier {
+                    let by_halves = translation.search(pair.later, earlier, &estimate.into())?;
                     translation.search(pair.later, earlier, &angle.into())?;
-                    joint.search(pair.later, earlier)?;
+                    let jointly = joint.search(pair.later, earlier)?;
+                    assert_finite(&estimate, &by_halves);
+                    assert_finite(&RotationEstimate::from(&jointly.rotation), &jointly.motion);
                 }
                 Ok(())
             });

@@ -20,7 +20,6 @@ enum RowEdit {
     Count(u8, u16),
     /// The encoder counts of all rows from this one on, shifted.
     CountsFrom(u8, u16),
-    /// The flags.
     Flags(u8, u8),
     /// All rows alike.
     Copy(u8),
@@ -64,7 +63,7 @@ fn edit_rows(pixels: &mut [u8], width: usize, edits: &[RowEdit]) {
     }
 }
 
-/// Opens a recording, reads all scans and inspects it. What it accepts must be consistent.
+/// Opens a recording, reads all scans and inspects it. An accepted recording must be consistent.
 fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
     let mut dataset = open(root, options)?;
     let mut refused = None;

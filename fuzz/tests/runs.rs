@@ -83,7 +83,7 @@ fn use_run(path: &Path) -> Result<(), Failure> {
 
     let mut dataset = gyre_recording::open(path, &DatasetOptions::default())?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
-    // A damaged number of a scan leaves a gap as long as it says.
+    // A damaged number of a scan leaves a gap of any length.
     for index in (dataset.first()..dataset.len()).take(100) {
         if let Ok(geometry) = dataset.read(index, scan.slot()) {
             scan.geometry = geometry;

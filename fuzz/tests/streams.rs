@@ -1,5 +1,4 @@
-//! The stream of a radar: a stream of Colossus, or datagrams of CAT-240, against what a client does
-//! with it.
+//! The stream of a radar: a client receives a stream of Colossus, or datagrams of CAT-240.
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{

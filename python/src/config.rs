@@ -21,8 +21,8 @@ use crate::{errors, values};
 /// of a configuration of `gyre run`, with the same keys and defaults.
 ///
 /// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in
-/// one key. Unknown keys and values out of their bounds raise ConfigError. A key that is None has
-/// its default. A configuration never changes, and can be pickled.
+/// one key. Unknown keys and values out of their bounds raise ConfigError. A key with the value
+/// None has its default. A configuration never changes, and can be pickled.
 #[pyclass(module = "gyre", frozen, eq)]
 pub struct Config {
     method: MethodConfig,
@@ -65,11 +65,10 @@ impl Config {
     }
 
     /// Reads a TOML file, or one of Gyre's configurations by its name as `oxford`, as `gyre run`
-    /// does. Relative paths in it start at its folder; Gyre's own files, as
-    /// `models/gyre-255.toml`, are found too. `note` says where a file is taken from if that is
-    /// not clear. Its sections `run`, `source`, `simulation`, `budget`,
-    /// `record` and `stages`, which are for a run of processes, are ignored. `overrides` replaces
-    /// keys: `{"masking.kind": "none"}`.
+    /// does. Relative paths in it start at its folder; Gyre's own files, as `models/gyre-255.toml`,
+    /// are found too. `note` receives a sentence with the place of a file if that is not clear. Its
+    /// sections `run`, `source`, `simulation`, `budget`, `record` and `stages`, which are for a run
+    /// of processes, are ignored. `overrides` replaces keys: `{"masking.kind": "none"}`.
     #[staticmethod]
     #[pyo3(signature = (path, overrides=None))]
     fn read(path: PathBuf, overrides: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
@@ -83,9 +82,9 @@ impl Config {
     }
 
     /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the
-    /// radar's constants are those of its format or its `dataset.toml`, and eight of its scans give
-    /// the threshold and the sizes of cells and beams. `note` says what was found. `overrides`
-    /// replaces keys.
+    /// radar's constants come from its format or its `dataset.toml`, and eight of its scans give
+    /// the threshold and the sizes of cells and beams. `note` receives a sentence with the
+    /// findings. `overrides` replaces keys.
     #[staticmethod]
     #[pyo3(signature = (data, overrides=None))]
     fn of(

@@ -23,8 +23,8 @@ const MAX_UNREADABLE: usize = 10;
 ///
 /// With a section `gyro` or `wheels` in `config` the scans have the samples that it names.
 ///
-/// The constants of the radar are those of the section `dataset` of `config`. Without one they are
-/// those of the format, or of the recording's `dataset.toml`, as `Config.of` takes them. Raises
+/// The constants of the radar come from the section `dataset` of `config`. Without `config` they
+/// come from the format, or from the recording's `dataset.toml`, as in `Config.of`. Raises
 /// ReadError.
 #[pyfunction]
 #[pyo3(signature = (data, config=None))]
@@ -74,7 +74,7 @@ pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
 /// scans as `gyre run` does: it begins at `first`, skips damaged scans with a SkippedScanWarning,
 /// and raises ReadError after ten of them in a row, or where a file cannot be read.
 ///
-/// A pickled dataset is opened anew where it is unpickled, as in a process of `multiprocessing`.
+/// A pickled dataset is opened again where it is unpickled, as in a process of `multiprocessing`.
 #[pyclass(module = "gyre", frozen)]
 pub struct Dataset {
     data: PathBuf,

@@ -23,14 +23,8 @@ macro_rules! exception {
     };
 }
 
-exception!(
-    /// Any other failure.
-    other, "Error"
-);
-exception!(
-    /// An invalid configuration.
-    config, "ConfigError"
-);
+exception!(other, "Error");
+exception!(config, "ConfigError");
 exception!(
     /// A file that cannot be read.
     read, "ReadError"
@@ -59,12 +53,12 @@ pub fn open(error: OpenError) -> PyErr {
 /// A log of a gyro or of wheels.
 pub fn log(error: LogError) -> PyErr {
     match error {
-        LogError::None { .. } | LogError::Live(_) => config(error),
+        LogError::None { .. } | LogError::Live { .. } => config(error),
         error => read(error),
     }
 }
 
-/// A radar that does not say its velocity by Doppler.
+/// The radar reports no velocity by Doppler.
 pub fn doppler(error: NoDoppler) -> PyErr {
     config(format!("doppler.kind is `auto`, but {error}"))
 }

@@ -7,9 +7,9 @@ use pyo3::prelude::*;
 
 use crate::{config::Config, errors, trajectory::Trajectory, values};
 
-/// Examines a recording: what it contains, and what looks wrong with it. With a trajectory of it
-/// the clock of its ground truth is compared. The section `dataset` of `config` says how the
-/// recording is opened; without one its format alone does. Raises ReadError.
+/// Examines a recording: its contents and its apparent faults. With a trajectory of it the clock of
+/// its ground truth is compared. The section `dataset` of `config` determines how the recording is
+/// opened; without `config`, the format does. Raises ReadError.
 #[pyfunction]
 #[pyo3(signature = (data, trajectory=None, config=None))]
 pub fn inspect(

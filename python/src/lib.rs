@@ -2,8 +2,8 @@
 //! rasters and points as numpy arrays.
 //!
 //! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and
-//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `errors` and `values` say how errors
-//! and values cross the border. What is written in Python is in `package/`.
+//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `errors` and `values` convert errors
+//! and values between Rust and Python. `package/` holds the part that is written in Python.
 //!
 //! The GIL is released while scans are decoded and computed. Each object of Rust that changes is
 //! behind a lock, which is taken without the GIL: two threads that share one wait for each other,
@@ -28,7 +28,7 @@ mod values;
 
 use std::path::Path;
 
-use gyre_networks::runtime::search_packages;
+use gyre_masking::networks::runtime::search_packages;
 use pyo3::{prelude::*, types::PyModule};
 
 /// The part of the package that is written in Rust.

@@ -11,9 +11,9 @@ use crate::errors;
 
 /// A value behind a lock, for the threads of one process.
 ///
-/// A forked process has a copy of the lock, which a thread of its parent may have held, of the
-/// threads of ONNX Runtime nothing, and the positions in open files in common with its parent. So
-/// it is told to make the value anew.
+/// A forked process has a copy of the lock, which a thread of its parent may have held. The threads
+/// of ONNX Runtime are missing, and the parent shares the positions in open files. So a caller in a
+/// forked process must make the value again.
 pub struct Guarded<T> {
     name: &'static str,
     process: u32,
@@ -32,9 +32,6 @@ impl<T: Send> Guarded<T> {
 
     /// Computes on the value. The GIL is released first, so that a thread that waits blocks no
     /// other.
-    ///
-    /// # Errors
-    /// Error: the value was made before this process was forked.
     pub fn with<R: Send>(
         &self,
         py: Python<'_>,
@@ -46,8 +43,8 @@ impl<T: Send> Guarded<T> {
                 self.name
             )));
         }
-        // A computation that panicked has raised PanicException in its thread; what it left is
-        // checked as any other input.
+        // A computation that panicked has raised PanicException in its thread, and the values that
+        // remain are checked like any other input.
         Ok(py.detach(|| compute(&mut self.value.lock().unwrap_or_else(PoisonError::into_inner))))
     }
 }

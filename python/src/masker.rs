@@ -65,9 +65,6 @@ pub fn points<'py>(
 }
 
 /// Returns the fields of points, one after the other.
-///
-/// # Errors
-/// TypeError: they are no points.
 pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let py = points.py();
     let none = self::points(&PyArray1::from_vec(py, Vec::new()), 0)?;
@@ -153,13 +150,13 @@ impl Masker {
         })
     }
 
-    /// Masks a scan. `velocity` is that of the sensor for motion compensation: x forward and y left
-    /// in m/s, and the yaw rate counter-clockwise in rad/s; without it nothing is compensated.
+    /// Masks a scan. `velocity` is the sensor's velocity for motion compensation: x forward and y
+    /// left in m/s, and the yaw rate counter-clockwise in rad/s; without it nothing is compensated.
     ///
     /// Where azimuths of a scan were lost is found by the scan of the call before and the velocity.
     ///
-    /// If the mask takes two scans, the previous one is that of the call before; a scan that is not
-    /// later than that, or by more than 10 s, is its own previous scan. A scan that cannot be used
+    /// If the mask takes two scans, the previous scan is the one of the call before; a scan that is
+    /// not later, or later by more than 10 s, is its own previous scan. A scan that cannot be used
     /// raises ScanError, and a network that fails Error.
     #[pyo3(signature = (scan, velocity=None))]
     fn mask(

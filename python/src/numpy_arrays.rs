@@ -13,9 +13,6 @@ use pyo3::{
 };
 
 /// Returns an object as an array of elements `T` in `D` dimensions.
-///
-/// # Errors
-/// TypeError: it is no such array.
 pub fn given<'py, T: Element, D: Dimension>(
     array: &Bound<'py, PyAny>,
     name: &str,
@@ -37,9 +34,6 @@ pub fn given<'py, T: Element, D: Dimension>(
 
 /// Borrows an object as an array that Rust reads. Type and shape are looked at each time: numpy can
 /// change both in place.
-///
-/// # Errors
-/// TypeError: it is no such array. RuntimeError: it is being written.
 pub fn readable<'py, T: Element, D: Dimension>(
     array: &Bound<'py, PyAny>,
     name: &str,
@@ -50,9 +44,6 @@ pub fn readable<'py, T: Element, D: Dimension>(
 
 /// Converts an object to an array of elements `T` that a slice of Rust can have: C-contiguous and
 /// aligned. One that is so is not copied; a view of packed records is.
-///
-/// # Errors
-/// TypeError or ValueError of numpy: it cannot be converted.
 pub fn sliceable<'py, T: Element>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
     let keywords =
@@ -63,9 +54,6 @@ pub fn sliceable<'py, T: Element>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'
 
 /// Converts what numpy can convert without loss of kind, as a list of int or an array of float64,
 /// to an array of one dimension.
-///
-/// # Errors
-/// TypeError or ValueError of numpy: it cannot be converted.
 pub fn converted<'py, T: Element>(
     value: &Bound<'py, PyAny>,
     name: &str,
@@ -84,7 +72,6 @@ pub fn converted<'py, T: Element>(
     given(&sliceable::<T>(&cast)?, name, expected)
 }
 
-/// Returns a matrix as an array.
 pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> Bound<'py, PyArray2<f64>> {
     let element = |(row, column)| matrix[(row, column)];
     PyArray2::from_owned_array(py, ndarray::Array2::from_shape_fn((3, 3), element))

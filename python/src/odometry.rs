@@ -28,7 +28,7 @@ impl State {
         samples: &[Sample],
     ) -> Result<Registered, OdometryError> {
         let mut registered = self.odometry.register(scan, samples)?;
-        // Numbers are those of a run, which counts on where a new chain starts.
+        // Numbering is the same as in a run, which continues to count where a new chain starts.
         registered.seq = self.trajectory.len() as u64;
         let stamp_ns = scan.geometry.stamp_ns;
         let stamps = self.trajectory.stamp_ns.get_or_insert_default();
@@ -58,10 +58,10 @@ impl Odometry {
     /// Registers the next scan: estimates its motion from the previous scan, and its pose.
     ///
     /// A scan that is not later than the previous one, or by more than 10 s, starts a new chain of
-    /// motions. What a gyro and wheels have measured, `scan.gyro` and `scan.wheels`, is used with
-    /// the noise that the sections `gyro` and `wheels` say. A scan that cannot be used raises
-    /// ScanError and is left out: the next one is registered against the scan before it. A network
-    /// that fails raises Error.
+    /// motions. The samples of gyro and wheels, `scan.gyro` and `scan.wheels`, are used with the
+    /// noise in the sections `gyro` and `wheels`. A scan that cannot be used raises ScanError and
+    /// is left out: the next one is registered against the scan before it. A network that fails
+    /// raises Error.
     fn register(&self, py: Python<'_>, scan: &Bound<'_, Scan>) -> PyResult<Registered> {
         let borrowed = scan.get().borrowed(py)?;
         let (view, samples) = (borrowed.view()?, scan.get().samples());

@@ -4,9 +4,7 @@ use gyre_datasets::{Dataset, ReadError, ScanSamples};
 use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
-/// An open recording.
 pub struct Opened {
-    /// The scans.
     pub scans: Box<dyn Dataset>,
     /// Samples of a gyro and of wheels, by the sections `gyro` and `wheels` of a configuration.
     pub samples: ScanSamples,

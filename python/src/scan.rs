@@ -1,4 +1,4 @@
-//! Scans, whose memory is that of numpy arrays.
+//! Scans in the memory of numpy arrays.
 
 use gyre_datasets::ReadError;
 use gyre_radar::{PolarScan, ScanSlot, Sense, SweepGeometry, scan::flag};
@@ -37,18 +37,18 @@ const FLAGS: &str = "one uint8 for each azimuth";
 /// time of each azimuth, ns; or else sweep_s: the duration of the sweep, s, whose azimuths are
 /// measured evenly in time. azimuth_rad: float32 (azimuths,), the angles from straight ahead in the
 /// sense of rotation, rad; without them the first is straight ahead, and all are spaced evenly over
-/// a turn. azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising
+/// a turn. azimuth_flags: uint8 (azimuths,), the properties of each azimuth: 1 measured, 2 rising
 /// chirp, 4 the chirp is known; without them all are measured. range_offset_m: m; the centre of bin
 /// b is at (b + 0.5) * range_resolution_m + range_offset_m. doppler_s: metres to add to a range for
 /// each m/s of closing speed; 0: unknown. gyro: the samples of a gyro since a turn before the
 /// sweep: pairs of a time, ns, and a yaw rate, rad/s, counter-clockwise, in the order of their
-/// times. wheels: the same of the wheels' speed, m/s.
+/// times. wheels: likewise the wheels' speed, m/s.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
 #[pyclass(module = "gyre", frozen)]
 pub struct Scan {
     geometry: SweepGeometry,
-    /// The memory of all bytes, in which `power` is a view.
+    /// The memory of all bytes; `power` is a view of it.
     bytes: Py<PyAny>,
     power: Py<PyAny>,
     azimuth_rad: Py<PyAny>,
@@ -178,7 +178,7 @@ fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<B
     array.call((shape, dtype), Some(&keywords))
 }
 
-/// Returns the times of azimuths that are measured evenly in time: their mean is that of the scan.
+/// Returns times of azimuths at equal intervals, with the scan's time as their mean.
 fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<i64>> {
     if !(sweep_s > 0.0 && sweep_s <= 10.0) {
         let sentence = format!("sweep_s is {sweep_s}, but must be above 0 and at most 10 s");
@@ -318,7 +318,7 @@ impl Scan {
     }
 
     /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata
-    /// that a file has before each row. What is written to it is registered.
+    /// that a file has before each row. Changes in it affect the registration.
     #[getter]
     fn power(&self, py: Python<'_>) -> Py<PyAny> {
         self.power.clone_ref(py)

@@ -168,11 +168,11 @@ impl Slam {
             ));
         }
         let capacity = config.odometry.points.capacity;
-        let options = LoopOptions {
-            submap_reach_m: config.slam.submap_reach_m,
-            ..LoopOptions::default()
-        };
-        let closer = LoopCloser::new(options, &config.odometry.refinement, capacity);
+        let closer = LoopCloser::new(
+            LoopOptions::default(),
+            &config.odometry.refinement,
+            capacity,
+        );
         let state = State {
             builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,
@@ -191,8 +191,8 @@ impl Slam {
         })
     }
 
-    /// Takes the next scan with its points, those of `Odometry.points`, and closes the loops that
-    /// it completes. Returns whether the scan is a keyframe.
+    /// Takes the next scan with its points, `Odometry.points`, and closes the loops that it
+    /// completes. Returns whether the scan is a keyframe.
     fn add(
         &self,
         py: Python<'_>,
@@ -223,7 +223,7 @@ impl Slam {
         added.map_err(errors::other)
     }
 
-    /// Says that no scan comes after the last one, and closes the last loops.
+    /// Ends the stream after the last scan, and closes the last loops.
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         self.state.with(py, State::finish)?.map_err(errors::other)
     }

@@ -12,7 +12,7 @@ use toml::{Table, Value};
 
 use crate::errors;
 
-/// Sections within sections; what is deeper contains itself.
+/// Maximum depth of nested sections; a deeper value contains itself.
 const MAX_DEPTH: usize = 8;
 
 /// Returns a mapping of sections as TOML.
@@ -39,7 +39,7 @@ pub fn set_all(table: &mut Table, overrides: Option<&Bound<'_, PyMapping>>) -> P
     Ok(())
 }
 
-/// Returns what a value is, as dictionaries, lists, strings and numbers.
+/// Converts a value to dictionaries, lists, strings and numbers.
 pub fn dictionary<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value).map_err(errors::other)?;
     py.import("json")?.call_method1("loads", (text,))
@@ -49,7 +49,7 @@ fn table_within(sections: &Bound<'_, PyMapping>, depth: usize) -> PyResult<Table
     let mut table = Table::new();
     for item in sections.items()? {
         let (key, value) = item.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-        // What a configuration leaves open is None in the dictionary of its settings.
+        // An open setting of a configuration becomes None in the dictionary.
         if !value.is_none() {
             let key = name(&key)?;
             let value = value_within(&key, &value, depth)?;
@@ -84,7 +84,7 @@ fn value_within(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<V
             .collect();
         return Ok(Value::Array(items?));
     }
-    // Numbers of numpy are none of Python's classes.
+    // Numbers of numpy do not belong to Python's classes.
     if let Ok(number) = value.extract::<i64>() {
         return Ok(Value::Integer(number));
     }

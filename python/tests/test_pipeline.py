@@ -54,7 +54,7 @@ def test_motions_of_real_scans_are_those_of_a_run(radiate: Path, tmp_path: Path)
 
 
 def test_motions_with_a_gyro_are_those_of_a_run(radiate: Path, tmp_path: Path) -> None:
-    gyro = {"gyro.kind": "auto", "gyro.late_s": 1.58, "gyro.up": "-z"}
+    gyro = {"gyro.kind": "auto", "gyro.delay_s": 1.58, "gyro.up": "-z"}
     given = [argument for key, value in gyro.items() for argument in ("--set", f"{key}={value}")]
     gyre_program("run", "--data", radiate, "--out", tmp_path, "--set", "source.scans=40", *given)
     config = gyre.Config.read(tmp_path / "config.toml")

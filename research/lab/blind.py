@@ -2,6 +2,7 @@
 """Measures what becomes of a simulated drive on which the radar is blind for a while: by radar alone, with a gyro, with both.
 
     cargo build --release
+    cargo build --release --manifest-path research/Cargo.toml -p gyre-worlds
     research/lab/blind.py target/release/gyre --seeds 1 2 3 4 [--blind-s 10] [--from-s 60] [--realism road] [--profile asm330lhh] [--out out/blind]
 
 The radome is blocked (`simulation.weather`, 100 dB) from `--from-s` on, for `--blind-s`. Each drive is simulated once, and
@@ -46,7 +47,7 @@ def simulate(arguments, seed, out):
         *arguments.set_simulation,
     ]
     scans = int(4 * (arguments.from_s + arguments.blind_s + arguments.after_s))
-    command = [arguments.gyre, "simulate", arguments.config, "--out", out, "--scans", str(scans), *settings(values)]
+    command = [arguments.worlds, arguments.config, "--out", out, "--scans", str(scans), *settings(values)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
@@ -146,6 +147,7 @@ def measure(arguments, recording, out):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("gyre")
+    parser.add_argument("--worlds", default="research/target/release/gyre-worlds", help="the program that simulates")
     parser.add_argument("--config", default="configs/demo.toml")
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3, 4])
     parser.add_argument("--blind-s", type=float, default=10.0)

@@ -22,13 +22,13 @@ pub struct Browser {
     answers: BufReader<ChildStdout>,
     session: Option<String>,
     sent: u64,
-    /// Errors of the page: exceptions, and what it or the browser logs as one.
+    /// Errors of the page: exceptions, and errors that the page or the browser logs.
     pub errors: Vec<String>,
     _profile: TempDir,
 }
 
 impl Browser {
-    /// Starts it; prints why a test is skipped where there is none.
+    /// Starts a browser; prints why a test is skipped if there is no browser.
     pub fn start() -> Option<Self> {
         let works = |program: &&&str| {
             let version = Command::new(program).arg("--version").output();

@@ -5,7 +5,6 @@ use std::process::{Command, ExitStatus};
 /// A run that is over, or another command.
 #[derive(Clone, Debug)]
 pub struct Ended {
-    /// The exit status.
     pub status: ExitStatus,
     /// The standard output.
     pub stdout: String,
@@ -14,7 +13,7 @@ pub struct Ended {
 }
 
 impl Ended {
-    /// Runs a command that ends by itself.
+    /// Runs a command to its end.
     pub fn of(mut command: Command) -> Self {
         let output = command.env("RUST_BACKTRACE", "1").output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
@@ -37,7 +36,7 @@ impl Ended {
         self
     }
 
-    /// Asserts that it said one sentence with all of these words, nothing else, and failed.
+    /// Asserts that the command failed with one sentence that contains all of these words.
     pub fn refused_with(&self, words: &[&str]) -> &Self {
         assert_eq!(
             self.stderr.lines().count(),

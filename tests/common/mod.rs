@@ -63,7 +63,7 @@ pub fn folder() -> TempDir {
     folder
 }
 
-/// The Python for what is tested in Python: it may have packages that `python3` has not.
+/// The Python for tests in Python: it may have packages that `python3` lacks.
 pub fn python() -> String {
     env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
@@ -106,7 +106,7 @@ pub fn wrapped(by: &[&str], command: &Command) -> Command {
     wrapped
 }
 
-/// A folder of real data; says so and returns `None` where there is none.
+/// A folder of real data; prints why and returns `None` if the folder is missing.
 pub fn real_data(folder: &str) -> Option<PathBuf> {
     match env::var_os("GYRE_DATA") {
         Some(data) => Some(Path::new(&data).join(folder)),
@@ -119,7 +119,7 @@ pub fn real_data(folder: &str) -> Option<PathBuf> {
 
 /// Returns whether networks can be computed here; prints why a test is skipped.
 pub fn runtime_is_installed() -> bool {
-    let found = gyre_networks::runtime::find(None).is_ok();
+    let found = gyre_masking::networks::runtime::find(None).is_ok();
     if !found {
         println!("skipped: ONNX Runtime is not installed");
     }
@@ -130,7 +130,7 @@ pub fn runtime_is_installed() -> bool {
 /// time.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Holds the configuration, the results and what the run says.
+    /// Holds the configuration, the results and the output of the run.
     folder: Arc<TempDir>,
     out: PathBuf,
     configuration: PathBuf,
@@ -296,7 +296,7 @@ impl Run {
             .stdin(Stdio::null())
             .stdout(file("stdout.txt"))
             .stderr(file("stderr.txt"));
-        // A backtrace in what a person reads would go unnoticed without this.
+        // Without this a backtrace in text for a person would go unnoticed.
         command.env("RUST_BACKTRACE", "1").env_remove("GYRE_LOG");
         Running::new(self.clone(), command.spawn().unwrap())
     }

@@ -5,7 +5,6 @@
 pub struct ChainRow {
     /// Number in the chain.
     pub seq: u64,
-    /// The scan.
     pub scan: u64,
     /// The scan that it was compared with.
     pub previous_scan: u64,

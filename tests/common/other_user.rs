@@ -1,4 +1,4 @@
-//! A user without privileges, for what the system grants root alone.
+//! A user without privileges, for tests of rights that only root has.
 
 use std::{
     fs,
@@ -20,7 +20,7 @@ pub struct OtherUser {
 }
 
 impl OtherUser {
-    /// `None`, which is said, if this user cannot become another.
+    /// `None`, with a message, if this user cannot become a different user.
     pub fn new(folder: &Path) -> Option<Self> {
         if !geteuid().is_root() {
             println!("skipped: only root can become another user");
@@ -35,7 +35,7 @@ impl OtherUser {
         Some(Self { id, program })
     }
 
-    /// A command of this user, to which a program and its arguments are added.
+    /// A command of this user; the caller adds a program and its arguments.
     pub fn command(&self) -> Command {
         let id = self.id.to_string();
         let mut command = Command::new("setpriv");

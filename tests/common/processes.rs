@@ -53,14 +53,14 @@ pub fn guardian_of(supervisor: Pid) -> Option<Pid> {
     pids().find(is_guardian)
 }
 
-/// Processes of the run at `root`, by what their environment says.
+/// Processes whose environment names the run at `root`.
 pub fn of_run(root: &Path) -> Vec<Pid> {
     pids()
         .filter(|pid| run_of(*pid).is_some_and(|run| run == root))
         .collect()
 }
 
-/// The root of the run that a process belongs to, by what its environment says.
+/// The root of the run that the environment of a process names.
 pub fn run_of(pid: Pid) -> Option<PathBuf> {
     let environment = fs::read(format!("/proc/{pid}/environ")).ok()?;
     let mut variables = environment.split(|byte| *byte == 0);

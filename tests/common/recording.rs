@@ -87,7 +87,7 @@ pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
     config.sensor.profile = Profile::Cts350xRadiate;
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
-    config.effects.lost_azimuths = Some(loses_azimuths);
+    config.sensor.lost_azimuths = loses_azimuths;
     simulated(&format!("radiate-{loses_azimuths}"), &config)
 }
 
@@ -106,15 +106,27 @@ pub fn linked(recording: &Path, keep: impl Fn(usize) -> bool) -> TempDir {
         .prefix("gyre-recording-")
         .tempdir()
         .unwrap();
-    copy_files(recording, folder.path());
+    link(recording, folder.path(), keep);
+    folder
+}
+
+/// A damaged recording: a copy of the small one whose images `damage` may replace.
+pub fn damaged(name: &str, damage: impl FnOnce(&[PathBuf])) -> PathBuf {
+    prepared(name, |folder| {
+        fs::create_dir(folder).unwrap();
+        link(small(), folder, |_| true);
+        fs::remove_file(folder.join("ground_truth.tum")).unwrap();
+        damage(&images(folder));
+    })
+}
+
+fn link(recording: &Path, folder: &Path, keep: impl Fn(usize) -> bool) {
+    copy_files(recording, folder);
     let images = images(recording);
-    let place = folder
-        .path()
-        .join(images[0].parent().unwrap().strip_prefix(recording).unwrap());
+    let place = folder.join(images[0].parent().unwrap().strip_prefix(recording).unwrap());
     for (_, image) in images.iter().enumerate().filter(|(scan, _)| keep(*scan)) {
         symlink(image, place.join(image.file_name().unwrap())).unwrap();
     }
-    folder
 }
 
 /// Copies all but the images.
@@ -177,8 +189,8 @@ fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Replaces an image by itself with other times of its rows, us since 1970: `stamp_us` returns that
-/// of a row, from 0, given the one that it has.
+/// Replaces the times of an image's rows, us since 1970: `stamp_us` returns the time of a row, from
+/// 0, for its present time.
 pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     const STAMP: usize = 8;
     rewrite(image, |row, pixels| {
@@ -187,13 +199,13 @@ pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     });
 }
 
-/// Replaces an image by itself with all rows marked as measured.
+/// Marks all rows of an image as measured.
 pub fn complete(image: &Path) {
     const VALIDITY: usize = 10;
     rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
 }
 
-/// Replaces an image by itself with other rows: `edit` is given their numbers from 0.
+/// Edits the rows of an image: `edit` is given their numbers from 0.
 fn rewrite(image: &Path, edit: impl Fn(usize, &mut [u8])) {
     let bytes = fs::read(image).unwrap();
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
@@ -223,9 +235,16 @@ fn replace(image: &Path, bytes: &[u8]) {
     fs::write(image, bytes).unwrap();
 }
 
-/// Simulates where the build keeps its temporary files, unless this build of the tests has done so
-/// already. Test processes that start at the same time wait for the first.
 fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
+    prepared(name, |recording| {
+        write_dataset(config, recording, &mut |_, _| ()).unwrap();
+    })
+}
+
+/// Makes a recording in a new folder where the build keeps its temporary files, unless this build
+/// of the tests has made the recording already. Test processes that start at the same time wait for
+/// the first.
+pub fn prepared(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
     let test = env::current_exe().unwrap();
     let name = format!("{}-{name}", test.file_stem().unwrap().to_string_lossy());
     let place = Path::new(env!("CARGO_TARGET_TMPDIR"));
@@ -233,12 +252,12 @@ fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
     let lock = File::create(place.join(format!("{name}.lock"))).unwrap();
     lock.lock().unwrap();
     let built = fs::metadata(&test).unwrap().modified().unwrap();
-    let made_by = recording.join("made_by.txt");
+    let made_by = place.join(format!("{name}.made_by"));
     if fs::read_to_string(&made_by).is_ok_and(|text| text == format!("{built:?}")) {
         return recording;
     }
     let _ = fs::remove_dir_all(&recording);
-    write_dataset(config, &recording, &mut |_, _| ()).unwrap();
+    make(&recording);
     fs::write(&made_by, format!("{built:?}")).unwrap();
     recording
 }

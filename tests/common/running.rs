@@ -118,7 +118,7 @@ impl Running {
         self
     }
 
-    /// Waits until it has said this on standard error.
+    /// Waits until the run has printed these words on standard error.
     pub fn await_words(&mut self, words: &str) -> &mut Self {
         self.until(words, |running| {
             let said = running.run.said("stderr.txt");

@@ -57,7 +57,7 @@ impl Server {
         self.line(" connect to ")
     }
 
-    /// Waits until it has said a line with these words, and returns what is behind them.
+    /// Waits for a line with these words, and returns the text after them.
     pub fn line(&self, words: &str) -> String {
         let since = Instant::now();
         loop {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, Weak};
 
 /// A value that is made for the first test that asks for it, and for all that ask while one of them
-/// has it. What it has on the disk goes with the last of them; a `static` value would leave it.
+/// has it. Its files on the disk are removed with the last user; a `static` value would leave them.
 pub struct Shared<T>(Mutex<Weak<T>>);
 
 impl<T> Shared<T> {

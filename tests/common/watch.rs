@@ -63,14 +63,14 @@ impl Watch {
         send(self.pid(), signal);
     }
 
-    /// Kills it and returns what it has printed.
+    /// Kills the process and returns its output.
     pub fn kill(mut self) -> Watched {
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.read()
     }
 
-    /// Waits until it ends by itself, and returns what it has printed.
+    /// Waits until the process ends, and returns its output.
     pub fn finish(mut self) -> Watched {
         let since = Instant::now();
         while self.child.try_wait().unwrap().is_none() {

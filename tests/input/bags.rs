@@ -1,5 +1,5 @@
-//! Bags of ROS 2: what a run has found, written and read by a reader that is not Gyre's own, and
-//! its scans taken back to the same motions.
+//! Bags of ROS 2: a run's results are written and then read by an independent reader, and its scans
+//! give the same motions again.
 
 use std::{
     fs,
@@ -36,8 +36,8 @@ fn bag(run: &Run, name: &str) -> PathBuf {
     run.folder().join(name)
 }
 
-/// Returns what the independent reader says of the bag of a run, and of one with a radar that looks
-/// to the left; `None` where it is not installed.
+/// Returns the independent reader's report about the bag of a run, and about a bag with a radar
+/// that looks to the left; `None` where it is not installed.
 fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
     let can = Command::new(python())
         .args(["-c", "import rosbags, numpy"])
@@ -159,7 +159,7 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
 }
 
 #[test]
-#[ignore = "nightly: a bag of a recording of a run"]
+#[ignore = ".ci/nightly: a bag of a recording of a run"]
 fn a_recorded_run_becomes_the_same_bag() {
     let whole = completed();
     let run = Run::small().data(whole.path());
@@ -234,7 +234,7 @@ fn a_damaged_scan_is_skipped_and_counted() {
     };
     let fewer = again(&path, &["is damaged at byte"]);
     assert!(fewer > 0 && fewer < recording::SCANS - 1, "{fewer}");
-    // Cut within a chunk: what is before it is read.
+    // Cut within a chunk: the messages before the cut are read.
     let cut = bag(&run, "cut.mcap");
     fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
     again(&cut, &["has no end behind byte"]);

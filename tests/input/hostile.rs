@@ -13,7 +13,7 @@ use gyre_slam::{Keyframe, Place, Query, records_path};
 
 use crate::common::{Ended, Run, recording, undisturbed, wrapped};
 
-/// Address space of the process, kB: twice what the program and its libraries map.
+/// Address space of the process, kB: twice the mapped size of the program and its libraries.
 const LIMIT_KB: usize = 4_000_000;
 
 /// `gyre` with these arguments and a limit on its memory.
@@ -40,40 +40,99 @@ fn sparse(file: &Path, gigabytes: u64) {
         .unwrap();
 }
 
+/// Files are opened by one reader, which has tests of its own; here, each command reads by it.
 #[test]
-fn a_configuration_without_end_is_refused() {
-    limited(&["run", "/dev/zero"]).refused_with(&["/dev/zero", "it is a device, not a file"]);
+fn files_without_end_are_refused_whatever_reads_them() {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("run.toml");
-    sparse(&file, 100);
-    limited(&["run", path(&file)]).refused_with(&["run.toml", "16 MB"]);
-}
-
-#[test]
-fn a_configuration_of_many_brackets_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("run.toml");
-    for text in [
-        "a = ".to_owned() + &"[".repeat(1_000_000),
-        "[".to_owned() + &"a.".repeat(1_000_000) + "b]",
-    ] {
-        fs::write(&file, text).unwrap();
-        let ended = limited(&["run", path(&file)]);
-        ended.refused_with(&["run.toml", "TOML parse error"]);
-        assert!(ended.stderr.len() < 1000, "{}", ended.stderr);
+    let file = |name: &str| folder.path().join(name);
+    let huge = |name: &str| {
+        sparse(&file(name), 100);
+        file(name)
+    };
+    let (run, truth, motions) = (huge("run.toml"), huge("truth.tum"), huge("odometry.csv"));
+    let estimate = file("trajectory.tum");
+    fs::write(&estimate, "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").unwrap();
+    let (endless, options) = (recording::copy(2), recording::copy(2));
+    for (copy, is_endless) in [(&endless, true), (&options, false)] {
+        let settings = copy.path().join("dataset.toml");
+        let _ = fs::remove_file(&settings);
+        match is_endless {
+            true => symlink("/dev/zero", &settings).unwrap(),
+            false => sparse(&settings, 100),
+        }
     }
-}
-
-#[test]
-fn options_of_a_recording_without_end_are_refused() {
-    let copy = recording::copy(2);
-    let file = copy.path().join("dataset.toml");
-    let _ = fs::remove_file(&file);
-    symlink("/dev/zero", &file).unwrap();
-    limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "a device"]);
-    fs::remove_file(&file).unwrap();
-    sparse(&file, 100);
-    limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "16 MB"]);
+    let simulated = tempfile::tempdir().unwrap();
+    symlink("/dev/zero", simulated.path().join("simulation.toml")).unwrap();
+    let images = recording::copy(2);
+    for image in recording::images(images.path()) {
+        let mut bytes = fs::read(&image).unwrap();
+        fs::remove_file(&image).unwrap();
+        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
+        fs::write(&image, bytes).unwrap();
+    }
+    let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
+    let card = file("single-127.toml");
+    fs::copy(models.join("single-127.toml"), &card).unwrap();
+    huge("single-127.onnx");
+    let (out, small) = (file("out"), path(recording::small()));
+    let learned = |card: &Path| {
+        let model = format!("masking.model='{}'", card.display());
+        let settings = [
+            "raster.n=127",
+            "raster.cell_m=0.8",
+            "masking.kind=learned",
+            &model,
+        ];
+        let words = settings
+            .iter()
+            .flat_map(|it| ["--set".to_owned(), (*it).to_owned()]);
+        let run = ["run", "--data", small, "--out", path(&out)].map(str::to_owned);
+        run.into_iter().chain(words).collect::<Vec<_>>()
+    };
+    let words = |words: &[&str]| words.iter().map(|it| (*it).to_owned()).collect::<Vec<_>>();
+    let evaluate = ["evaluate", "--estimate", path(&estimate), "--ground-truth"];
+    for (arguments, expected) in [
+        (
+            words(&["run", "/dev/zero"]),
+            ["/dev/zero", "it is a device"],
+        ),
+        (words(&["run", path(&run)]), ["run.toml", "16 MB"]),
+        (
+            words(&["inspect", path(endless.path())]),
+            ["dataset.toml", "a device"],
+        ),
+        (
+            words(&["inspect", path(options.path())]),
+            ["dataset.toml", "16 MB"],
+        ),
+        (
+            words(&["inspect", path(images.path())]),
+            ["png", "too large"],
+        ),
+        (
+            words(&["simulate", "--scans", "2", "--out", path(simulated.path())]),
+            ["simulation.toml", "a device"],
+        ),
+        (
+            words(&[&evaluate[..], &[path(&truth)]].concat()),
+            ["truth.tum", ""],
+        ),
+        (
+            words(
+                &[
+                    &evaluate[..],
+                    &[path(&estimate), "--odometry", path(&motions)],
+                ]
+                .concat(),
+            ),
+            ["odometry.csv", "line"],
+        ),
+        (learned(Path::new("/dev/zero")), ["/dev/zero", "a device"]),
+        (learned(&card), ["single-127.onnx", "MB"]),
+    ] {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        limited(&arguments).failed_with(&expected);
+    }
 }
 
 /// Nobody writes to these pipes, so that to open one waits for ever.
@@ -85,109 +144,37 @@ fn a_pipe_in_place_of_a_file_is_refused_at_once() {
         Ended::of(wrapped(&["timeout", "20"], &command))
     };
     let folder = tempfile::tempdir().unwrap();
-    let configuration = folder.path().join("run.toml");
-    fs::write(&configuration, "").unwrap();
-    let out = folder.path().join("out");
-    let run = |data: &str| {
-        let [configuration, out] = [&configuration, &out].map(|file| path(file));
-        at_once(&["run", configuration, "--data", data, "--out", out])
-    };
-    let is_pipe = "it is a pipe, not a file";
-    let copy = recording::copy(2);
-    let data = path(copy.path());
-    replace_by_pipe(&copy.path().join("dataset.toml"));
-    at_once(&["inspect", data]).refused_with(&["dataset.toml", is_pipe]);
-    run(data).refused_with(&["dataset.toml", is_pipe]);
-    let copy = recording::copy(2);
-    for image in recording::images(copy.path()) {
-        replace_by_pipe(&image);
-    }
-    at_once(&["inspect", path(copy.path())]).refused_with(&["holds no PNG images"]);
-    let recorded = folder.path().join("drive.mcap");
-    replace_by_pipe(&recorded);
-    at_once(&["inspect", path(&recorded)]).refused_with(&["drive.mcap", is_pipe]);
-    run(path(&recorded)).refused_with(&["drive.mcap", is_pipe]);
-    fs::remove_file(&recorded).unwrap();
-    fs::create_dir(&recorded).unwrap();
-    run(path(&recorded)).refused_with(&["there is no recording", "drive.mcap"]);
+    let [configuration, recorded] = ["run.toml", "drive.mcap"].map(|name| folder.path().join(name));
+    let (options, images) = (recording::copy(2), recording::copy(2));
+    replace_by_pipe(&options.path().join("dataset.toml"));
+    recording::images(images.path())
+        .iter()
+        .for_each(|image| replace_by_pipe(image));
     replace_by_pipe(&configuration);
-    run(path(&recorded)).refused_with(&["run.toml", is_pipe]);
+    replace_by_pipe(&recorded);
+    let is_pipe = "it is a pipe, not a file";
+    for (arguments, words) in [
+        (["inspect", path(options.path())], ["dataset.toml", is_pipe]),
+        (
+            ["inspect", path(images.path())],
+            ["holds no PNG images", ""],
+        ),
+        (["inspect", path(&recorded)], ["drive.mcap", is_pipe]),
+        (["run", path(&configuration)], ["run.toml", is_pipe]),
+    ] {
+        at_once(&arguments).refused_with(&words);
+    }
+    for data in [options.path(), &recorded] {
+        let out = folder.path().join("out");
+        let ended = at_once(&["run", "--data", path(data), "--out", path(&out)]);
+        ended.refused_with(&[is_pipe]);
+    }
 }
 
 fn replace_by_pipe(file: &Path) {
     let _ = fs::remove_file(file);
     let made = Command::new("mkfifo").arg(file).status();
     assert!(made.unwrap().success(), "{}", file.display());
-}
-
-#[test]
-fn the_configuration_of_a_simulated_recording_without_end_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    symlink("/dev/zero", folder.path().join("simulation.toml")).unwrap();
-    let out = path(folder.path());
-    let ended = limited(&["simulate", "--scans", "2", "--out", out]);
-    ended.failed_with(&["simulation.toml", "a device"]);
-}
-
-#[test]
-fn an_image_that_claims_to_be_huge_is_refused() {
-    let copy = recording::copy(2);
-    let images = fs::read_dir(copy.path().join("radar")).unwrap();
-    for image in images.map(|entry| entry.unwrap().path()) {
-        let mut bytes = fs::read(&image).unwrap();
-        fs::remove_file(&image).unwrap();
-        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
-        fs::write(&image, bytes).unwrap();
-    }
-    limited(&["inspect", path(copy.path())]).refused_with(&["png", "too large"]);
-}
-
-#[test]
-fn trajectories_and_motions_without_end_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let [truth, motions] = ["truth.tum", "odometry.csv"].map(|name| folder.path().join(name));
-    let estimate = folder.path().join("trajectory.tum");
-    fs::write(&estimate, "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").unwrap();
-    sparse(&truth, 100);
-    let evaluate = ["evaluate", "--estimate", path(&estimate), "--ground-truth"];
-    limited(&[&evaluate[..], &[path(&truth)]].concat()).refused_with(&["truth.tum"]);
-    sparse(&motions, 100);
-    let odometry = [path(&estimate), "--odometry", path(&motions)];
-    limited(&[&evaluate[..], &odometry].concat()).failed_with(&["odometry.csv", "line"]);
-}
-
-#[test]
-fn a_model_and_a_card_without_end_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
-    let run = |card: &Path| {
-        let model = format!("masking.model='{}'", card.display());
-        let out = folder.path().join("out");
-        let small = ["--set", "raster.n=127", "--set", "raster.cell_m=0.8"];
-        let learned = ["--set", "masking.kind=learned", "--set", &model];
-        let run = [
-            "run",
-            path(&folder.path().join("run.toml")),
-            "--data",
-            path(recording::small()),
-            "--out",
-            path(&out),
-        ]
-        .map(str::to_owned);
-        let arguments: Vec<&str> = run
-            .iter()
-            .map(String::as_str)
-            .chain(small)
-            .chain(learned)
-            .collect();
-        limited(&arguments)
-    };
-    fs::write(folder.path().join("run.toml"), "").unwrap();
-    run(Path::new("/dev/zero")).failed_with(&["/dev/zero", "a device"]);
-    let card = folder.path().join("single-127.toml");
-    fs::copy(models.join("single-127.toml"), &card).unwrap();
-    sparse(&folder.path().join("single-127.onnx"), 100);
-    run(&card).failed_with(&["single-127.onnx", "MB"]);
 }
 
 #[test]
@@ -201,7 +188,7 @@ fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on
         journal::path(out),
         records_path::<Keyframe>(out),
         records_path::<Query>(out),
-        // Last: loop-closure alone reads it, and odometry goes on to its end meanwhile.
+        // Last: only loop-closure reads this log, and odometry continues to its end meanwhile.
         records_path::<Place>(out),
     ] {
         let whole = fs::read(&log).unwrap();

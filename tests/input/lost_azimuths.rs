@@ -32,7 +32,7 @@ fn stale(scans: &[OwnedScan]) -> Vec<usize> {
     scans.iter().map(|scan| stale_rows(&scan.view())).collect()
 }
 
-/// The mean difference of powers, in scans with losses, from those of the whole scans.
+/// The mean difference of powers between scans with losses and the whole scans.
 fn difference(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
     let lossy = (0..scans.len()).filter(|scan| stale[*scan] > 0);
     let powers = lossy.flat_map(|scan| scans[scan].bytes.iter().zip(&whole[scan].bytes));
@@ -40,8 +40,8 @@ fn difference(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 
     powers.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / count
 }
 
-/// The mean distance, in steps, from the angles of measured rows to those at which the whole scans
-/// have them.
+/// The mean distance, in steps, between the angles of measured rows and their angles in the whole
+/// scans.
 fn misplaced(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
     let mut off = Vec::new();
     for scan in (0..scans.len()).filter(|scan| stale[*scan] > 0) {

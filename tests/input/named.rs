@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::common::{Ended, OtherUser, Run, folder, gyre, recording};
+use crate::common::{Ended, OtherUser, folder, gyre, recording};
 
 /// A name with a byte that no UTF-8 has.
 fn unprintable(folder: &Path) -> PathBuf {
@@ -64,19 +64,6 @@ fn a_folder_in_place_of_a_configuration_is_refused_with_what_to_name() {
         " is a folder: name the configuration in it, ",
         own.to_str().unwrap(),
     ]);
-}
-
-#[test]
-fn a_value_of_another_kind_is_refused_in_plain_words() {
-    let set = |sentence: &str| Run::of_recording().set(sentence).finish();
-    set("masking.threshold=abc").refused_with(&[
-        "[masking]: threshold is \"abc\", but must be a whole number from 0 to 255",
-    ]);
-    set("masking.threshold=256").refused_with(&["threshold is `256`, but must be a whole number"]);
-    set("stages.masking.command=./x").refused_with(&[
-        "[stages.masking]: command is \"./x\", but must be a list, as in [\"./x\"]",
-    ]);
-    set("raster.cell_m=wide").refused_with(&["[raster]: cell_m is \"wide\", but must be a number"]);
 }
 
 /// Results are their user's alone, so nobody else knows whether a run has keyframes.

@@ -123,22 +123,6 @@ fn a_part_of_a_simulation_is_the_same_part_of_its_recording() {
 }
 
 #[test]
-fn the_source_and_the_supervisor_can_be_killed_and_the_stream_goes_on() {
-    let undisturbed = streamed().complete();
-    let run = streamed();
-    let mut running = run.start();
-    running.await_poses(SCANS / 3).kill("radar-replay");
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
-    let run = streamed();
-    let mut running = run.start();
-    running.await_poses(SCANS / 3);
-    running.kill_supervisor();
-    assert_eq!(run.complete(), undisturbed);
-    assert!(run.summary()["resumed_after"].as_u64().unwrap() >= (SCANS / 3) as u64);
-}
-
-#[test]
 fn a_radar_that_does_not_wait_can_be_simulated() {
     let run = streamed().rate("0.5").set("run.mode=live");
     let rows = odometry::rows(&run.complete());

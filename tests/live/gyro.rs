@@ -20,8 +20,8 @@ use crate::{
 
 pub const SCANS: usize = 12;
 
-/// A recording with the logs of a gyro and of wheels, all rows of which are measured: a radar sends
-/// no others.
+/// A recording with the logs of a gyro and of wheels. All its rows are measured, because a radar
+/// sends no others.
 pub fn with_log() -> TempDir {
     let simulation = format!("scans = {SCANS}\n{}", recording::SENSOR);
     let mut config: SimulationConfig = toml::from_str(&simulation).unwrap();
@@ -35,14 +35,14 @@ pub fn with_log() -> TempDir {
     whole
 }
 
-/// A sensor that sends what a log holds once somebody receives it, in datagrams of ten samples.
+/// A sensor that sends a log once somebody receives it, in datagrams of ten samples.
 fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
     thread::spawn(move || {
         let text = fs::read_to_string(log).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(&address).unwrap();
-        // While nobody receives, the call after one that has sent says so.
+        // While nobody receives, each send reports the failure of the send before.
         let probe = || {
             socket.send(b"")?;
             thread::sleep(Duration::from_millis(5));
@@ -114,10 +114,9 @@ fn a_live_gyro_that_is_silent_leaves_the_radar_alone() {
 #[test]
 fn a_log_beside_a_live_radar_is_refused() {
     let radar = Radar::playing(recording::small(), &[]);
-    let run = radar.run(SCANS).set("gyro.kind=auto");
-    run.finish()
-        .refused_with(&["gyro.kind", "the radar is live", "`udp`"]);
-    let run = radar.run(SCANS).set("wheels.kind=auto");
-    run.finish()
-        .refused_with(&["wheels.kind", "the radar is live", "`udp`"]);
+    for sensor in ["gyro.kind", "wheels.kind"] {
+        let run = radar.run(SCANS).set(&format!("{sensor}=auto"));
+        run.finish()
+            .refused_with(&[sensor, "the radar is live", "`udp`"]);
+    }
 }

@@ -21,7 +21,7 @@ use crate::{
 
 /// Ends a run of a radar that has ended, with a pose of each scan that it has published.
 fn interrupt(run: &Run, running: Running) -> Value {
-    // What is on its way arrives.
+    // Waits for datagrams in flight.
     thread::sleep(Duration::from_millis(500));
     await_status(run, "a pose of each scan", |status| {
         let count = |key: &str| status[key].as_u64().unwrap_or_default();
@@ -49,7 +49,7 @@ fn assert_all_counted(summary: &Value, played: &Played) {
         summary["stages"]["radar-replay"]
     );
     let missing = count(summary, "missing_azimuths");
-    // Those of scans that were left out are not missing from any.
+    // Azimuths of dropped scans are not missing from any scan.
     let of_scans = played.lost_azimuths.saturating_sub(missing);
     assert!(
         missing <= played.lost_azimuths + 400 * left_out && of_scans <= 400 * left_out + 4,
@@ -77,7 +77,7 @@ fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_d
     let summary = interrupt(&run, running);
     assert_eq!(summary["restarts"]["radar-replay"], 1);
     assert_all_counted(&summary, &played);
-    // Those of the process that was killed, too: three resets come after it.
+    // The counter includes the killed process: three resets come after it.
     assert!(count(&summary, "reconnections") > played.resets.min(3));
     assert!(count(&summary, "damaged_messages") >= 1);
     assert!(count(&summary, "scans_left_out") >= played.resets);
@@ -101,8 +101,8 @@ fn a_source_that_stands_still_does_not_hide_its_delay() {
     assert!(longest_us.unwrap() > 1e6, "{}", summary["latency"]);
 }
 
-/// Passes on what a group receives to another, but for those datagrams that come within a time of
-/// the first azimuth.
+/// Relays datagrams from one group to another, except datagrams within a time after the first
+/// azimuth.
 fn relay_with_outage(from: &str, to: String, outage: Range<Duration>) {
     let group = from.parse::<SocketAddrV4>().unwrap();
     let receiver = UdpSocket::bind(group).unwrap();
@@ -156,13 +156,13 @@ enum Connection {
     Relayed,
     /// Sends bytes that are no messages.
     Junk,
-    /// Describes the radar, and says again and again that it is alive.
+    /// Describes the radar, and repeatedly reports that it is alive.
     KeptAlive,
     /// Describes the radar, and sends that without a pause.
     Flooded,
 }
 
-/// Listens for connections, and treats one after the other as told; all further ones are relayed.
+/// Listens for connections, and treats each by this list; all further connections are relayed.
 fn relay(radar: &str, all: &'static [Connection]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();

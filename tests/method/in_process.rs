@@ -97,7 +97,7 @@ fn with_the_gyro_of_a_real_drive() {
         let run = run
             .set("gyro.kind=log")
             .set(&format!("gyro.file={}", log.display()))
-            .set("gyro.late_s=1.58")
+            .set("gyro.delay_s=1.58")
             .set("gyro.up=-z")
             .set("source.scans=80");
         assert_eq!(assert_same_bits(&run), 80);
@@ -107,7 +107,7 @@ fn with_the_gyro_of_a_real_drive() {
 }
 
 #[test]
-#[ignore = "nightly: a whole drive"]
+#[ignore = ".ci/nightly: a whole drive"]
 fn on_all_real_scans() {
     on_a_real_drive(466);
 }

@@ -1,5 +1,5 @@
-//! `gyre masks` as a whole: pictures of what each kind of mask keeps of a small simulated drive,
-//! and what is refused.
+//! `gyre masks` as a whole: pictures of the parts of a small simulated drive that each kind of mask
+//! keeps, and invalid arguments.
 
 use std::{
     collections::BTreeSet,
@@ -10,7 +10,7 @@ use std::{
 
 use crate::common::{Ended, Run, folder, gyre, recording};
 use gyre_geometry::Twist;
-use gyre_networks::runtime;
+use gyre_masking::networks::runtime;
 use nalgebra::{Isometry2, Vector2};
 
 /// Pixels a side of a panel, each cell of 127 two wide; and around it.

@@ -3,10 +3,9 @@
 
 pub mod in_process;
 mod joint_search;
-mod k2pi;
 pub mod learned_masks;
 mod masks;
 mod pipeline;
 mod real_scans;
 mod refinement;
-mod standstill;
+pub mod standstill;

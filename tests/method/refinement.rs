@@ -1,11 +1,9 @@
-//! Refinement, the process between the search and the poses: what it changes, what it leaves alone,
-//! and its death while it writes its map.
+//! Refinement, the process between the search and the poses: changed motions, unchanged motions,
+//! and damage of its map.
 
-use std::{collections::BTreeSet, fs, thread, time::Duration};
+use std::{collections::BTreeSet, fs};
 
-use crate::common::{
-    Ended, Pid, Run, Running, STAGES, odometry::columns, recording, send, undisturbed,
-};
+use crate::common::{Run, STAGES, odometry::columns, recording, undisturbed};
 use gyre_journal::{self as journal, Journal};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -27,13 +25,6 @@ const MIDDLE: usize = recording::SCANS / 3;
 
 fn without() -> Run {
     Run::of_recording().set("refinement.kind=none")
-}
-
-/// A map so small that its keyframes' slots are used again within the recording.
-fn with_small_map() -> Run {
-    Run::of_recording()
-        .set("refinement.keyframes=2")
-        .set("run.window=1")
 }
 
 fn names(object: &Value) -> BTreeSet<String> {
@@ -132,91 +123,6 @@ fn joint_search_is_refined_as_well() {
     );
 }
 
-// Its death.
-
-/// The run is disturbed once it is in its middle: the result is that of one that was not, to the
-/// byte.
-fn survives(run: &Run, undisturbed: &str, disturb: impl FnOnce(&mut Running)) {
-    let run = run.clone().rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
-    disturb(&mut running);
-    let ended = running.finish();
-    ended.succeeded();
-    assert_eq!(run.odometry(), undisturbed, "{}", ended.stderr);
-    assert_eq!(run.summary()["published"], recording::SCANS);
-}
-
-#[test]
-fn refinement_and_a_neighbour_killed_at_once_go_on() {
-    for neighbour in ["translation-search", "pose-integration", "masking"] {
-        let run = Run::of_recording();
-        survives(&run, undisturbed(), |running| {
-            running.kill(neighbour).kill(REFINEMENT);
-        });
-        assert_eq!(
-            names(&run.summary()["restarts"]),
-            BTreeSet::from([REFINEMENT, neighbour].map(str::to_owned))
-        );
-    }
-}
-
-/// The recording's vehicle makes nearly every scan a keyframe, so deaths this dense meet keyframes
-/// and states half written.
-#[test]
-#[ignore = "nightly: kills at many moments"]
-fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
-    for run in [Run::of_recording(), with_small_map()] {
-        let alone = run.clone().into(&run.folder().join("alone")).complete();
-        let run = run.set("stages.refinement.restart.limit=1000");
-        survives(&run, &alone, |running| {
-            let mut last: Pid = 0;
-            for delay_us in (0..16).map(|k| 2_500 * k) {
-                last = running.await_other_stage(REFINEMENT, last);
-                thread::sleep(Duration::from_micros(delay_us));
-                send(last, Signal::KILL);
-            }
-        });
-        assert!(
-            run.summary()["restarts"][REFINEMENT].as_u64().unwrap() > 3,
-            "{}",
-            run.summary()["restarts"]
-        );
-    }
-}
-
-#[test]
-#[ignore = "nightly: kills at many moments"]
-fn refinement_killed_after_each_pose_goes_on() {
-    let run = with_small_map();
-    let alone = run.clone().into(&run.folder().join("alone")).complete();
-    let run = run.rate("3").set("stages.refinement.restart.limit=1000");
-    let mut running = run.start();
-    for poses in 1..recording::SCANS {
-        running.await_poses_or_end(poses);
-        if let Some(pid) = running.stages().get(REFINEMENT) {
-            send(*pid, Signal::KILL);
-        }
-    }
-    let ended = running.finish();
-    ended.succeeded();
-    assert_eq!(run.odometry(), alone, "{}", ended.stderr);
-}
-
-#[test]
-#[ignore = "nightly: kills at many moments"]
-fn a_supervisor_killed_again_and_again_does_not_confuse_the_map() {
-    let run = with_small_map();
-    let alone = run.clone().into(&run.folder().join("alone")).complete();
-    let slowly = run.clone().rate(MODERATE);
-    for poses in [1, 2, 7, 8, 15, 20] {
-        let mut running = slowly.start();
-        running.await_poses(poses);
-        running.kill_supervisor();
-    }
-    assert_eq!(run.complete(), alone);
-}
-
 // Its map.
 
 /// Interrupts a run in its middle.
@@ -226,15 +132,6 @@ fn interrupted() -> Run {
     running.await_poses(MIDDLE).signal(Signal::INT);
     assert_eq!(running.finish().code(), Some(130));
     run
-}
-
-#[test]
-fn an_unfinished_run_is_not_continued_with_another_refinement() {
-    let run = interrupted();
-    for other in [without(), Run::of_recording().set("refinement.keyframes=3")] {
-        Ended::of(other.into(run.out()).command())
-            .refused_with(&["unfinished run of another configuration"]);
-    }
 }
 
 /// Returns what damage can leave of a map.

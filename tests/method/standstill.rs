@@ -1,12 +1,9 @@
-//! A vehicle that stops, stands and drives off: the run says so, and a death meanwhile changes
-//! nothing.
+//! A vehicle that stops, stands and drives off: the run reports it.
 
-use std::fmt::Write;
-
-use rustix::process::Signal;
+use std::{fmt::Write, path::PathBuf};
 
 use crate::{
-    common::{Run, odometry::columns, recording, send},
+    common::{self, Run, odometry::columns},
     method::in_process,
 };
 
@@ -36,9 +33,16 @@ fn trajectory() -> String {
     text
 }
 
+/// Scans of the recording.
+pub const SCANS: usize = DRIVE_S * RATE_HZ;
+
+/// The recording of the drive.
+pub fn recording() -> PathBuf {
+    common::recording::along("stop-and-go", &trajectory())
+}
+
 fn run() -> Run {
-    let recording = recording::along("stop-and-go", &trajectory());
-    Run::of_recording_named(recording.to_str().unwrap())
+    Run::small().data(&recording())
 }
 
 #[test]
@@ -63,26 +67,7 @@ fn the_motions_of_a_standing_vehicle_are_zero_and_said_to_be() {
     }
 }
 
-/// The state of the standstill is part of the checkpoint.
-#[test]
-fn refinement_killed_while_the_vehicle_stands_goes_on() {
-    let run = run();
-    let alone = run.clone().into(&run.folder().join("alone")).complete();
-    let run = run.rate("8").set("stages.refinement.restart.limit=1000");
-    let mut running = run.start();
-    for poses in [14, 20, 30, 40, 45, 46] {
-        running.await_poses(poses);
-        if let Some(pid) = running.stages().get("refinement") {
-            send(*pid, Signal::KILL);
-        }
-    }
-    let ended = running.finish();
-    ended.succeeded();
-    assert_eq!(run.odometry(), alone, "{}", ended.stderr);
-    assert!(run.summary()["restarts"]["refinement"].as_u64().unwrap() > 3);
-}
-
 #[test]
 fn one_process_holds_the_pose_as_a_run_does() {
-    assert_eq!(in_process::assert_same_bits(&run()), DRIVE_S * RATE_HZ);
+    assert_eq!(in_process::assert_same_bits(&run()), SCANS);
 }

@@ -1,5 +1,5 @@
-//! `gyre watch --foxglove`: what a viewer that is not Gyre's own receives, who may connect, and one
-//! that never reads.
+//! `gyre watch --foxglove`: messages to an independent viewer, access, and a viewer that never
+//! reads.
 
 use std::{
     collections::BTreeMap,
@@ -17,9 +17,8 @@ use crate::common::{Ended, Run, Running, Server, odometry, python, recording};
 /// Bytes before the powers in each row of an image: the azimuth, its time and its flag.
 const ROW_HEADER: usize = 11;
 
-/// Subscribes to all channels by the Python package `websockets`, decodes what comes by the schemas
-/// that are sent, and prints it once it has so many poses and a message of each channel that a run
-/// has.
+/// Subscribes to all channels by the Python package `websockets`, decodes the messages by their
+/// schemas, and prints them after so many poses and a message of each channel of the run.
 const VIEW: &str = "
 import base64, hashlib, json, struct, sys
 from mcap.records import Schema
@@ -309,7 +308,7 @@ fn frame(text: &str) -> Vec<u8> {
     [&[0x81, 0xfe][..], &length, &[0; 4], text.as_bytes()].concat()
 }
 
-/// Memory of a process's own: what it maps of the run's is not its.
+/// Private memory of a process, without the mapped memory of the run.
 fn own_bytes(pid: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
     let line = status

@@ -1,4 +1,4 @@
-//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and
+//! Recordings of runs: they change nothing, survive kills and full disks, report missing items, and
 //! replay to the same bytes.
 
 use std::{
@@ -20,10 +20,11 @@ use crate::{
         send, undisturbed,
     },
     operate::commands::{ask, await_status, process},
+    restart::faults::configurations,
 };
 
 /// Every topic that a replay can begin with.
-const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
+pub const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
 /// With so large a window the queues hold all scans of these tests: nothing is missed, however slow
 /// the machine is.
 pub const WINDOW: &str = "run.window=32";
@@ -56,7 +57,7 @@ pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
     recording.entries(topic).map(|entry| entry.seq).collect()
 }
 
-/// Waits for the recorder of a run, another one than `not`.
+/// Waits for a recorder of the run other than `not`.
 pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
     loop {
         let recorder = processes::child_with(running.pid(), "record");
@@ -213,8 +214,8 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     from.finish().refused_with(&[&lacks]);
 }
 
-/// Returns the number of scans that are not there, four or more, which the recorder has said and
-/// written.
+/// Returns the number of missing scans, four or more. The recorder must have printed and written
+/// this number.
 fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let recording = open_recording(&file(run)).unwrap();
     let there = seqs(&recording, "scan");
@@ -336,21 +337,29 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
     );
 }
 
+/// The logs of the sensors are not there any more, and their delays are in the samples already.
 #[test]
-fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
-    let run = recorded(&played()).set(ALL);
-    let odometry = run.complete();
-    let again = Run::configured("");
-    let mut command = gyre();
-    command.arg("run").arg("--data").arg(file(&run));
-    command
-        .args(["--from", "masked", "--rate", "2", "--out"])
-        .arg(again.out());
-    let mut running = again.start_as(command);
-    running.await_poses(SCANS / 4).kill("radar-replay");
-    running.await_poses(SCANS / 2).kill("refinement");
-    running.finish().succeeded();
-    assert_eq!(again.odometry(), odometry);
+fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
+    let without_doppler: fn() -> Run = configurations::without_doppler;
+    for (configuration, setting, without) in [
+        (
+            configurations::gyro_and_wheels(),
+            "wheels.kind=none",
+            configurations::with_gyro as fn() -> Run,
+        ),
+        (
+            configurations::doppler(),
+            "doppler.kind=none",
+            without_doppler,
+        ),
+    ] {
+        let run = recorded(&configuration.run()).set(WINDOW);
+        let odometry = run.complete();
+        assert_eq!(replay(&file(&run), &[]), odometry);
+        let alone = without().complete();
+        assert_eq!(replay(&file(&run), &["--set", setting]), alone);
+        assert_ne!(alone, odometry);
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Recordings of live runs: masking numbers the scans that it takes, and gives numbers anew when it
-//! is started again. The newer message of a number is the one that the run's results come from.
+//! Recordings of live runs: masking numbers the scans that it takes, and reuses numbers after a
+//! restart. The newer message of a number is the one that the run's results come from.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ fn slow(run: Run) -> Run {
     recorded(&run)
 }
 
-/// One of a recording, which goes on where it was after a start.
+/// A live run of a recording; after a restart the recording continues at its present place.
 fn played() -> Run {
     let run = Run::small().data(recording::around_a_block());
     slow(run.rate(RATE).set(&format!("source.scans={SCANS}")))
@@ -41,8 +41,8 @@ fn radar() -> Radar {
     Radar::playing(recording::around_a_block(), &["--rate", RATE, "--repeat"])
 }
 
-/// Asserts that the recording is of the results: item by item, and replayed from each topic of
-/// which it has all. Returns what it lacks.
+/// Asserts that the recording contains the results: item by item, and by a replay of each complete
+/// topic. Returns the missing items.
 fn assert_is_of(run: &Run) -> BTreeMap<&'static str, usize> {
     let recording = open_recording(&file(run)).unwrap();
     let items = |topic| -> BTreeMap<u64, (u64, i64)> {
@@ -88,7 +88,7 @@ fn assert_lacks_little(run: &Run) {
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed() {
     let run = played();
     let mut running = run.start();
@@ -100,7 +100,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed() {
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
     let mut running = run.start();
@@ -145,7 +145,7 @@ fn a_recording_has_all_results_of_a_run_that_was_stopped() {
 
 #[test]
 fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorder_was_there() {
-    // Without poses nothing but the recorder can know what the second masking gave anew.
+    // Without poses only the recorder can know which numbers the second masking reused.
     let run = played().set("record.topics=['masked','motion']");
     let mut running = run.start();
     running.await_poses(8);
@@ -179,7 +179,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped() {
     let radar = radar();
     let run = slow(radar.run(SCANS));
@@ -194,7 +194,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
 {
     assert_goes_on(&played());
@@ -202,7 +202,7 @@ fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_sup
     assert_goes_on(&slow(radar.run(SCANS)));
 }
 
-/// A recorder that is killed with the run may lack its last half second, and says so.
+/// A recorder that is killed with the run may lack the last half second, and reports it.
 fn assert_goes_on(run: &Run) {
     let mut running = run.start();
     running.await_poses(8);

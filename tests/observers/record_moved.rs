@@ -1,4 +1,4 @@
-//! Parts of a recording that are moved away while it goes on, as to another disk.
+//! Parts of a recording that are moved away, as to another disk, while the recorder writes.
 
 use std::{fs, path::Path};
 
@@ -29,14 +29,14 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     running.await_poses(SCANS / 3);
     let moved = move_away(&file(&run), &other_disk);
     assert!(moved > 0);
-    // Another recorder goes on, which does not find the first part.
+    // A new recorder continues without the first part.
     let killed = await_recorder(&mut running, None);
     send(killed, Signal::KILL);
     await_recorder(&mut running, Some(killed));
     running.await_poses(2 * SCANS / 3);
     let moved = moved + move_away(&file(&run), &other_disk);
     running.finish().succeeded();
-    // What is left is a recording without its first part, and says so.
+    // The rest is a recording without its first part, and reports it.
     let rest = open_recording(&file(&run)).unwrap();
     assert!(rest.absent_parts().contains(&1));
     let mut inspect = gyre();

@@ -1,5 +1,5 @@
-//! `gyre shadow`: a second program beside a stage of a running run. Whatever it does, the run is
-//! the same; what it answers is compared.
+//! `gyre shadow`: a second program beside a stage of a running run. The shadow never changes the
+//! run; its answers are compared.
 
 use std::{
     fs::{self, File},
@@ -61,7 +61,7 @@ fn release(running: &Running) {
     send(running.stages()["refinement"], Signal::CONT);
 }
 
-/// A shadow that runs, and what it prints.
+/// A running shadow, and its output.
 struct Shadow {
     child: Child,
     /// The folder of its report.
@@ -69,7 +69,7 @@ struct Shadow {
 }
 
 impl Shadow {
-    /// Starts one beside a run; `name` is that of its report.
+    /// Starts one beside a run; `name` is the name of its report.
     fn start(run: &Run, name: &str, stage: &str, options: &[&str]) -> Self {
         let report = run.folder().join(name);
         fs::create_dir_all(&report).unwrap();
@@ -249,7 +249,7 @@ fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in several runs"]
+#[ignore = ".ci/nightly: a drive in several runs"]
 fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
     // The mask takes two scans, and the motions of both.
     let run = long().rate(RATE).masked_by(&card(TWO_SCANS));
@@ -285,8 +285,7 @@ fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
 
 #[test]
 fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
-    let recording = breaks::with_a_gap();
-    let run = breaks::run_of(&recording).rate("0.5");
+    let run = Run::small().data(&breaks::with_a_gap()).rate("0.5");
     let run = run.masked_by(&card(TWO_SCANS));
     let running = held(&run);
     let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));
@@ -310,7 +309,7 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
     // With many scans dropped, motions may be too long for the radar: that is a problem of its own.
     running.finish();
     assert!(run.summary()["dropped"].as_u64() > Some(0));
-    // What is dropped is not compared, and of the rest what the shadow is behind with.
+    // The shadow does not compare dropped items, nor the items that it has not reached.
     assert_identical(shadow.end(), 1);
 }
 
@@ -381,7 +380,7 @@ fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
 }
 
 #[test]
-#[ignore = "nightly: a stage in Python beside a run"]
+#[ignore = ".ci/nightly: a stage in Python beside a run"]
 fn python_masking_beside_the_own_one_is_compared() {
     if !python_stage::can_start() {
         return;

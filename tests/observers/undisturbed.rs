@@ -1,5 +1,5 @@
-//! Observers of a run: whatever happens to them, the result is the same, nothing is left, and each
-//! knows what it has missed.
+//! Observers of a run: faults of observers change no result and leave nothing, and each observer
+//! reports the messages that it missed.
 
 use std::{path::Path, thread, time::Duration};
 
@@ -66,7 +66,7 @@ fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
 }
 
 #[test]
-#[ignore = "nightly: a whole drive"]
+#[ignore = ".ci/nightly: a whole drive"]
 fn observers_of_a_real_recording_change_nothing() {
     let Some(data) = real_data("radiate-2019-02-12") else {
         return;

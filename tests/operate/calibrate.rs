@@ -1,4 +1,4 @@
-//! `gyre calibrate`: what it says of a recording, and that a run takes its file.
+//! `gyre calibrate`: its findings in a recording, and a run with its file.
 
 use std::{
     env, fs,
@@ -39,7 +39,7 @@ fn range_offset_m(settings: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "nightly: calibrates a drive"]
+#[ignore = ".ci/nightly: calibrates a drive"]
 fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
@@ -98,7 +98,7 @@ fn offset_of(block: &str) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "nightly: calibrates two drives"]
+#[ignore = ".ci/nightly: calibrates two drives"]
 fn two_drives_of_one_radar_tell_more_than_one() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
@@ -142,8 +142,8 @@ fn a_drive_that_is_too_short_is_refused() {
     assert!(!out.path().join("calibration.toml").exists());
 }
 
-/// The three-point turn of a real drive: it tells the clock of its gyro in a second, and is too
-/// short for the constants of the radar.
+/// The three-point turn of a real drive: it determines the delay of its gyro, and is too short for
+/// the constants of the radar.
 fn turning() -> Option<TempDir> {
     let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
         println!("skipped: GYRE_DATA is not set");
@@ -172,15 +172,15 @@ fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
     let file = out.path().join("calibration.toml");
     let table: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
     let gyro = table["gyro"].as_table().unwrap();
-    let late_s = gyro["late_s"].as_float().unwrap();
-    assert!((late_s - 1.58).abs() < 0.06, "{said}");
+    let delay_s = gyro["delay_s"].as_float().unwrap();
+    assert!((delay_s - 1.58).abs() < 0.06, "{said}");
     assert_eq!(gyro["kind"].as_str(), Some("auto"));
     let run = Run::of_recording_named(recording.to_str().unwrap())
         .set("source.scans=6")
         .argument("--calibration", file.to_str().unwrap());
     run.complete();
     let used: toml::Table = run.result("config.toml").parse().unwrap();
-    assert_eq!(used["gyro"]["late_s"].as_float(), Some(late_s));
+    assert_eq!(used["gyro"]["delay_s"].as_float(), Some(delay_s));
     assert_eq!(used["gyro"]["up"].as_str(), Some("-z"));
 }
 

@@ -356,7 +356,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
     assert_eq!(run.odometry(), undisturbed());
 }
 
-/// Reads what is sent to a socket, as systemd does, until `STOPPING=1`.
+/// Reads notifications from a socket, as systemd does, until `STOPPING=1`.
 fn notifications(socket: &UnixDatagram) -> Vec<String> {
     let mut buffer = [0; 4096];
     let mut all: Vec<String> = Vec::new();

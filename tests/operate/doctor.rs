@@ -1,4 +1,4 @@
-//! `gyre doctor` says what a machine lacks.
+//! `gyre doctor` reports the faults of a machine.
 
 use std::process::Command;
 

@@ -60,7 +60,7 @@ fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
     let program = python.with_file_name(program);
     let truth = run.out().join("ground_truth.tum");
     let mut command = Command::new(program);
-    // What it plots and logs is its user's.
+    // evo writes its settings and logs into the home folder.
     command.env("HOME", run.folder()).arg("tum").arg(truth);
     command.arg(run.out().join("trajectory.tum")).args(options);
     if command.output().is_err() {
@@ -75,7 +75,7 @@ fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
 }
 
 #[test]
-#[ignore = "nightly: evo starts slowly, and often"]
+#[ignore = ".ci/nightly: evo starts slowly, and often"]
 fn evo_finds_the_same_errors_to_the_digit_it_shows() {
     let simulation = "[simulation]\nscans = 24\n[raster]\nn = 127\ncell_m = 0.8\n";
     let run = Run::configured(simulation);
@@ -259,4 +259,22 @@ fn a_part_that_is_none_is_refused() {
         assert_eq!(ended.code(), Some(2));
         assert!(ended.stderr.contains("as in 0..50"), "{}", ended.stderr);
     }
+}
+
+#[test]
+fn objects_are_evaluated_against_the_truth_of_their_recording() {
+    let data = recording::around_a_block();
+    let run = Run::small().data(data).set("objects.kind=tracks");
+    run.complete();
+    let against = |truth: &Path| {
+        let mut command = gyre();
+        command.args(["evaluate", "--objects"]).arg(run.out());
+        command.arg(truth);
+        Ended::of(command)
+    };
+    let printed = against(data);
+    assert!(printed.succeeded().stdout.contains("precision"));
+    let empty = tempfile::tempdir().unwrap();
+    fs::write(empty.path().join("objects.csv"), "").unwrap();
+    against(empty.path()).failed_with(&["ground_truth.tum"]);
 }

@@ -1,5 +1,5 @@
-//! The ways in: the demo and the configurations of the program in any folder, and one page about
-//! what comes out.
+//! The first steps: the demo and the configurations of the program in any folder, and one page
+//! about the results.
 
 use std::{fs, path::Path};
 
@@ -46,15 +46,15 @@ fn a_configuration_of_the_program_is_run_by_its_name_on_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     let data = recording::small();
     let data = data.to_str().unwrap();
-    let run = ["run", data, "simulated-oxford", "--json"];
+    let run = ["run", data, "stop-and-go", "--json"];
     let ended = at(folder.path(), &run);
     let summary: serde_json::Value = serde_json::from_str(&ended.succeeded().stdout).unwrap();
     assert_eq!(summary["processed"], recording::SCANS);
-    let odometry = folder.path().join("out/simulated-oxford/odometry.csv");
+    let odometry = folder.path().join("out/stop-and-go/odometry.csv");
     assert!(odometry.is_file());
     at(folder.path(), &["run", "oxfrod"])
         .refused_with(&["`oxfrod` is no file or folder", "did you mean `oxford`?"]);
-    at(folder.path(), &["evaluate", "out/simulated-oxford", data]).succeeded();
+    at(folder.path(), &["evaluate", "out/stop-and-go", data]).succeeded();
 }
 
 #[test]

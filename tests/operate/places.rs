@@ -58,7 +58,7 @@ fn no_command_replaces_what_is_not_its_own() {
     let before = state();
     for (number, command) in commands(&run, files).iter().enumerate() {
         let at = |name: &str| files.join(format!("{number}-{name}.mcap"));
-        // A new place, and what the command has written there.
+        // A new folder, then the folder that the command has written.
         expect(false, command, &at("new"));
         if number < NEW_FROM {
             expect(false, command, &at("new"));

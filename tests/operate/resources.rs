@@ -35,7 +35,7 @@ fn an_idle_pipeline_uses_no_time_and_goes_on_afterwards() {
     let source = stages["radar-replay"];
     running.await_poses(recording::SCANS / 3);
     send(source, Signal::STOP);
-    // What was on its way still arrives.
+    // Waits for messages in flight.
     thread::sleep(Duration::from_millis(400));
     let idle = stages
         .iter()

@@ -6,7 +6,7 @@ use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
 
 /// The recording's six seconds in two.
 const MODERATE: &str = "3";
-/// The system's limit on the time in which a processor wakes.
+/// The system's limit on the wake-up time of a processor.
 const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 
 /// The niceness of a process and the processors that it may use.

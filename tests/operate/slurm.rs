@@ -12,7 +12,7 @@ struct Slurm {
 }
 
 impl Slurm {
-    /// Starts it; prints why a test is skipped where there is none.
+    /// Starts Slurm; prints why a test is skipped if there is no Slurm.
     fn start() -> Option<Self> {
         let programs = ["slurmctld", "slurmd", "munged", "sbatch"].iter();
         let is_there = |program: &&str| {

@@ -118,7 +118,7 @@ fn script(run: &Run, name: &str, text: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// A masking stage that stands by as the contract says, and then dies.
+/// A masking stage that stands by as the contract demands, and then dies.
 const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\nexit 3";
 
 #[test]
@@ -133,8 +133,8 @@ fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fail
     script(&run, "own.sh", FAILS);
     ask(&run, &["restart", "masking"]).refused_with(&["own.sh has changed", "gyre swap masking"]);
     assert_eq!(process(&status(&run).unwrap(), "masking")["pid"], before);
-    // The one before is of a file that is another one by now: so it is the one that the run was
-    // begun with.
+    // The file of the earlier program has changed by now, so the swap returns to the program of the
+    // run's start.
     swap(&run, "masking", &[], &[&own]).refused_with(&["own.sh` has failed", "no such mask"]);
     assert_eq!(
         process(&status(&run).unwrap(), "masking")["is_swapped"],
@@ -245,7 +245,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
 
 #[test]
 fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
-    // A minute, of which the swap takes eight seconds and more where the machine is busy.
+    // A minute. The swap takes eight seconds, or more on a busy machine.
     let run = Run::of_recording().rate("0.1").set("run.start_timeout_s=8");
     let mut running = run.start();
     running.await_poses(2);

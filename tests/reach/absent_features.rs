@@ -1,4 +1,4 @@
-//! A build without `--features full` says in one sentence what it lacks, and how to get it.
+//! A build without `--features full` prints one sentence: the missing feature, and how to get it.
 
 use crate::common::{Ended, Run, gyre};
 

@@ -72,7 +72,7 @@ fn a_split_run_goes_on_after_a_death_of_any_process_on_either_side() {
     for (poses, stage) in [(10, "radar-replay"), (13, "pose-integration")] {
         there.await_poses(poses).kill(stage);
     }
-    // The robot's whole side begins again, and goes on.
+    // The robot's whole side begins again, and continues.
     here.await_poses(16);
     here.kill_supervisor();
     robot.start().finish().succeeded();
@@ -139,7 +139,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
     here.kill_supervisor();
     let ended = second.finish();
     ended.failed_with(&["the base has poses of another drive", "--fresh"]);
-    // What was killed is swept by the next run.
+    // The next run removes the leftovers of the killed one.
     first.option("--fresh").finish().succeeded();
 }
 
@@ -272,7 +272,7 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     running.kill_supervisor();
 }
 
-/// A free port of this machine, at which one looks on.
+/// A link over a free port of this machine.
 struct Link {
     address: String,
 }
@@ -416,7 +416,7 @@ struct Machines {
 }
 
 impl Machines {
-    /// Says so and returns `None` where that is not permitted.
+    /// Prints why and returns `None` if the system forbids it.
     fn new() -> Option<Self> {
         let id = process::id() % 65536;
         let subnet = format!("10.{}.{}", 64 + id / 256 % 128, id % 256);

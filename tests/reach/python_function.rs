@@ -69,7 +69,7 @@ fn factors_of_powers_are_a_threshold_where_they_are_one() {
     }
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
     assert_ne!(threshold, undisturbed());
-    // What is left of a power above 90 is the power, and what is not is below the threshold of 60.
+    // Powers above 90 stay unchanged, and all others are below the threshold of 60.
     let text = "def mask(scan):\n    return scan.power > 90\n";
     let (_folder, file) = file(text);
     let run = with(Run::of_recording(), "masking", &file);
@@ -185,7 +185,7 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
 }
 
 #[test]
-#[ignore = "nightly: starts Python often"]
+#[ignore = ".ci/nightly: starts Python often"]
 fn conformance_says_the_line_of_an_exception() {
     if !can_start() {
         return;
@@ -343,19 +343,19 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
         .refused_with(&["unfinished run of another program", is_another]);
     fs::write(&file, &text).unwrap();
     assert_eq!(run.complete(), undisturbed());
-    // Nor are its results those of another one.
+    // A changed file does not continue the results of the old file.
     fs::write(&file, &other).unwrap();
     run.finish().refused_with(&[is_another]);
 }
 
 #[test]
-#[ignore = "nightly: begins a stage and holds it to its contract"]
+#[ignore = ".ci/nightly: begins a stage and holds it to its contract"]
 fn a_begun_mask_keeps_the_contract_and_drives() {
     begun_keep_the_contract_and_drive(&[("masking", "mask")]);
 }
 
 #[test]
-#[ignore = "nightly: the same of the searches"]
+#[ignore = ".ci/nightly: the same of the searches"]
 fn begun_searches_keep_the_contract_and_drive() {
     let searches = [
         ("rotation-search", "rotation"),
@@ -390,7 +390,7 @@ fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
 }
 
 #[test]
-#[ignore = "nightly: builds a program"]
+#[ignore = ".ci/nightly: builds a program"]
 fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
     let folder = folder();
     for stage in ["masking", "rotation-search", "translation-search"] {

@@ -6,7 +6,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     mem::{offset_of, size_of},
     process::Command,
 };
@@ -21,7 +20,7 @@ use serde_json::Value;
 
 use crate::{
     PROJECT,
-    common::{Ended, Pid, Run, gyre, python, recording, send, undisturbed},
+    common::{Ended, Run, gyre, python, recording, undisturbed},
 };
 
 /// The Python and the script.
@@ -46,7 +45,7 @@ pub fn can_start() -> bool {
     has_packages
 }
 
-fn with_python(run: Run) -> Run {
+pub fn with_python(run: Run) -> Run {
     let [python, script] = command();
     run.set(&format!("stages.masking.command=['{python}', '{script}']"))
 }
@@ -146,7 +145,7 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
 }
 
 #[test]
-#[ignore = "nightly: starts Python often"]
+#[ignore = ".ci/nightly: starts Python often"]
 fn it_keeps_the_contract_of_masking() {
     if !can_start() {
         return;
@@ -195,24 +194,6 @@ fn motions(odometry: &str) -> Vec<[f64; 2]> {
         .map(|row| row.unwrap())
         .map(|row| [number(&row, x), number(&row, y)])
         .collect()
-}
-
-#[test]
-fn killed_it_leaves_the_results_as_they_are() {
-    if !can_start() {
-        return;
-    }
-    let undisturbed = with_python(Run::of_recording()).complete();
-    let run = with_python(Run::of_recording()).rate("6");
-    let mut running = run.start();
-    for pose in [6, 12] {
-        running.await_poses(pose);
-        let script = masking_of(running.pid());
-        send(script, Signal::KILL);
-    }
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
-    assert_eq!(run.summary()["restarts"]["masking"], 2);
 }
 
 #[test]
@@ -285,16 +266,4 @@ fn swap_masking(run: &Run, command: &[&str]) {
     swap.args(["swap", "masking"]).arg(run.out());
     swap.args(command);
     Ended::of(swap).succeeded();
-}
-
-/// The process of the script, which is a child of the supervisor.
-fn masking_of(supervisor: Pid) -> Pid {
-    let children = fs::read_to_string(format!("/proc/{supervisor}/task/{supervisor}/children"));
-    let is_script = |pid: &Pid| {
-        let command = fs::read_to_string(format!("/proc/{pid}/cmdline"));
-        command.is_ok_and(|command| command.contains("masking.py"))
-    };
-    let children = children.unwrap();
-    let mut pids = children.split_whitespace().map(|pid| pid.parse().unwrap());
-    pids.find(is_script).unwrap()
 }

@@ -1,5 +1,5 @@
-//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run. All on
-//! the loopback, each test in a domain of its own, with those of
+//! ROS 2 without ROS 2: an independent peer (Cyclone DDS) receives the messages of a run. All on
+//! the loopback, each test in a domain of its own, as the tests of
 //! [`ros2_driver`](super::ros2_driver).
 
 use std::{
@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::common::{Run, gyre, odometry, python};
 
-/// Variance of what is not measured.
+/// The variance of an unmeasured quantity.
 const UNKNOWN: f64 = 1e6;
 /// Where x, y and yaw are among the values of ROS.
 const PLANAR: [usize; 3] = [0, 1, 5];
@@ -42,14 +42,14 @@ pub(crate) fn domain(test: u32) -> String {
     (1 + (process::id() % 9) * 11 + test).to_string()
 }
 
-/// A program that says lines. Dropped, it is killed.
+/// A program that prints lines. Dropped, it is killed.
 pub(crate) struct Program {
     child: Child,
     said: Lines<BufReader<ChildStdout>>,
 }
 
 impl Program {
-    /// Starts it, and waits until it has said its first line.
+    /// Starts the program, and waits for its first line.
     fn start(command: &mut Command) -> Self {
         let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
@@ -69,8 +69,7 @@ impl Program {
         )
     }
 
-    /// A bridge that waits for the run. What it says to the person at the terminal is taken for its
-    /// lines.
+    /// A bridge that waits for the run. Its sentences for the terminal count as its lines.
     pub(crate) fn bridge(run: &Run, domain: &str, options: &[&str]) -> Self {
         let mut command = Command::new("sh");
         command.args(["-c", "exec \"$@\" 2>&1", "sh"]);
@@ -79,7 +78,7 @@ impl Program {
         Self::start(command.args(options))
     }
 
-    /// Closes its input, and returns what it says up to its end.
+    /// Closes the input of the program, and returns its output up to its end.
     fn rest(mut self) -> Vec<String> {
         drop(self.child.stdin.take());
         let said = self.said.by_ref().map(Result::unwrap).collect();
@@ -87,7 +86,7 @@ impl Program {
         said
     }
 
-    /// Ends it as Ctrl-C does, and returns what it has said.
+    /// Ends the program as Ctrl-C does, and returns its output.
     pub(crate) fn interrupt(self) -> Vec<String> {
         let pid = Pid::from_child(&self.child);
         kill_process(pid, Signal::INT).unwrap();
@@ -233,7 +232,7 @@ fn assert_covariance(found: &Value, planar: Option<&Matrix3<f64>>, what: &str) {
     }
 }
 
-/// Asserts that odometry is what the results of the run say, field by field.
+/// Asserts that odometry equals the results of the run, field by field.
 fn assert_odometry(found: &[Value], run: &Run) {
     let poses = expected(run);
     assert_eq!(found.len(), poses.len());

@@ -1,4 +1,4 @@
-//! Tests of what a peer in ROS 2 receives of a run with SLAM: a frame of the map, and the map.
+//! Tests of the messages to a peer in ROS 2 from a run with SLAM: a frame of the map, and the map.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! Tests of what a peer in ROS 2 receives of a run that tracks objects.
+//! Tests of the messages to a peer in ROS 2 from a run that tracks objects.
 
 use std::collections::BTreeMap;
 

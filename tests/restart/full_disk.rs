@@ -1,4 +1,4 @@
-//! A full disk: the exit code and, where it can be written, a sentence tell what happened; nothing
+//! A full disk: the exit code and, if it can be written, a sentence report the cause; nothing
 //! panics.
 
 use std::{fs::File, path::Path, process::Command};

@@ -1,5 +1,4 @@
-//! A run goes on only with what it was begun with: the program, the configuration and the
-//! recording.
+//! A run is continued only with the program, the configuration and the recording of its start.
 
 use std::{
     fs,
@@ -9,6 +8,7 @@ use std::{
 
 use crate::{
     common::{Run, copy_program, install, recording, undisturbed},
+    method::learned_masks::card,
     operate::commands::ask,
 };
 use rustix::process::Signal;
@@ -29,13 +29,6 @@ fn change_options(recording: &TempDir) -> (PathBuf, String) {
     options.insert("range_offset_m".to_owned(), 0.5.into());
     fs::write(&path, options.to_string()).unwrap();
     (path, stored)
-}
-
-fn interrupt(run: &Run) {
-    let slow = run.clone().rate(MODERATE);
-    let mut running = slow.start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
 }
 
 /// A program of its own for a run, which a test can replace.
@@ -77,25 +70,72 @@ fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun
     assert_eq!(run.odometry(), undisturbed());
 }
 
+/// A copy of a model in a folder.
+fn install_model(name: &str, ours: &Path) {
+    fs::copy(card(name), ours).unwrap();
+    let file = card(name).with_extension("onnx");
+    fs::copy(&file, ours.with_file_name(file.file_name().unwrap())).unwrap();
+}
+
+/// One after the other is changed, refused by name, and put back; the same command continues.
 #[test]
-fn another_build_does_not_resume_the_run_and_the_same_one_does() {
-    let run = Run::of_recording();
-    interrupt(&run);
-    let program = program_in(run.folder());
-    let mut other = fs::read(crate::PROGRAM).unwrap();
-    // What follows the last section is not executed.
-    other.extend(b"another build");
-    replace(&program, other);
-    run.start_as(by(&program, &run)).finish().refused_with(&[
-        "unfinished run of another program",
-        "gyre was build",
-        "and is now build",
-        "--out",
-        "--fresh",
-    ]);
-    let copy = program_in(run.folder());
-    run.start_as(by(&copy, &run)).finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+fn unfinished_and_complete_runs_are_kept_until_they_are_replaced_on_purpose() {
+    let mut results = Vec::new();
+    for state in ["unfinished run of another", "complete run of another"] {
+        let recording = recording::copy(recording::SCANS);
+        let models = tempfile::tempdir().unwrap();
+        let ours = models.path().join("mask.toml");
+        install_model("single-127", &ours);
+        let run = run_of(&recording).masked_by(&ours);
+        let run = run.set("masking.backend=rten");
+        if state.starts_with("complete") {
+            run.complete();
+        } else {
+            let mut running = run.clone().rate(MODERATE).start();
+            running.await_poses(MIDDLE).signal(Signal::INT);
+            assert_eq!(running.finish().code(), Some(130));
+        }
+        let refused = |run: &Run, words: &[&str]| {
+            let ended = run.finish();
+            ended.refused_with(&[state, "--out", "--fresh"]);
+            ended.refused_with(words);
+        };
+        for (sentence, words) in [
+            ("raster.cell_m=0.9", ["raster.cell_m was 0.8", "is now 0.9"]),
+            ("refinement.keyframes=3", ["configuration", "keyframes"]),
+            ("refinement.kind=none", ["configuration", "refinement"]),
+            ("slam.kind=graph", ["configuration", "slam.kind"]),
+        ] {
+            refused(&run.clone().set(sentence), &words);
+        }
+        install_model("pair-127", &ours);
+        refused(&run, &["another configuration"]);
+        install_model("single-127", &ours);
+        let (path, stored) = change_options(&recording);
+        refused(&run, &["dataset.range_offset_m was", "is now 0.5"]);
+        fs::write(&path, stored).unwrap();
+        let images = recording::images(recording.path());
+        let away = recording.path().join("away.png");
+        fs::rename(&images[20], &away).unwrap();
+        let fewer = ["another recording", "it had 24 scans and now has 23"];
+        refused(&run, &fewer);
+        fs::copy(&away, &images[20]).unwrap();
+        recording::truncate(&images[20], 50_000);
+        refused(&run, &["another recording", "its images had"]);
+        fs::rename(&away, &images[20]).unwrap();
+        let program = program_in(run.folder());
+        let whole = fs::read(&program).unwrap();
+        // What follows the last section is not executed.
+        replace(&program, [&whole[..], b"another build"].concat());
+        let ended = run.start_as(by(&program, &run)).finish();
+        ended.refused_with(&[state, "program", "gyre was build", "and is now build"]);
+        replace(&program, whole);
+        run.start_as(by(&program, &run)).finish().succeeded();
+        results.push(run.odometry());
+        let other = run.clone().set("refinement.kind=none").option("--fresh");
+        assert_ne!(other.complete(), results[0]);
+    }
+    assert_eq!(results[0], results[1]);
 }
 
 #[test]
@@ -141,21 +181,6 @@ fn a_stage_of_another_build_is_refused() {
 }
 
 #[test]
-fn changed_options_of_the_recording_are_refused_by_name() {
-    let recording = recording::copy(recording::SCANS);
-    let run = run_of(&recording);
-    interrupt(&run);
-    let (path, stored) = change_options(&recording);
-    run.finish().refused_with(&[
-        "unfinished run of another configuration",
-        "dataset.range_offset_m was",
-        "and is now 0.5",
-    ]);
-    fs::write(&path, stored).unwrap();
-    assert_eq!(run.complete(), undisturbed());
-}
-
-#[test]
 fn options_that_change_during_a_run_do_not_change_it() {
     let recording = recording::copy(recording::SCANS);
     let run = run_of(&recording).rate(MODERATE);
@@ -165,23 +190,4 @@ fn options_that_change_during_a_run_do_not_change_it() {
     running.kill("radar-replay");
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn another_recording_under_the_same_name_is_refused() {
-    let recording = recording::copy(recording::SCANS);
-    let run = run_of(&recording);
-    interrupt(&run);
-    let images = recording::images(recording.path());
-    let away = recording.path().join("away.png");
-    fs::rename(&images[20], &away).unwrap();
-    run.finish().refused_with(&[
-        "unfinished run of another recording",
-        "it had 24 scans and now has 23",
-    ]);
-    fs::rename(&away, &images[20]).unwrap();
-    recording::truncate(&images[20], 50_000);
-    run.finish()
-        .refused_with(&["unfinished run of another recording", "its images had"]);
-    assert_ne!(run.option("--fresh").complete(), undisturbed());
 }

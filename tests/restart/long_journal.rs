@@ -1,5 +1,5 @@
 //! A journal of a month: restarting, checking and writing results take time and memory that do not
-//! grow with what was done before.
+//! grow with the length of the journal.
 //!
 //! The journal is short by default. A month of it, in release: `GYRE_POSES=26000000 cargo test
 //! --release -p gyre --test long_journal NAME -- --nocapture`, each test in a process of its own,
@@ -95,7 +95,7 @@ fn forge(out: &Path, poses: u64) {
     journal.append(&end).unwrap();
 }
 
-/// The length is real and the content is not: what is not read may be a hole.
+/// The length is real and the content is not: unread parts may be a hole.
 #[test]
 fn a_restart_reads_the_end_alone() {
     let (folder, poses) = (folder(), poses());

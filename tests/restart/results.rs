@@ -1,9 +1,9 @@
 //! The folder of the results: whole files, one run at a time, nothing lost and nothing of others
 //! removed.
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed};
+use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
 use rustix::process::Signal;
 
 const MODERATE: &str = "6";
@@ -66,41 +66,25 @@ fn a_run_whose_results_are_written_is_begun_anew() {
 }
 
 #[test]
-fn complete_results_are_replaced_by_others_only_if_that_is_asked_for() {
+fn results_without_a_journal_are_replaced_only_if_that_is_asked_for() {
     let run = Run::of_recording();
     run.complete();
-    let other = run.clone().set("masking.threshold=70");
-    other.finish().refused_with(&[
-        "holds the results of a complete run of another configuration",
-        "masking.threshold was",
-        "and is now 70",
-        "another --out",
-        "--fresh",
-    ]);
-    assert_eq!(run.odometry(), undisturbed());
-    assert!(run.out().join("journal/complete").exists());
-    assert_ne!(other.option("--fresh").complete(), undisturbed());
     fs::remove_dir_all(run.out().join("journal")).unwrap();
     run.finish()
         .refused_with(&["summary.json", "journal is missing", "--fresh"]);
 }
 
 #[test]
-fn results_of_another_recording_or_program_are_kept() {
-    let recording = recording::copy(recording::SCANS);
-    let run = Run::of_recording_named(recording.path().to_str().unwrap());
-    let odometry = run.complete();
-    let images = recording::images(recording.path());
-    fs::remove_file(&images[recording::SCANS - 1]).unwrap();
-    run.finish().refused_with(&[
-        "complete run of another recording",
-        "it had 24 scans and now has 23",
-    ]);
-    run.clone()
-        .stage_script("masking", "exec '{gyre}' stage masking")
-        .finish()
-        .refused_with(&["complete run of another program", "masking"]);
-    assert_eq!(run.odometry(), odometry);
+fn a_journal_of_another_version_is_replaced_only_if_that_is_asked_for() {
+    let run = Run::of_recording();
+    run.complete();
+    let path = run.out().join("journal/poses.journal");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[..16].copy_from_slice(b"gyre journal v9 ");
+    fs::write(&path, bytes).unwrap();
+    run.finish()
+        .refused_with(&["poses.journal", "another version", "--fresh"]);
+    assert_eq!(run.option("--fresh").complete(), undisturbed());
 }
 
 #[test]
@@ -156,7 +140,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     assert!(ended.stderr.contains(note), "{}", ended.stderr);
     is_there();
 
-    // The supervisor is killed: the next command gives back what has not been replaced.
+    // The supervisor is killed: the next command restores all results that are not yet replaced.
     let mut running = futile(&run, "exec sleep 60").start();
     running.await_stage("radar-replay");
     running.kill_supervisor();
@@ -185,7 +169,7 @@ fn a_killed_run_is_not_reported_with_the_results_of_the_run_before() {
     }
 }
 
-/// A run that begins anew ends, as by a kill, when it has removed what there was.
+/// A new run ends, as by a kill, when it has removed the old results.
 #[test]
 fn results_of_a_run_are_not_taken_for_those_of_an_unknown_one_while_another_begins() {
     let run = interrupted();
@@ -298,39 +282,36 @@ fn a_journal_that_is_removed_during_the_run_ends_it_and_is_named() {
     }
 }
 
-/// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does
-/// not permit that.
-fn in_container(run: &Run) -> Option<Command> {
-    let permitted = Command::new("unshare").args(["--mount", "true"]).output();
-    if !permitted.is_ok_and(|output| output.status.success()) {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return None;
-    }
-    let own = run.command();
-    let mut command = Command::new("unshare");
-    command
-        .args([
-            "--mount",
-            "sh",
-            "-c",
-            "mount -t tmpfs tmpfs /dev/shm && exec \"$@\"",
-            "sh",
-        ])
-        .arg(own.get_program())
-        .args(own.get_args());
-    Some(command)
-}
-
 #[test]
-fn two_runs_without_common_shared_memory_do_not_write_to_one_journal() {
-    let run = Run::of_recording().rate(MODERATE);
-    let second = Run::of_recording().option("--fresh").into(run.out());
-    let Some(second) = in_container(&second) else {
-        return;
-    };
+fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
+    let run = Run::of_recording().rate("2");
     let mut running = run.start();
-    running.await_poses(2);
-    Ended::of(second).refused_with(&["another command is writing to", "--out"]);
+    running.await_poses(1);
+    let [link, mounted] = ["link", "mounted"].map(|name| run.folder().join(name));
+    symlink(run.out(), &link).unwrap();
+    fs::create_dir(&mounted).unwrap();
+    let named = |out: &Path| run.clone().into(out).command();
+    let unshared = |mount: &str, run: &Command| {
+        let script = format!("mount {mount} && exec \"$@\"");
+        wrapped(&["unshare", "--mount", "sh", "-c", &script, "sh"], run)
+    };
+    let mut seconds = vec![
+        run.command(),
+        named(&link),
+        named(&run.out().join("log/..")),
+    ];
+    let permitted = unshared("-t tmpfs tmpfs /mnt", &Command::new("true")).status();
+    if permitted.is_ok_and(|it| it.success()) {
+        let bound = format!("--bind '{}' '{}'", run.out().display(), mounted.display());
+        seconds.push(unshared(&bound, &named(&mounted)));
+        seconds.push(unshared("-t tmpfs tmpfs /dev/shm", &run.command()));
+    } else {
+        println!("skipped: a mount namespace of its own is not permitted here");
+    }
+    for second in seconds {
+        Ended::of(second).refused_with(&["another command is writing to", "--out"]);
+    }
+    assert!(!running.is_over(), "the first run ended before the second");
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
 }

@@ -195,7 +195,7 @@ fn a_restart_without_memory_ends_the_run_in_a_sentence() {
     };
     let mut running = run.start_as(command);
     let source = running.await_poses(1).await_stage("radar-replay");
-    // What a dead process leaves is taken at once.
+    // The next run takes the resources of a dead process at once.
     let script =
         format!("{FILL}; kill -9 {source}; for i in $(seq 100); do {FILL}; sleep 0.01; done");
     in_shared_memory_of(running.pid(), &script);

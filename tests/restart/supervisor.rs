@@ -1,5 +1,5 @@
-//! Tests of what the supervisor owes to the machine: no process outlives a run, no log grows for
-//! ever, and it waits for room.
+//! Tests of the supervisor's duties to the machine: no process outlives a run, no log grows for
+//! ever, and the supervisor waits for room.
 
 use std::{fs, thread, time::Duration};
 

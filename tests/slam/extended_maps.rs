@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use gyre_datasets::read_trajectory;
-use gyre_localisation::Map;
+use gyre_slam::localisation::Map;
 
 use crate::common::{Ended, Run, gyre};
 
-/// A drive around a block of the town with this seed, with traffic and noise of its own.
-fn drive(town: u64, seed: u64) -> Run {
+/// A drive through the streets of this seed, with cars and noise of its own.
+fn drive(streets: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
-        .set(&format!("simulation.town.seed={town}"))
-        .set(&format!("simulation.seed={seed}"))
+        .set(&format!("simulation.seed={streets}"))
+        .set(&format!("simulation.sensor.seed={seed}"))
         .set("simulation.sensor.profile=cts350x-radiate")
         .set("slam.kind=graph");
     run.set("simulation.scans=40")
@@ -38,7 +38,7 @@ fn extend(run: &Run, map: &Path, out: &Path) -> Ended {
 }
 
 #[test]
-#[ignore = "nightly: two drives through a town"]
+#[ignore = ".ci/nightly: two drives through the same streets"]
 fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let (first, map) = first();
     // From half way round on, to the end of the block.
@@ -68,7 +68,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
         );
     }
     let truth = |run: &Run| read_trajectory(&run.out().join("ground_truth.tum")).unwrap();
-    // The map's frame is that of the first scan of the first drive.
+    // The map's frame is the frame of the first scan of the first drive.
     let (start, truth) = (truth(&first).poses[0], truth(&second));
     let added = &all.keyframes()[count..];
     assert!(added.len() > 20, "{}", added.len());
@@ -101,7 +101,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in another town"]
+#[ignore = ".ci/nightly: a drive in another town"]
 fn a_drive_through_another_town_is_refused_and_the_map_is_kept() {
     let (first, map) = first();
     let elsewhere = drive(5, 9);

@@ -1,15 +1,14 @@
-//! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what
-//! they write is the same to the byte.
+//! The followers of a run with SLAM: faults of followers do not affect odometry, and the followers
+//! write the same bytes.
 
-use std::{fs, ops::Range, sync::OnceLock, thread, time::Duration};
+use std::{fs, sync::OnceLock};
 
 use gyre_messages::FollowerId;
 use gyre_slam::{Keyframe, Query, RecordReader, records_path};
-use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
 
 use crate::common::{
-    Ended, Run, Running, Watch, gyre,
+    Ended, Run, Watch, gyre,
     recording::{SCANS_AROUND as SCANS, around_a_block},
     send,
 };
@@ -89,43 +88,7 @@ fn a_drive_round_a_block_closes_its_loops_and_has_the_same_odometry() {
 }
 
 #[test]
-fn followers_killed_at_random_moments_are_restarted_alone() {
-    assert_restarted_alone(0..1);
-}
-
-#[test]
-#[ignore = "nightly: kills at many moments"]
-fn followers_killed_at_many_moments_are_restarted_alone() {
-    assert_restarted_alone(1..6);
-}
-
-fn assert_restarted_alone(seeds: Range<u64>) {
-    for seed in seeds {
-        let mut random = StdRng::seed_from_u64(seed);
-        let run = run().rate(MODERATE);
-        let mut running = run.start();
-        for follower in [LOOP_CLOSURE, TRAJECTORY, LOOP_CLOSURE] {
-            running.await_poses_or_end(random.random_range(1..SCANS));
-            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
-            kill_if_there(&running, follower);
-        }
-        running.finish().succeeded();
-        assert_undisturbed(&run, &format!("seed {seed}"));
-        for (process, times) in run.summary()["restarts"].as_object().unwrap() {
-            let is_follower = FollowerId::by_name(process).is_some();
-            assert!(is_follower, "{process} was restarted {times} times");
-        }
-    }
-}
-
-fn kill_if_there(running: &Running, name: &str) {
-    if let Some(pid) = running.stages().get(name) {
-        send(*pid, Signal::KILL);
-    }
-}
-
-#[test]
-#[ignore = "nightly: a drive with loops in several runs"]
+#[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_end() {
     let run = run();
     let mut running = run.start();
@@ -141,7 +104,7 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
 }
 
 #[test]
-#[ignore = "nightly: a drive with loops in several runs"]
+#[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     let slow = run().set("stages.loop-closure.delay_ms=200");
     let mut running = slow.start();
@@ -158,28 +121,11 @@ fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
 }
 
 #[test]
-#[ignore = "nightly: a drive with loops in three parts"]
-fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
-    let run = run();
-    for poses in [SCANS / 3, SCANS * 2 / 3] {
-        let mut running = run.start();
-        running.await_poses(poses).signal(Signal::INT);
-        running.finish();
-    }
-    run.complete();
-    assert_undisturbed(&run, "resumed twice");
-}
-
-#[test]
-#[ignore = "nightly: a drive with loops in several runs"]
+#[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn odometry_goes_on_without_a_follower_that_always_dies_and_the_same_command_makes_up_for_it() {
-    assert_made_up_for(LOOP_CLOSURE);
-}
-
-#[test]
-#[ignore = "nightly: the same of the other follower"]
-fn odometry_goes_on_without_a_trajectory_that_always_dies() {
-    assert_made_up_for(TRAJECTORY);
+    [LOOP_CLOSURE, TRAJECTORY]
+        .into_iter()
+        .for_each(assert_made_up_for);
 }
 
 fn assert_made_up_for(follower: &str) {
@@ -218,15 +164,11 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
 }
 
 #[test]
-#[ignore = "nightly: a drive with loops in several runs"]
+#[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
-    assert_restarted_when_it_hangs(TRAJECTORY);
-}
-
-#[test]
-#[ignore = "nightly: the same of the other follower"]
-fn loop_closure_that_hangs_is_restarted_when_the_run_waits_for_it() {
-    assert_restarted_when_it_hangs(LOOP_CLOSURE);
+    [LOOP_CLOSURE, TRAJECTORY]
+        .into_iter()
+        .for_each(assert_restarted_when_it_hangs);
 }
 
 fn assert_restarted_when_it_hangs(follower: &str) {
@@ -235,7 +177,7 @@ fn assert_restarted_when_it_hangs(follower: &str) {
     send(running.await_stage(follower), Signal::STOP);
     let ended = running.finish();
     ended.succeeded();
-    // While the stream goes on its heartbeat tells, and then its progress.
+    // While the stream continues, the heartbeat reveals the fault, and afterwards the progress.
     let sentences = ["hangs", "has made no progress"];
     let said = sentences.map(|it| ended.stderr.contains(&format!("{follower} {it}")));
     assert!(said.contains(&true), "{}", ended.stderr);
@@ -258,23 +200,18 @@ fn loops_and_corrections_can_be_watched() {
 }
 
 #[test]
-fn a_run_without_a_map_says_that_it_has_no_fixes_to_watch() {
-    let run = run().rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(1);
-    let mut watch = gyre();
-    watch.arg("echo").arg(run.out()).arg("fix");
-    Ended::of(watch).failed_with(&["has no topic `fix`", "slam.map"]);
-    running.finish().succeeded();
-}
-
-#[test]
-fn a_run_without_slam_says_that_it_has_no_loops_to_watch() {
-    let run = without_slam().rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(1);
-    let mut watch = gyre();
-    watch.arg("echo").arg(run.out()).arg("loop");
-    Ended::of(watch).failed_with(&["has no topic `loop`", "slam.kind"]);
-    running.finish().succeeded();
+fn a_topic_that_the_run_does_not_have_is_refused_with_its_key() {
+    for (run, topic, key) in [
+        (run(), "fix", "slam.map"),
+        (without_slam(), "loop", "slam.kind"),
+    ] {
+        let run = run.rate(MODERATE);
+        let mut running = run.start();
+        running.await_poses(1);
+        let mut watch = gyre();
+        watch.arg("echo").arg(run.out()).arg(topic);
+        Ended::of(watch).failed_with(&[&format!("has no topic `{topic}`"), key]);
+        running.signal(Signal::INT);
+        running.finish();
+    }
 }

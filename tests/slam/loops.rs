@@ -1,7 +1,6 @@
-//! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the
-//! files are the same bytes whatever happens to the run.
+//! Results of a run with SLAM: a drive that comes back to its start is corrected by loops.
 
-use std::{fs, process::Command, sync::Arc};
+use std::{process::Command, sync::Arc};
 
 use gyre_estimation::G2o;
 use gyre_geometry::xy_yaw;
@@ -13,14 +12,6 @@ const GTSAM: &str = "import gtsam, sys
 graph, poses = gtsam.readG2o(sys.argv[1], False)
 last = poses.atPose2(poses.size() - 1)
 print(graph.size(), poses.size(), last.x(), last.y(), last.theta())";
-
-const FILES: [&str; 5] = [
-    "trajectory_slam.tum",
-    "loops.csv",
-    "graph.g2o",
-    "bands_slam.svg",
-    "map.png",
-];
 
 /// Once around a block.
 fn run(kind: &str) -> Run {
@@ -35,11 +26,6 @@ fn corrected() -> Arc<Run> {
         run.complete();
         run
     })
-}
-
-fn files(run: &Run) -> Vec<Vec<u8>> {
-    let read = |name| fs::read(run.out().join(name)).unwrap();
-    FILES.iter().map(read).collect()
 }
 
 #[test]
@@ -101,18 +87,4 @@ fn gtsam_reads_all_of_a_graph() {
         assert!((read - expected).abs() < 1e-9, "{read} for {expected}");
     }
     assert_eq!(read.len(), expected.len());
-}
-
-#[test]
-#[ignore = "nightly: a drive with loops in several runs"]
-fn an_interrupted_drive_has_the_same_corrected_trajectory() {
-    let whole = corrected();
-    let interrupted = run("graph").rate("20");
-    let mut running = interrupted.start();
-    running.await_poses(40);
-    running.signal(rustix::process::Signal::INT);
-    running.finish();
-    assert!(!interrupted.result("trajectory_slam.tum").is_empty());
-    interrupted.complete();
-    assert!(files(&interrupted) == files(&whole));
 }

@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use gyre_mapping::{TILE_CELLS, TileIndex};
-use gyre_networks::{PlanesError, PlanesNetwork};
+use gyre_masking::networks::{PlanesError, PlanesNetwork};
 use serde::Serialize;
 
 use clusters::Cluster;

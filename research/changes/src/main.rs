@@ -11,12 +11,12 @@ use clap::Parser;
 use gyre_changes::{Change, ChangeKind, Changes, Survey, changes};
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_localisation::{Localiser, PlacedDrive};
-use gyre_maps::localise::searched_map;
-use gyre_maps::map::{self, keyframes, placing};
+use gyre_slam::localisation::{Localiser, PlacedDrive};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::{Failure, print};
+use gyre_tools::maps::localise::searched_map;
+use gyre_tools::maps::map::{self, keyframes, placing};
 use serde::Serialize;
 
 /// The table of all changes.

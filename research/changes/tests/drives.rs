@@ -2,24 +2,30 @@
 
 use std::{fs, path::Path};
 
+use gyre_worlds::{Profile, SimulationConfig, write_dataset};
 use serde_json::Value;
 
-use crate::common::{Ended, Run, gyre};
+use crate::common::{Ended, Run, gyre, recording};
 use crate::gyre_changes;
+
+/// The method's configuration.
+const METHOD: &str = "[raster]\nn = 255\ncell_m = 0.4\n";
 
 /// A drive around a block of the town with this seed, with traffic and noise of its own, and with
 /// other parked cars than the town's own if `changes` says so.
 fn drive(town: u64, seed: u64, changes: Option<u64>) -> Run {
-    let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
-        .set(&format!("simulation.town.seed={town}"))
-        .set(&format!("simulation.seed={seed}"))
-        .set("simulation.sensor.profile=cts350x-radiate")
-        .set("simulation.scans=50")
-        .set("slam.kind=graph");
-    let run = match changes {
-        Some(changes) => run.set(&format!("simulation.town.changes_seed={changes}")),
-        None => run,
+    let mut config = SimulationConfig {
+        seed,
+        scans: Some(50),
+        ..SimulationConfig::default()
     };
+    config.town.seed = Some(town);
+    config.town.changes_seed = changes;
+    config.sensor.profile = Profile::Cts350xRadiate;
+    let data = recording::prepared(&format!("town-{town}-{seed}"), |folder| {
+        write_dataset(&config, folder, &mut |_, _| ()).unwrap();
+    });
+    let run = Run::configured(METHOD).data(&data).set("slam.kind=graph");
     run.complete();
     run
 }
@@ -76,7 +82,7 @@ fn parked_cars_that_have_come_and_gone_are_reported_and_a_drive_has_not_changed_
 #[test]
 fn a_drive_that_cannot_be_compared_is_refused() {
     let first = drive(3, 1, None);
-    let plain = Run::configured("[raster]\nn = 255\ncell_m = 0.4\n[simulation]\nscans = 4\n");
+    let plain = Run::configured(&format!("{METHOD}[simulation]\nscans = 4\n"));
     plain.complete();
     let out = first.folder().join("changes");
     let hint = ["keyframes.log does not exist", "--set slam.kind=graph"];

@@ -13,7 +13,6 @@ use gyre_radar::{OwnedScan, PointsConfig, RasterConfig};
 use ndarray::{Array2, Axis};
 
 const SCANS: usize = 100;
-/// A typical motion.
 const TWIST: Twist = Twist {
     vx_mps: 7.0,
     vy_mps: 0.0,

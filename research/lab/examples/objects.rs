@@ -19,13 +19,13 @@ use std::{env, fs};
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
-use gyre_networks::runtime;
+use gyre_masking::networks::runtime;
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
-use gyre_simulator::drive::DriveKind;
-use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{Realism, SimulatedDrive, SimulationConfig};
+use gyre_worlds::drive::DriveKind;
+use gyre_worlds::weather::WeatherConfig;
+use gyre_worlds::{Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Point2, Vector2};
 use serde::Deserialize;
 

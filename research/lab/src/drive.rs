@@ -4,7 +4,7 @@ use std::{convert::Infallible, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
-use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
+use gyre_estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_scan_matching::{RefinementConfig, Submap};
@@ -22,8 +22,6 @@ pub struct Drive {
     pub keyframes: Vec<Keyframe>,
     /// The true pose of each keyframe.
     pub truths: Vec<Option<Pose>>,
-    /// The reach of the submaps of the run, m.
-    pub submap_reach_m: f64,
     /// The path up to each keyframe, m.
     pub path_m: Vec<f64>,
     pub refinement: RefinementConfig,
@@ -65,7 +63,6 @@ impl Drive {
             truth,
             refinement: configuration.odometry.refinement,
             capacity,
-            submap_reach_m: configuration.slam.submap_reach_m,
             submaps: [0, 1].map(|_| Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1))),
         })
     }
@@ -83,8 +80,7 @@ impl Drive {
         let middle = &self.keyframes[keyframe];
         let submap = &mut self.submaps[submap];
         submap.start(&middle.points, &middle.twist);
-        for k in neighbours(&self.path_m, keyframe, self.submap_reach_m).filter(|k| *k != keyframe)
-        {
+        for k in neighbours(&self.path_m, keyframe, SUBMAP_REACH_M).filter(|k| *k != keyframe) {
             let other = &self.keyframes[k];
             submap.add(
                 &other.points,

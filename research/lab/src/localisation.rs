@@ -8,9 +8,9 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_geometry::{Pose, SparsePoint};
-use gyre_localisation::{Fix, Localiser, Status};
-use gyre_maps::localise::{Scans, searched_map};
+use gyre_slam::localisation::{Fix, Localiser, Status};
 use gyre_terminal::Failure;
+use gyre_tools::maps::localise::{Scans, searched_map};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::{

@@ -65,7 +65,7 @@ mod tests {
     use std::fs;
 
     use gyre_configuration::Configuration;
-    use gyre_networks::runtime;
+    use gyre_masking::networks::runtime;
 
     use super::*;
 

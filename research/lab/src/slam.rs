@@ -80,11 +80,7 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
 
 /// Closes all loops.
 fn queries(drive: &Drive) -> Result<Vec<Query>, Failure> {
-    let options = LoopOptions {
-        submap_reach_m: drive.submap_reach_m,
-        ..LoopOptions::default()
-    };
-    let mut closer = LoopCloser::new(options, &drive.refinement, drive.capacity)?;
+    let mut closer = LoopCloser::new(LoopOptions::default(), &drive.refinement, drive.capacity)?;
     let (mut source, mut queries) = (drive, Vec::new());
     for keyframe in &drive.keyframes {
         closer.push(keyframe)?;

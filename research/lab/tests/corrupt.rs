@@ -114,7 +114,7 @@ fn assert_counted(fault: &str, clean: &Outcome, faulty: &Outcome) {
 }
 
 #[test]
-#[ignore = "nightly: whole drives"]
+#[ignore = ".ci/nightly: whole drives"]
 fn no_fault_leads_a_real_drive_astray_and_each_is_counted() {
     let Some(data) = real_data("radiate-2019-02-12") else {
         return;

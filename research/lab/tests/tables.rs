@@ -163,7 +163,7 @@ fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
 }
 
 #[test]
-#[ignore = "nightly: both tables with each network"]
+#[ignore = ".ci/nightly: both tables with each network"]
 fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
     if !runtime_is_installed() {
         return;
@@ -218,7 +218,7 @@ fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
 }
 
 #[test]
-#[ignore = "nightly: many runs"]
+#[ignore = ".ci/nightly: many runs"]
 fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
     if !runtime_is_installed() {
         return;
@@ -245,7 +245,7 @@ fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
 }
 
 #[test]
-#[ignore = "nightly: many runs"]
+#[ignore = ".ci/nightly: many runs"]
 fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() {
     let folder = lab_folder();
     let ended = Ended::of(ablation(folder.path()));

@@ -348,7 +348,7 @@ def folder(tmp_path):
     """A folder with `small`, a drive, `other`, one through another town, and the configuration that they are read with."""
     if not PROGRAM.is_file():
         pytest.skip(f"there is no {PROGRAM}: build it, or name another by GYRE_PROGRAM")
-    for name, changes in (("small", ["scans=24"]), ("single", ["scans=1"]), ("other", ["scans=8", "seed=7", "traffic.vehicles_per_km=0"])):
+    for name, changes in (("small", ["scans=24"]), ("single", ["scans=1"]), ("other", ["scans=8", "seed=7"])):
         changes = [argument for change in changes for argument in ("--set", f"simulation.{change}")]
         # A radar of few bins.
         radar = ["--set", "simulation.sensor.profile=cts350x-radiate", "--format", "oxford"]

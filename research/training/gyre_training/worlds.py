@@ -1,4 +1,4 @@
-"""The simulated training worlds and the pairs made of them, by calls of `gyre-lab` and of `gyre`."""
+"""The simulated training worlds and the pairs made of them, by calls of `gyre-worlds` and of `gyre-lab`."""
 
 import os
 import subprocess
@@ -12,23 +12,30 @@ SPLITS = ("train", "validation", "test")
 
 def find_gyre_lab(given: Path | None) -> Path:
     """Returns the program as given, or the build of this repository."""
-    places = [given] if given else [PROJECT / "research/target" / build / "gyre-lab" for build in ("release", "debug")]
+    return find("gyre-lab", given, "give --gyre-lab")
+
+
+def find_gyre_worlds() -> Path:
+    """Returns the program in GYRE_WORLDS, else the build of this repository."""
+    given = os.environ.get("GYRE_WORLDS")
+    return find("gyre-worlds", Path(given) if given else None, "set GYRE_WORLDS")
+
+
+def find(program: str, given: Path | None, otherwise: str) -> Path:
+    """Returns a program of `research` as given, or its build."""
+    places = [given] if given else [PROJECT / "research/target" / build / program for build in ("release", "debug")]
     for place in places:
         if place.is_file():
             return place.resolve()
-    raise SystemExit(f"no gyre-lab at {' or '.join(map(str, places))}: cargo build --release --manifest-path research/Cargo.toml -p gyre-lab, or give --gyre-lab")
-
-
-def gyre() -> Path:
-    """Returns the program in GYRE_PROGRAM, else the release build of this repository."""
-    return Path(os.environ.get("GYRE_PROGRAM", PROJECT / "target/release/gyre"))
+    raise SystemExit(f"no {program} at {' or '.join(map(str, places))}: cargo build --release --manifest-path research/Cargo.toml -p {program}, or {otherwise}")
 
 
 def simulate(folder: Path) -> None:
     """Renders every world of `worlds/` that is not in `folder`; an interrupted one is resumed."""
+    gyre_worlds = find_gyre_worlds()
     for split in SPLITS:
         for world in worlds_of(split):
-            call(gyre(), "simulate", world, "--out", folder / split / world.stem, "--format", "oxford", *trajectory(world))
+            call(gyre_worlds, world, "--out", folder / split / world.stem, "--format", "oxford", *trajectory(world))
 
 
 def worlds_of(split: str) -> list[Path]:

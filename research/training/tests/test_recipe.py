@@ -4,7 +4,7 @@ from gyre_training import worlds
 from gyre_training.recipe import HOME, lineage, read, search_of
 
 ROTATION = {"form": "eq7", "window": "hann", "band_low": 0.05, "band_high": 0.45, "angles": 576, "peak": "gaussian"}
-TRANSLATION = {"reach_m": 12.0, "overlap": "energy", "peak": "gaussian"}
+TRANSLATION = {"reach_m": 12.0, "overlap": "energy", "peak": "gaussian", "half_turn": False}
 SETTINGS = {"raster": {"n": 255}, "rotation": ROTATION, "translation": TRANSLATION}
 
 

@@ -5,18 +5,16 @@ mod drive;
 use std::{
     collections::BTreeMap,
     fs,
-    path::{Path, PathBuf, absolute},
+    path::{Path, absolute},
     process::ExitCode,
     thread,
 };
 
-use gyre_batch::{
-    Batch, DriveOutcome, Ended, List, Settings, Slice, Table, collect, compute, table,
-};
 use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_tools::batch::{Batch, Ended, List, Outcome, Settings, compute, table};
 
 use crate::cli::BatchArguments;
 
@@ -24,63 +22,51 @@ pub use drive::drive;
 
 /// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if
 /// all are complete, 1 if not, and 130 after an interruption.
-///
-/// # Errors
-/// A list that cannot be read, a folder that cannot be written, or to which another batch is
-/// writing.
 pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     let list = List::read(&arguments.list)?;
     let settings = settings(arguments)?;
-    let slice = arguments.task.zip(arguments.tasks);
-    let slice = slice.map(|(task, tasks)| Slice { task, tasks });
+    let share = arguments.task.zip(arguments.tasks);
+    let out = |out: &Path| {
+        let found = out.canonicalize();
+        found.map_err(|error| format!("cannot use {}: {error}", out.display()))
+    };
     if arguments.collect {
-        let out = existing(&arguments.out)?;
-        let table = written(&list, &settings, &out)?;
-        table.failures().for_each(print::note);
-        return concluded(&table.counts(), 0, &out, false);
+        let out = out(&arguments.out)?;
+        let mut ended = Ended::default();
+        for row in table::write(&list, &settings, &out)? {
+            *ended.counts.entry(row.outcome).or_default() += 1;
+            if row.outcome != Outcome::Complete {
+                print::note(row.line(false));
+            }
+        }
+        return concluded(&ended, Some(&out));
     }
-    // Tasks share the folder. Alone, this one has it for itself, and writes the table.
+    // Tasks share the folder. A batch without tasks has it for itself, and writes the table.
     Content::BATCH.require_place(&arguments.out)?;
-    let lock = slice
-        .is_none()
-        .then(|| Out::lock_for(&arguments.out, Content::BATCH));
-    let _lock = lock.transpose()?;
+    let _lock = match share {
+        None => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
+        Some(_) => None,
+    };
     fs::create_dir_all(&arguments.out)
         .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;
-    let out = existing(&arguments.out)?;
     let batch = Batch {
         program: own(),
         list: &list,
-        drives: match slice {
-            Some(slice) => list.slice(slice)?,
-            None => list.drives().to_vec(),
+        drives: match share {
+            Some((task, tasks)) => list.share(task, tasks)?,
+            None => list.drives.clone(),
         },
-        settings: settings.clone(),
-        out: out.clone(),
-        jobs: arguments.jobs.map_or_else(jobs, usize::from),
+        settings,
+        out: out(&arguments.out)?,
+        // A run alone is bounded by its slowest stage and leaves time unused.
+        jobs: arguments.jobs.map_or_else(processors, usize::from),
     };
     let ended = compute(&batch, &Signals::install()?, &mut |line| print::note(line))?;
-    let Ended {
-        counts,
-        earlier,
-        interrupted,
-    } = ended;
-    if slice.is_some() {
-        print::line(sentence(&counts, earlier))?;
-        return Ok(exit_code(&counts, interrupted));
+    if share.is_some() {
+        return concluded(&ended, None);
     }
-    match written(&list, &settings, &out) {
-        Ok(table) => concluded(&table.counts(), earlier, &out, interrupted),
-        Err(error) if DriveOutcome::of_full(&error.to_string()).is_some() => {
-            print::note(format_args!("gyre: there is no table: {error}"));
-            print::line(sentence(&counts, earlier))?;
-            Ok(match interrupted {
-                true => ExitCode::from(INTERRUPTED),
-                false => ExitCode::FAILURE,
-            })
-        }
-        Err(error) => Err(error),
-    }
+    table::write(&list, &batch.settings, &batch.out)?;
+    concluded(&ended, Some(&batch.out))
 }
 
 fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
@@ -99,72 +85,39 @@ fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
     })
 }
 
-fn existing(out: &Path) -> Result<PathBuf, Failure> {
-    let unusable = |error| format!("cannot use {}: {error}", out.display());
-    Ok(out.canonicalize().map_err(unusable)?)
-}
-
-/// As many runs as processors: one alone is bounded by its slowest stage and leaves time unused.
-fn jobs() -> usize {
+fn processors() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Writes the table, and says if it is of several builds.
-fn written(list: &List, settings: &Settings, out: &Path) -> Result<Table, Failure> {
-    let table = collect(list, settings, out)?;
-    table.write(out)?;
-    if let builds @ [_, _, ..] = &table.builds()[..] {
-        print::note(format_args!(
-            "the results are of {} builds of gyre: {}; those in drives/ that are removed are computed anew",
-            builds.len(),
-            builds.join(", ")
-        ));
+/// Prints the number of drives by outcome, and the place of the table.
+fn concluded(ended: &Ended, table: Option<&Path>) -> Result<ExitCode, Failure> {
+    print::line(sentence(&ended.counts, ended.earlier))?;
+    if let Some(out) = table {
+        let (out, results, times) = (out.display(), table::RESULTS, table::TIMES_FILE);
+        print::line(format_args!("table in {out}: {results}, {times}"))?;
     }
-    Ok(table)
-}
-
-fn concluded(
-    counts: &BTreeMap<DriveOutcome, usize>,
-    earlier: usize,
-    out: &Path,
-    interrupted: bool,
-) -> Result<ExitCode, Failure> {
-    print::line(format_args!(
-        "{}\ntable in {}: {}, {}",
-        sentence(counts, earlier),
-        out.display(),
-        table::RESULTS,
-        table::TIMES
-    ))?;
-    Ok(exit_code(counts, interrupted))
+    let mut outcomes = ended.counts.keys();
+    let is_whole = outcomes.all(|outcome| *outcome == Outcome::Complete);
+    Ok(match (ended.interrupted, is_whole) {
+        (true, _) => ExitCode::from(INTERRUPTED),
+        (false, true) => ExitCode::SUCCESS,
+        (false, false) => ExitCode::FAILURE,
+    })
 }
 
 /// The number of drives by outcome, in a sentence.
-fn sentence(counts: &BTreeMap<DriveOutcome, usize>, earlier: usize) -> String {
+fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
     let drives: usize = counts.values().sum();
-    let each = counts
-        .iter()
-        .map(|(outcome, count)| format!("{count} {outcome}"));
-    let each: Vec<_> = each.collect();
+    let each = counts.iter();
+    let each = each.map(|(outcome, count)| format!("{count} {outcome}"));
+    let each = each.collect::<Vec<_>>().join(", ");
     let earlier = match earlier {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    let each = each.join(", ");
     match drives {
         0 => "no drives".to_owned(),
         1 => format!("1 drive: {each}{earlier}"),
         _ => format!("{drives} drives: {each}{earlier}"),
-    }
-}
-
-fn exit_code(counts: &BTreeMap<DriveOutcome, usize>, interrupted: bool) -> ExitCode {
-    let is_whole = counts
-        .keys()
-        .all(|outcome| *outcome == DriveOutcome::Complete);
-    match (interrupted, is_whole) {
-        (true, _) => ExitCode::from(INTERRUPTED),
-        (false, true) => ExitCode::SUCCESS,
-        (false, false) => ExitCode::FAILURE,
     }
 }

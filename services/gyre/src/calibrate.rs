@@ -32,11 +32,6 @@ const PICTURE: &str = "calibration.svg";
 const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
-///
-/// # Errors
-/// A recording or a configuration that cannot be used, a drive that does not determine the
-/// constants, drives that are read with different ones, a file that cannot be written; a named log
-/// of a gyro or of wheels that the drive does not tell.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
@@ -60,7 +55,8 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let text = match &radar {
         Ok(found) if is_worse => format!("# NOT recommended: {check}\n{}", toml(found)),
         Ok(found) => toml(found),
-        // A drive may tell the others alone, as one that stands and turns tells the gyro.
+        // A drive may determine only the other constants: a drive that stands and turns determines
+        // only the gyro.
         Err(error) if gyro.is_told || wheels.is_told => {
             print::note(format_args!("the radar is not calibrated: {error}"));
             format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
@@ -109,7 +105,7 @@ impl Section {
         }
     }
 
-    /// That of a sensor, as `gyro is`, that no drive tells.
+    /// The refusal for a sensor, as `gyro is`, that no drive determines.
     fn refused<E>(sensor: &str, error: Option<E>, is_named: bool) -> Self
     where
         E: std::fmt::Display + Into<Failure>,
@@ -172,7 +168,7 @@ impl Recorded {
     ) -> Result<Self, Failure> {
         let gyro = Gyro::read(&configuration, arguments.gyro.as_deref())?;
         let wheels = Wheels::read(&configuration, arguments.wheels.as_deref())?;
-        // By radar alone: what the others say is compared with that.
+        // The radar alone: the other sensors are compared with it.
         configuration.odometry.gyro.kind = GyroKind::None;
         configuration.odometry.wheels.kind = WheelsKind::None;
         let configuration = &configuration;
@@ -192,7 +188,8 @@ impl Recorded {
         })
     }
 
-    /// Refuses another drive that was read with other constants: what it says is a change of those.
+    /// Refuses another drive that was read with different constants, since its findings are changes
+    /// to those constants.
     fn require_same_constants(&self, other: &Self) -> Result<(), Failure> {
         let constants = [self, other].map(|it| {
             let geometry = &it.configured.geometry;
@@ -227,7 +224,7 @@ impl Recorded {
     }
 }
 
-/// The options of the dataset, with those of the recording's own `dataset.toml`.
+/// The options of the dataset, merged with the recording's own `dataset.toml`.
 fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
     let own = configuration.dataset;
     match configuration.streamed() {

@@ -13,21 +13,21 @@ mod watch;
 use std::{io::IsTerminal, num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use gyre_doctor::DoctorArguments;
-use gyre_export::ExportArguments;
-use gyre_inputs::{ConfigArguments, Given, InputError, Inputs};
-use gyre_maps::{localise::LocaliseArguments, map::MapArguments};
-use gyre_masks::MasksArguments;
-use gyre_new::NewArguments;
-use gyre_operate::{
-    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
-    TopArguments,
-};
-use gyre_radar_server::RadarServerArguments;
-use gyre_report::ReportArguments;
 use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
+use gyre_terminal::inputs::{ConfigArguments, Given, InputError, Inputs};
+use gyre_tools::doctor::DoctorArguments;
+use gyre_tools::export::ExportArguments;
+use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
+use gyre_tools::masks::MasksArguments;
+use gyre_tools::new::NewArguments;
+use gyre_tools::operate::{
+    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
+    TopArguments,
+};
+use gyre_tools::radar_server::RadarServerArguments;
+use gyre_tools::report::ReportArguments;
 
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
@@ -57,25 +57,25 @@ pub enum Command {
     Run(RunArguments),
     /// Run a simulated drive around a block, which needs no data: `gyre run demo`.
     Demo(DemoArguments),
-    /// Run the pipeline on many drives, and write a table of their results. The same command goes
-    /// on after an interruption.
+    /// Run the pipeline on many drives, and write a table of their results. The same command
+    /// continues after an interruption.
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
-    #[command(hide = true, name = gyre_batch::COMMAND)]
+    #[command(hide = true, name = gyre_tools::batch::COMMAND)]
     BatchDrive(BatchDriveArguments),
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
-    /// End a run that goes on in the background, and wait for its results.
+    /// End a run in the background, and wait for its results.
     Down(RunChoice),
     /// List the running runs and their processes.
     Ps(PsArguments),
-    /// Print what the processes of a run report.
+    /// Print the reports of a run's processes.
     Logs(LogsArguments),
     /// Show rates, latencies and processes of a running run in the terminal.
     Top(TopArguments),
     /// Start a process of a running run again.
     Restart(RestartArguments),
-    /// Go on with another program in the place of a stage of a running run, without losing a scan.
+    /// Replace the program of a stage of a running run, without losing a scan.
     Swap(SwapArguments),
     /// Run a second program beside a stage of a running run, and compare what both make of the same
     /// inputs. Its results are never used.
@@ -103,7 +103,7 @@ pub enum Command {
     /// load.
     Stress(StressArguments),
     /// Load the machine or take part in a measurement (what `gyre stress` starts).
-    #[command(hide = true, name = gyre_stress::helper::COMMAND)]
+    #[command(hide = true, name = gyre_tools::stress::helper::COMMAND)]
     StressHelper {
         /// The process that has started it, the work, and what that needs.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -122,7 +122,7 @@ pub enum Command {
     Guard,
     /// Play a recording or a simulation as a Navtech radar on the network.
     RadarServer(RadarServerArguments),
-    /// Report what a dataset contains, and what looks wrong with it.
+    /// Report the contents of a dataset, and its apparent faults.
     Inspect(InspectArguments),
     /// Write one page about a run, or about several beside each other.
     Report(ReportArguments),
@@ -134,7 +134,7 @@ pub enum Command {
     Localise(LocaliseArguments),
     /// Find the constants of a radar from a drive, without ground truth.
     Calibrate(CalibrateArguments),
-    /// Draw what the mask keeps of scans.
+    /// Draw the effect of the mask on scans.
     Masks(MasksArguments),
     /// Write odometry, transforms, the map and scans as a bag of ROS 2, or a repaired recording.
     Export(ExportArguments),
@@ -175,7 +175,7 @@ pub struct RunArguments {
     /// run live (source.kind, source.topic, run.mode).
     #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
     pub ros2: Option<String>,
-    /// The constants of the radar, of `gyre calibrate`, over those of the configuration.
+    /// The constants of the radar, of `gyre calibrate`, which override the configuration.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
     /// The results and the pace.
@@ -210,11 +210,11 @@ pub struct RunOptions {
     /// Print all figures at the end, as where the output is no terminal.
     #[arg(short, long)]
     pub verbose: bool,
-    /// Print the figures as JSON, those of summary.json.
+    /// Print the figures as JSON, as in summary.json.
     #[arg(long, conflicts_with = "verbose")]
     pub json: bool,
-    /// Begin anew: discard an unfinished run in --out, replace the results of another or of a live
-    /// run.
+    /// Start from the first scan: discard an unfinished run in --out, replace the results of
+    /// another or of a live run.
     #[arg(long)]
     pub fresh: bool,
 }
@@ -245,10 +245,7 @@ impl RunOptions {
 }
 
 impl RunArguments {
-    /// Returns what is to be run.
-    ///
-    /// # Errors
-    /// Words that do not say it.
+    /// Returns the inputs to run.
     pub fn given(&self) -> Result<Given, InputError> {
         let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
         // A topic of ROS 2 is a radar too.
@@ -260,7 +257,7 @@ impl RunArguments {
 /// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// The recording; a configuration says how it is read.
+    /// The recording; a configuration determines how it is read.
     #[command(flatten)]
     pub inputs: Inputs,
     /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
@@ -277,8 +274,8 @@ pub struct CalibrateArguments {
     /// The recording, and the configuration whose constants are checked.
     #[command(flatten)]
     pub inputs: Inputs,
-    /// Another drive of the same radar, read in the same way: the file has what all drives say
-    /// together. May be repeated.
+    /// Another drive of the same radar, read in the same way: the file has the constants from all
+    /// drives together. May be repeated.
     #[arg(long, value_name = "RECORDING")]
     pub with: Vec<PathBuf>,
     /// The folder of calibration.toml and calibration.svg.
@@ -292,8 +289,8 @@ pub struct CalibrateArguments {
     /// lies beside the scans.
     #[arg(long, value_name = "FILE", conflicts_with = "with")]
     pub wheels: Option<PathBuf>,
-    /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be
-    /// told.
+    /// Length of the path by an odometer or GNSS, m: without it the range resolution is
+    /// undetermined.
     #[arg(long, value_parser = length, conflicts_with = "with")]
     pub distance_m: Option<f64>,
     /// Maximum number of scans of a drive. Their points are kept in memory.
@@ -315,7 +312,7 @@ pub struct SimulateArguments {
     /// The configuration, a TOML file or a name that `gyre config` lists: its section
     /// `[simulation]` is used. Default: the defaults of that section.
     pub configuration: Option<PathBuf>,
-    /// The folder of the recording. What an earlier call with the same configuration left there is
+    /// The folder of the recording. The files of an earlier call with the same configuration are
     /// kept and completed.
     #[arg(long)]
     pub out: PathBuf,

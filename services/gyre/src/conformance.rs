@@ -3,14 +3,14 @@
 use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
-use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report, Test, check};
-use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
+use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
+use gyre_tools::conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
@@ -22,17 +22,14 @@ use crate::{
 /// The configuration of a test without `--config` and `--data`: the shape of the program's messages
 /// matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
-/// Places for readers beside those of a run; the test takes some.
+/// Places for observers in addition to the places of a run; the test uses some.
 const OBSERVERS: usize = 4;
 
-/// The exit code where not all could be tested, which says nothing against the program.
+/// The exit code if some rules could not be tested, which is no evidence against the program.
 const NOT_TESTED: u8 = 2;
 
-/// Tests a program, and prints what it breaks. The exit code is 0 if it keeps the contract, 1 if it
-/// breaks a rule, and 2 if not all could be tested.
-///
-/// # Errors
-/// Standard output cannot be written.
+/// Tests a program, and prints the rules that it breaks. The exit code is 0 if it keeps the
+/// contract, 1 if it breaks a rule, and 2 if not all could be tested.
 pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
     match examine(arguments) {
         Ok(Some(report)) => print(&report, arguments.json),
@@ -82,12 +79,12 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         demands,
     };
     match run_test(&test, scans, arguments.json) {
-        Err(ConformanceError::Interrupted) => Ok(None),
+        Err(ProgramError::Interrupted) => Ok(None),
         report => Ok(Some(report?)),
     }
 }
 
-fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ConformanceError> {
+fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ProgramError> {
     let signals = Signals::install()?;
     check(test, scans, &signals, &mut |what| {
         if !quietly {
@@ -168,7 +165,6 @@ fn configuration(
     Ok(configuration)
 }
 
-/// The command to test.
 fn command(
     arguments: &ConformanceArguments,
     configuration: &Configuration,

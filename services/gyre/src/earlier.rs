@@ -35,13 +35,13 @@ const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 /// The state of an earlier run.
 #[derive(Debug)]
 pub enum Earlier {
-    /// Nothing to go on from.
+    /// Nothing to continue from.
     Nothing,
-    /// The same run, begun and ended without a pose to go on from. Only its recording goes on.
+    /// The same run, begun and ended without a pose to continue from. Only its recording continues.
     WithoutPoses(Identity),
-    /// A journal without its end, or of which the followers have not read all keyframes or scans.
+    /// A journal without its end, or with keyframes or scans that the followers have not all read.
     Unfinished(Begun),
-    /// A journal with its end, of which results have not been written.
+    /// A journal with its end, whose results have not been written.
     Ended(Begun),
     /// The results of a complete run, which the same run may replace.
     Complete(Identity),
@@ -52,7 +52,7 @@ pub enum Earlier {
 /// A run that was begun.
 #[derive(Debug)]
 pub struct Begun {
-    /// Poses in its journal to go on from.
+    /// Poses in its journal to continue from.
     pub poses: u64,
     /// Records behind them, which a power failure has left in part: they are to be cut off.
     pub lost: u64,
@@ -61,11 +61,8 @@ pub struct Begun {
 }
 
 impl Earlier {
-    /// Looks at the folder, and finishes what a kill has left of a replacement. A `fresh` run goes
-    /// on from nothing.
-    ///
-    /// # Errors
-    /// Files that cannot be read, or a damaged journal.
+    /// Looks at the folder, and finishes a replacement that a kill has interrupted. A `fresh` run
+    /// starts from nothing.
     pub fn of(
         out: &Out,
         configuration: &Configuration,
@@ -137,7 +134,7 @@ impl Earlier {
         }
     }
 
-    /// Returns whether a run of this identity goes on with the recording that was begun before.
+    /// Returns whether a run of this identity continues the recording that was begun before.
     pub fn recording_goes_on(&self, identity: &Identity, out: &Out) -> bool {
         let holds = Holds::Unfinished(0);
         let is_same = |begun: &Identity| begun.require_recording(identity, out.path(), holds);
@@ -160,8 +157,8 @@ impl Earlier {
     }
 }
 
-/// Returns the state of a folder without poses: whatever was begun there may be begun anew, and the
-/// same run may go on with its recording.
+/// Returns the state of a folder without poses: anything begun there may begin again, and the same
+/// run may continue its recording.
 fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
     let holds = Holds::Unfinished(0);
     let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
@@ -180,7 +177,7 @@ fn complete(
 ) -> Result<Earlier, Failure> {
     let identity = Identity::read(out, Holds::Complete)?;
     identity.require(configuration, programs, out.path(), Holds::Complete)?;
-    // What is dropped in live mode depends on the load, and the base has the scans of its robot.
+    // Drops in live mode depend on the load, and the base has the scans of its robot.
     let is_live = configuration.is_radar() || configuration.run.mode == Mode::Live;
     if is_live || configuration.is_side(Side::Base) {
         return Err(format!(
@@ -192,7 +189,7 @@ fn complete(
     Ok(Earlier::Complete(identity))
 }
 
-/// Checks that there are no results without the journal that tells what they are of.
+/// Checks that there are no results without the journal that identifies them.
 fn require_no_results(out: &Out) -> Result<(), Failure> {
     let summary = out.join(SUMMARY);
     match summary.exists() && !out.join(BEGUN_WITH).exists() {
@@ -221,9 +218,6 @@ fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
 }
 
 /// Returns whether the objects of all scans are known.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 fn has_all_objects(out: &Out) -> Result<bool, Failure> {
     let opened = RecordReader::<LoggedObjects>::open(out.path());
     opened
@@ -234,12 +228,6 @@ fn has_all_objects(out: &Out) -> Result<bool, Failure> {
             }
             _ => error.into(),
         })
-}
-
-/// Returns whether the journal in a folder is of a version of Gyre that had another form of it.
-pub fn is_of_another_version(out: &Path) -> bool {
-    let records = journal::records(&journal::path(out));
-    matches!(records, Err(JournalError::OtherVersion { .. }))
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.
@@ -261,9 +249,9 @@ fn kept(error: JournalError, path: &Path) -> Failure {
     .into()
 }
 
-/// Returns the number of poses of an unfinished journal up to the newest one from which the run can
-/// go on: all poses up to it have their keyframes, and the map of the refinement knows it. After a
-/// power failure that may be an earlier one than the last; after a death it is the last.
+/// Returns the number of poses of an unfinished journal up to the newest pose where the run can
+/// continue: all poses up to it have their keyframes, and the map of the refinement knows it. After
+/// a power failure that may be an earlier one than the last; after a death it is the last.
 fn known_poses(
     out: &Out,
     configuration: &Configuration,
@@ -329,9 +317,6 @@ pub fn is_closed(configuration: &Configuration) -> bool {
 
 /// Closes a run that the new one cannot continue: its folder keeps all that it holds under a name
 /// with a number. Returns the folder of the new run.
-///
-/// # Errors
-/// A folder that cannot be renamed, as one that is a file system of its own.
 pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     let path = out.path();
     let mut names = (1..).map(|number: u32| {
@@ -352,7 +337,7 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     Ok(Out::lock(path)?)
 }
 
-/// Says what to do about damaged keyframes.
+/// Advises how to repair damaged keyframes.
 fn damaged(error: KeyframesError) -> Failure {
     match error {
         KeyframesError::Log(LogError::Damaged { .. }) => format!(
@@ -382,18 +367,16 @@ fn state(out: &Path) -> [PathBuf; 12] {
     ]
 }
 
-/// Those that a recording needs to go on: its ledger, and the generations of the numbers in it.
+/// The files that a recording needs to continue: its ledger, and the generations of its numbers.
 fn state_of_recording(out: &Path) -> [PathBuf; 2] {
     [Ledger::of(out).path().to_owned(), Generation::path(out)]
 }
 
-/// Removes the state of an unfinished run, puts that of a complete one aside, and says what the new
-/// one begins with. The journal goes first: without it nothing else is taken for part of a run. The
-/// results of an unfinished run go before the new configuration is there, those of a complete one
-/// stay until the new run has its own, and what its recording needs if that goes on.
-///
-/// # Errors
-/// A file that cannot be removed or written.
+/// Removes the state of an unfinished run, puts aside the state of a complete run, and returns the
+/// state where the new run begins. The journal goes first: without it no other file counts as part
+/// of a run. The results of an unfinished run go before the new configuration is there. The results
+/// of a complete run stay until the new run has its own results, together with the files that its
+/// recording needs if the recording continues.
 pub fn begin(
     out: &Out,
     identity: &Identity,
@@ -405,7 +388,8 @@ pub fn begin(
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
-    // Results without any are refused, so what the run was begun with is replaced as a whole below.
+    // Results without a journal are refused, so the files of the run's begin are replaced as a
+    // whole below.
     let mut kept = vec![out.join(BEGUN_WITH)];
     if recording_goes_on {
         kept.extend(state_of_recording(out.path()));
@@ -433,9 +417,6 @@ pub fn replaces(out: &Out, poses: usize) -> bool {
 
 /// Returns the same before results take that place, where the complete run gives way to them: from
 /// then on it is not given back.
-///
-/// # Errors
-/// A file that cannot be removed.
 pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
     let replaces = replaces(out, poses);
     if replaces {
@@ -444,11 +425,8 @@ pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
     Ok(replaces)
 }
 
-/// Ends a run whose results are in place, and survive a power failure by now. If it is complete,
-/// that is said.
-///
-/// # Errors
-/// A file that cannot be written or removed.
+/// Ends a run whose results are in place, and survive a power failure by now. A complete run is
+/// marked as complete.
 pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     if !replaces(out, poses) {
         return Ok(replaced::give_back(out)?);
@@ -459,11 +437,8 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     Ok(replaced::remove(out)?)
 }
 
-/// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last
-/// poses, and writes `config.toml` again if it is not what the run was begun with.
-///
-/// # Errors
-/// A file that cannot be written.
+/// Prepares the folder for a resumed run: cuts off the remains of the last poses after a power
+/// failure, and writes `config.toml` again if it differs from the run's first configuration.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
         journal::cut(&journal::path(out.path()), begun.poses)?;

@@ -1,4 +1,4 @@
-//! The sentence of a build without `--features full` for what it lacks.
+//! The message of a build without `--features full` about a missing feature.
 
 use gyre_stage::StageError;
 

@@ -1,18 +1,15 @@
-//! `gyre inspect`: reports what a dataset contains.
+//! `gyre inspect`: reports the contents of a dataset.
 
 use std::process::ExitCode;
 
 use gyre_configuration::Configuration;
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
-use gyre_inputs::Inputs;
+use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::InspectArguments;
 
-/// Prints what a dataset contains and what looks wrong with it.
-///
-/// # Errors
-/// A folder that is not a dataset, a trajectory that cannot be read, a key that is none.
+/// Prints the contents of a dataset and its apparent faults.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory
@@ -22,7 +19,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let Inputs { set, .. } = &arguments.inputs;
     let given = arguments.inputs.given_recording()?;
     let configuration = match &given.configuration {
-        Some(named) => gyre_inputs::configuration(named, set)?,
+        Some(named) => gyre_terminal::inputs::configuration(named, set)?,
         None => Configuration::of_overrides(set)?,
     };
     let path = given.data.unwrap_or(configuration.source.data);

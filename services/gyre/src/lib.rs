@@ -31,24 +31,21 @@ pub mod watch;
 use std::{path::PathBuf, process::ExitCode};
 
 use gyre_configuration::{Configuration, schema};
-use gyre_doctor::DoctorArguments;
 use gyre_terminal::{Failure, print};
+use gyre_tools::doctor::DoctorArguments;
 
 use cli::{Command, SchemaArguments};
 #[cfg(not(feature = "link"))]
 use split::absent as link;
 
 /// Executes a command of `gyre`.
-///
-/// # Errors
-/// One sentence that says what, where and what to do.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
     if is_private(&command) {
         gyre_stage::run::keep_files_private();
     }
     match command {
-        Command::New(arguments) => gyre_new::new(&arguments),
+        Command::New(arguments) => gyre_tools::new::new(&arguments),
         Command::Stage { name, python } => Ok(stage::run(&name, python)),
         Command::Guard => {
             let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);
@@ -57,14 +54,14 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         }
         Command::Run(arguments) => run::run(&arguments),
         Command::Demo(arguments) => run::run(&arguments.into()),
-        Command::Up(arguments) => gyre_operate::up(&run::results_folder(&arguments)?),
-        Command::Down(run) => gyre_operate::down(&run),
-        Command::Ps(arguments) => gyre_operate::ps(&arguments),
-        Command::Logs(arguments) => gyre_operate::logs(&arguments),
-        Command::Top(arguments) => gyre_operate::top(&arguments),
-        Command::Restart(arguments) => gyre_operate::restart(&arguments),
-        Command::Swap(arguments) => gyre_operate::swap(&arguments),
-        Command::Echo(arguments) => gyre_operate::echo(&arguments),
+        Command::Up(arguments) => gyre_tools::operate::up(&run::results_folder(&arguments)?),
+        Command::Down(run) => gyre_tools::operate::down(&run),
+        Command::Ps(arguments) => gyre_tools::operate::ps(&arguments),
+        Command::Logs(arguments) => gyre_tools::operate::logs(&arguments),
+        Command::Top(arguments) => gyre_tools::operate::top(&arguments),
+        Command::Restart(arguments) => gyre_tools::operate::restart(&arguments),
+        Command::Swap(arguments) => gyre_tools::operate::swap(&arguments),
+        Command::Echo(arguments) => gyre_tools::operate::echo(&arguments),
         Command::Watch(arguments) => watch::watch(&arguments),
         Command::Ros2(arguments) => ros2::publish(&arguments),
         Command::Shadow(arguments) => shadow::shadow(&arguments),
@@ -75,18 +72,18 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Record(arguments) => record::record(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Doctor(arguments) => doctor(&arguments),
-        Command::RadarServer(arguments) => gyre_radar_server::serve(&arguments),
+        Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
-        Command::Report(arguments) => gyre_report::report(&arguments),
+        Command::Report(arguments) => gyre_tools::report::report(&arguments),
         Command::Evaluate(arguments) => gyre_results::evaluate::evaluate(&arguments),
-        Command::Map(arguments) => gyre_maps::map::map(&arguments),
-        Command::Localise(arguments) => gyre_maps::localise::localise(&arguments),
+        Command::Map(arguments) => gyre_tools::maps::map::map(&arguments),
+        Command::Localise(arguments) => gyre_tools::maps::localise::localise(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
-        Command::Masks(arguments) => gyre_masks::masks(&arguments),
-        Command::Export(arguments) => gyre_export::export(&arguments),
+        Command::Masks(arguments) => gyre_tools::masks::masks(&arguments),
+        Command::Export(arguments) => gyre_tools::export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
-        Command::Config(arguments) => gyre_inputs::config(&arguments),
+        Command::Config(arguments) => gyre_terminal::inputs::config(&arguments),
         Command::Schema(arguments) => print_schema(&arguments),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -102,16 +99,16 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Looks for what this machine lacks for a run of the default configuration, whose scans are as
-/// large as those of Oxford.
+/// Checks this machine for missing requirements of a run of the default configuration, whose scans
+/// are as large as Oxford's.
 fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
     let checked = preflight::check(&simulated, &mut preflight::ask)?;
-    gyre_doctor::doctor(arguments, &checked.footprint, checked.window.observers)
+    gyre_tools::doctor::doctor(arguments, &checked.footprint, checked.window.observers)
 }
 
 /// Returns whether the files of a command are its user's alone: all but a simulated recording. The
-/// umask of what a run starts may be the one that the transport sets for a moment.
+/// umask of a child process may be the one that the transport sets for a moment.
 fn is_private(command: &Command) -> bool {
     !matches!(command, Command::Simulate(_))
 }

@@ -14,9 +14,6 @@ use crate::{
 };
 
 /// Runs one end of a link.
-///
-/// # Errors
-/// There is no such run, the network cannot be used, or the other end is of another version.
 pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     split::set_environment()?;
     match &arguments.end {

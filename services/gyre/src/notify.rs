@@ -19,7 +19,6 @@ pub struct Notifier {
     listens: bool,
     /// systemd takes keep-alives from the start of the service on.
     is_ready: bool,
-    /// Time between two keep-alives.
     every: Option<Duration>,
     kept_alive: Instant,
     status: Instant,
@@ -40,9 +39,8 @@ impl Notifier {
         }
     }
 
-    /// Tells what systemd wants to know of an event. The keep-alive says that the supervisor looks
-    /// after its processes, which it restarts by itself; systemd restarts a supervisor that does
-    /// not.
+    /// Reports an event to systemd. The keep-alive means that the supervisor watches its processes,
+    /// which it restarts without systemd; systemd restarts a supervisor that hangs.
     pub fn report(&mut self, event: &Event<'_>) {
         match event {
             Event::Ready => {
@@ -60,7 +58,7 @@ impl Notifier {
         }
     }
 
-    /// The run waits for its radar. For systemd it has started: what is after it at the boot does
+    /// The run waits for its radar. For systemd the run has started: later services of the boot do
     /// not wait.
     pub fn waiting(&mut self, reason: &str) {
         self.is_ready = true;
@@ -86,7 +84,7 @@ impl Notifier {
             return;
         }
         if let Err(error) = sd_notify::notify(states) {
-            // The run does not need a listener. Once is enough to say so.
+            // The run does not need a listener. One warning is enough.
             self.listens = error.kind() == io::ErrorKind::WouldBlock;
             print::note(format_args!("gyre: systemd cannot be notified: {error}"));
         }

@@ -15,7 +15,8 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
         let own = configuration.stages.get(name).cloned().unwrap_or_default();
         let is_base = configuration.is_side(Side::Base) && configuration.is_link(name);
         let gyre = gyre.to_string_lossy();
-        // The supervisor keeps its own program; those of others can change under their names.
+        // The supervisor keeps its own program open; programs of others can change under their
+        // names.
         let (command, programs) = match configuration.is_link(name) {
             true => (StageConfig::own_command(&gyre, name, None), Vec::new()),
             false => (
@@ -100,10 +101,7 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
     })
 }
 
-/// Checks that a run writes over no recording but one that it goes on with.
-///
-/// # Errors
-/// There is one.
+/// Checks that a run overwrites no recording except one that it continues.
 pub fn require_recordable(record: &RecordConfig, out: &Path, goes_on: bool) -> Result<(), Failure> {
     match (record.is_on(), goes_on) {
         (true, true) => Ok(gyre_recorder::require_own(&record.file, out)?),

@@ -4,15 +4,15 @@ use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
-use gyre_live_radar::{Settings, Sizes};
-use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
 use gyre_stage::run::free_shared_memory;
+use gyre_stages::live_radar::{Settings, Sizes};
+use gyre_stages::radar_replay::{Listing, Player};
 use gyre_terminal::{Failure, print};
+use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
@@ -21,62 +21,40 @@ use crate::{ros2, split};
 /// Why a run cannot start.
 #[derive(Debug, Error)]
 pub enum PreflightError {
-    /// A recording of a run is needed.
     #[error(
         "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
     )]
     NoRecording {
-        /// The topic.
         from: &'static str,
         /// The source that was named.
         data: String,
     },
-    /// One scan makes no motion.
     #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
-    TooFew {
-        /// The dataset.
-        path: String,
-        /// The scans.
-        scans: usize,
-    },
+    TooFew { path: String, scans: usize },
     /// A log beside a live radar, or a topic beside one that is not in ROS 2.
     #[error(
         "{0}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
     LiveLog(&'static str),
-    /// An address at which no fixes can be received.
     #[error("cannot receive the fixes of GNSS at {address} (gnss.listen): {source}")]
     LiveGnss {
-        /// The address.
         address: String,
         /// The system's reason.
         source: io::Error,
     },
-    /// Chirps of a live radar.
     #[error(
         "doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`"
     )]
     LiveDoppler,
-    /// The segments would not fit.
     #[error(
         "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
          or lower run.window or raster.n"
     )]
-    SharedMemory {
-        /// Free space.
-        free_mb: f64,
-        /// Required space.
-        footprint: Footprint,
-    },
-    /// A process could not open what it needs.
+    SharedMemory { free_mb: f64, footprint: Footprint },
     #[error(
         "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
     )]
-    OpenFiles {
-        /// The limit.
-        limit: u64,
-    },
-    /// The size cannot be read.
+    OpenFiles { limit: u64 },
     #[error("cannot use shared memory at /dev/shm: {0}")]
     NoSharedMemory(rustix::io::Errno),
 }
@@ -105,7 +83,6 @@ pub struct Preflight {
 pub struct Recording {
     /// The identity of the recording.
     pub fingerprint: Fingerprint,
-    /// The files.
     pub listing: Listing,
 }
 
@@ -113,9 +90,6 @@ pub struct Recording {
 pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
-///
-/// # Errors
-/// A dataset or a mask that cannot be used.
 pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
     split::check(configuration)?;
     let masker = Masker::new(
@@ -124,7 +98,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
         &configuration.odometry.masking,
     )?;
     if configuration.objects.is_on() {
-        gyre_objects_follower::tracker(&configuration.objects, &configuration.odometry.masking)?;
+        gyre_followers::objects::tracker(&configuration.objects, &configuration.odometry.masking)?;
     }
     check_gnss(configuration)?;
     if configuration.slam.is_localised() {
@@ -249,7 +223,6 @@ impl Scans {
         })
     }
 
-    /// Asks the radar.
     fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
         let can_come = match configuration.odometry.gyro.kind {
@@ -282,15 +255,13 @@ impl Scans {
     }
 }
 
-/// Asks the radar once.
-///
-/// # Errors
-/// No radar, or one that cannot be used.
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
         SourceKind::Ros2 => ros2::ask(source, options),
-        _ => Ok(gyre_live_radar::ask(&Settings::of(source, options)?)?),
+        _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
+            source, options,
+        )?)?),
     }
 }
 
@@ -315,10 +286,7 @@ fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
 }
 
 /// Checks that a process may open as many files as it needs. The transport's own errors would not
-/// say what is missing.
-///
-/// # Errors
-/// It may not.
+/// name the missing limit.
 pub fn check_open_files() -> Result<(), PreflightError> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(PreflightError::OpenFiles { limit }),
@@ -328,9 +296,6 @@ pub fn check_open_files() -> Result<(), PreflightError> {
 
 /// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire
 /// the run's root first, which removes them.
-///
-/// # Errors
-/// Too little shared memory.
 pub fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
     let free = free_shared_memory().map_err(PreflightError::NoSharedMemory)?;
     match free {

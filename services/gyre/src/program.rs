@@ -16,9 +16,6 @@ use gyre_terminal::own;
 use crate::plan::stage_plans;
 
 /// Returns the BLAKE3 digest of a file.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn digest(path: &Path) -> io::Result<String> {
     let mut digest = Hasher::new();
     digest.update_reader(gyre_storage::open(path)?)?;
@@ -26,9 +23,6 @@ pub fn digest(path: &Path) -> io::Result<String> {
 }
 
 /// Returns the BLAKE3 digest of what replaces each stage: of its words and the files that it names.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, String>> {
     let stages = stage_plans(configuration, &own());
     let replaced = stages.iter().filter(|stage| !stage.programs.is_empty());
@@ -48,9 +42,6 @@ pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, St
 }
 
 /// Returns the programs of a run that is started now.
-///
-/// # Errors
-/// A program that cannot be read.
 pub fn now(configuration: &Configuration) -> io::Result<Programs> {
     Ok(Programs::new(digest(&own())?, replaced(configuration)?))
 }

@@ -32,7 +32,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Starts with a run of `scans` scans, of which `resumed` are in the journal already.
+    /// Starts with a run of `scans` scans, `resumed` of them already in the journal.
     pub fn new(scans: Option<usize>, resumed: usize, footprint: &impl Display) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let (bar, template) = match scans {
@@ -65,7 +65,6 @@ impl Progress {
         self.radar = Some((Silence::new(radar, clock::now_ns()), manifest));
     }
 
-    /// Shows an event.
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
             Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
@@ -102,7 +101,6 @@ impl Progress {
         }
     }
 
-    /// Removes the bar.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -124,7 +122,7 @@ impl Progress {
         }
     }
 
-    /// Says how long the radar of a live run has been silent.
+    /// Reports how long the radar of a live run has been silent.
     fn silence(&mut self) {
         let Some((silence, manifest)) = &mut self.radar else {
             return;
@@ -144,7 +142,7 @@ impl Progress {
         }
     }
 
-    /// Says how far a follower is, if the run has to wait for it.
+    /// Reports the progress of a follower if the run has to wait for it.
     fn following(&mut self, follower: &str, progress: Following) {
         let work = match FollowerId::by_name(follower) {
             Some(FollowerId::LoopClosure) => "loop closing",

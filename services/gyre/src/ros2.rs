@@ -1,5 +1,5 @@
 //! ROS 2: `gyre ros2`, and a radar behind Navtech's driver as a source. A build without the feature
-//! `ros2` says so.
+//! `ros2` refuses both.
 
 #[cfg(feature = "ros2")]
 #[path = "ros2/present.rs"]

@@ -14,7 +14,6 @@ use std::{
 use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
 use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
-use gyre_operate::detach_if_asked;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
@@ -28,6 +27,7 @@ use gyre_stage::{
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_tools::operate::detach_if_asked;
 
 use crate::{
     cli::RunArguments,
@@ -45,11 +45,8 @@ pub use resolve::resolve;
 /// The folder of a simulated recording that is stored.
 const RECORDING: &str = "recording";
 
-/// Runs the pipeline and writes its results, however it ended. What an earlier run has begun is
-/// resumed; if it only lacks results, they are written.
-///
-/// # Errors
-/// A run that cannot start, fails, or finds fewer than two readable scans.
+/// Runs the pipeline and writes its results, however it ended. An interrupted earlier run is
+/// resumed; if it only lacks results, the results are written.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     detach_if_asked();
     let configuration = resolve(arguments)?;
@@ -65,11 +62,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     )
 }
 
-/// Runs a resolved configuration, and prints its figures in a form. A `fresh` run goes on from
+/// Runs a resolved configuration, and prints its figures in a form. A `fresh` run starts from
 /// nothing.
-///
-/// # Errors
-/// As [`run`].
 pub(crate) fn compute(
     mut configuration: Configuration,
     out: Out,
@@ -88,7 +82,7 @@ pub(crate) fn compute(
     }
 }
 
-/// Says where a simulation is stored that is stored.
+/// Chooses the place of a simulation that is stored.
 pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
@@ -96,9 +90,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
 }
 
 /// Returns the folder of the results that the arguments name.
-///
-/// # Errors
-/// Arguments that do not say what to run.
 pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     if let Some(out) = &arguments.options.out {
         return Ok(out.clone());
@@ -124,7 +115,7 @@ struct Ready {
     resolved: Configuration,
     checked: Preflight,
     identity: Identity,
-    /// True if the run goes on with the recording that it has begun before.
+    /// True if the run continues its own earlier recording.
     recording_goes_on: bool,
 }
 
@@ -138,7 +129,7 @@ fn make_ready(
 ) -> Result<Ready, Failure> {
     let unfinished = earlier.unfinished();
     if let Some(simulation) = configuration.stored() {
-        // A run that goes on needs the recording that it was begun with.
+        // A resumed run needs its first recording.
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
@@ -174,7 +165,7 @@ fn make_ready(
     })
 }
 
-/// Starts all processes, resumes an unfinished run or begins anew, and writes the results.
+/// Starts all processes, resumes an unfinished run or begins a new one, and writes the results.
 fn play(
     configuration: &Configuration,
     programs: &Programs,
@@ -258,7 +249,7 @@ fn play(
     }
 }
 
-/// Writes into the folder of the results what the stages expect there.
+/// Writes the files that the stages expect in the folder of the results.
 fn prepare(
     configuration: &Configuration,
     ready: &Ready,
@@ -348,7 +339,7 @@ fn write_missing_results(
 }
 
 /// Writes the results. Only when all of them are in place, the run counts as complete, and the next
-/// one starts anew.
+/// run starts from the first scan.
 fn finish(
     configuration: &Configuration,
     out: &Out,
@@ -442,9 +433,9 @@ fn has_started_over_at(poses: usize) -> bool {
     env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
 }
 
-/// Executes the same command again: the transport hung on what a dead process left, which is
-/// removed now, and the run resumes from the journal; or, if it has computed nothing in the place
-/// of a complete run, begins anew as it was asked to.
+/// Executes the same command again. The transport hung on the remains of a dead process, which are
+/// removed now. The run resumes from the journal; if it was replacing a complete run and has
+/// computed nothing, it begins again as requested.
 fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over",
@@ -456,7 +447,7 @@ fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
     Err(format!("cannot start over: {failed}").into())
 }
 
-/// Returns the arguments of a run that starts over. What it has computed is not discarded.
+/// Returns the arguments of a run that starts over. Computed poses are not discarded.
 fn again(
     arguments: impl Iterator<Item = OsString>,
     begins_anew: bool,

@@ -4,20 +4,17 @@
 use std::process::ExitCode;
 
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
-use gyre_operate::chosen;
 use gyre_results::{Content, Out};
 use gyre_run::{Scheduling, StageConfig};
-use gyre_shadow::{Options, STAGES};
 use gyre_stage::{control::Control, observer::ObservedRun};
 use gyre_terminal::{Failure, own, print, seconds, words};
+use gyre_tools::conformance::shadow::{self, Options, STAGES};
+use gyre_tools::operate::chosen;
 
 use crate::{cli::ShadowArguments, preflight};
 
-/// Compares until the run ends or as long as the arguments say, and prints the report. The exit
-/// code is 1 if nothing was compared, or the program died, hung or broke the contract.
-///
-/// # Errors
-/// There is no such run or stage, the stage cannot have a shadow, or the program cannot be started.
+/// Compares until the run ends or the given time is over, and prints the report. The exit code is 1
+/// if nothing was compared, or the program died, hung or broke the contract.
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;
@@ -33,7 +30,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
         ..manifest.window
     };
     preflight::check_shared_memory(&Footprint::new(&window, &manifest.limits))?;
-    let report = gyre_shadow::shadow(&run, &options, &mut |line| {
+    let report = shadow::shadow(&run, &options, &mut |line| {
         print::note(format_args!("gyre shadow: {line}"));
     })?;
     match arguments.json {

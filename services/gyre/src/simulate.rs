@@ -14,14 +14,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::cli::SimulateArguments;
 
 /// Writes a simulated recording, or completes one.
-///
-/// # Errors
-/// A configuration that cannot be simulated, a folder that cannot be written.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
     let configuration = match &arguments.configuration {
-        Some(named) => gyre_inputs::configuration(named, &overrides)?,
+        Some(named) => gyre_terminal::inputs::configuration(named, &overrides)?,
         None => Configuration::of_overrides(&overrides)?,
     };
     let started = Instant::now();
@@ -55,9 +52,6 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns the options of the command line as overrides `section.key=value`.
-///
-/// # Errors
-/// A file whose name is not UTF-8.
 fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     let scans = arguments
         .scans
@@ -72,18 +66,12 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
         .map(path_value)
         .transpose()?;
     let file = file.map(|file| format!("simulation.drive.file={file}"));
-    let kind = file
-        .is_some()
-        .then(|| "simulation.drive.kind=file".to_owned());
-    let options = [scans, seed, format, kind, file].into_iter().flatten();
+    let options = [scans, seed, format, file].into_iter().flatten();
     Ok(arguments.set.iter().cloned().chain(options).collect())
 }
 
-/// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of
-/// that of an earlier run.
-///
-/// # Errors
-/// As [`simulate`]; a folder that holds files which Gyre did not write.
+/// Writes the recording of a run to `out`, or completes it. If `replace`, it replaces the recording
+/// of an earlier run.
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     match write(threads, simulation, out) {

@@ -14,10 +14,6 @@ pub use gyre_link::{run_base, run_robot};
 pub use absent::{run_base, run_robot};
 
 /// Checks that the other side of a split run can be reached as it is configured.
-///
-/// # Errors
-/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without
-/// link.
 pub fn check(configuration: &Configuration) -> Result<(), Failure> {
     if configuration.link.side.is_none() {
         return Ok(());
@@ -32,9 +28,6 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
 
 /// Executes the same command again with the environment that the network layer needs, unless it has
 /// that already.
-///
-/// # Errors
-/// The program cannot be executed.
 pub fn set_environment() -> Result<(), Failure> {
     let (name, value) = ONE_THREAD;
     if env::var_os(name).is_some_and(|set| set == value) {
@@ -48,9 +41,6 @@ pub fn set_environment() -> Result<(), Failure> {
 }
 
 /// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.
-///
-/// # Errors
-/// The robot cannot be asked.
 pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
     match link.cut {
         #[cfg(feature = "link")]
@@ -77,26 +67,14 @@ pub mod absent {
 
     pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
 
-    /// Refuses to run.
-    ///
-    /// # Errors
-    /// Always.
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
         Err(ABSENT.into())
     }
 
-    /// Refuses to run.
-    ///
-    /// # Errors
-    /// Always.
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
         Err(ABSENT.into())
     }
 
-    /// Refuses to link.
-    ///
-    /// # Errors
-    /// Always.
     pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
         Err(ABSENT.into())
     }

@@ -9,13 +9,13 @@ use std::{
 
 use gyre_configuration::{process_names, simulated_samples};
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::Settings;
 use gyre_messages::{FollowerId, StageId};
-use gyre_radar_replay::Pace;
 use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind, StageConfig};
-use gyre_search::{python, rotation, translation};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
+use gyre_stages::live_radar::Settings;
+use gyre_stages::radar_replay::Pace;
+use gyre_stages::search::{python, rotation, translation};
 use gyre_terminal::{own, print};
 use rustix::{
     process::{Pid, getppid},
@@ -59,30 +59,31 @@ fn work_of_stage(stage: StageId, python: Option<PathBuf>) -> Work {
             StageId::TranslationSearch => {
                 translation::run_with(it, python::translation(it, &file)?)
             }
-            _ => gyre_masking_stage::run_with(it, gyre_masking_stage::python(it, &file)?),
+            _ => gyre_stages::masking::run_with(it, gyre_stages::masking::python(it, &file)?),
         });
     }
     match stage {
         StageId::RadarReplay => Box::new(play),
-        StageId::Masking => Box::new(gyre_masking_stage::run),
+        StageId::Masking => Box::new(gyre_stages::masking::run),
         StageId::RotationSearch => Box::new(rotation::run),
         StageId::TranslationSearch => Box::new(translation::run),
-        StageId::JointSearch => Box::new(gyre_search::joint::run),
-        StageId::Refinement => Box::new(gyre_refinement::run),
+        StageId::JointSearch => Box::new(gyre_stages::search::joint::run),
+        StageId::Refinement => Box::new(gyre_stages::refinement::run),
         StageId::PoseIntegration => Box::new(integrate),
     }
 }
 
 fn work_of_follower(follower: FollowerId) -> Work {
     Box::new(match follower {
-        FollowerId::LoopClosure => gyre_loop_closure::run,
-        FollowerId::Trajectory => gyre_trajectory::run,
-        FollowerId::Localisation => gyre_localisation_follower::run,
-        FollowerId::Objects => gyre_objects_follower::run,
+        FollowerId::LoopClosure => gyre_followers::loop_closure::run,
+        FollowerId::Trajectory => gyre_followers::trajectory::run,
+        FollowerId::Localisation => gyre_followers::localisation::run,
+        FollowerId::Objects => gyre_followers::objects::run,
     })
 }
 
-/// Checks that this is the supervisor's build. A command of the configuration may name another one.
+/// Checks that this is the supervisor's build. A command of the configuration may name a different
+/// build.
 fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     let path = own();
     let supervisor = PathBuf::from(format!(
@@ -90,7 +91,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
         getppid().map_or(0, Pid::as_raw_pid)
     ));
     let file = |path: &Path| fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
-    // A shell can be in between; then the content tells.
+    // A shell can stand between the two processes; then the file contents decide.
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }
@@ -107,7 +108,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
 fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     match launch.section::<LinkConfig>("link")?.side {
         Some(Side::Robot) => split::run_robot(launch),
-        _ => gyre_pose_integration::run(launch),
+        _ => gyre_stages::pose_integration::run(launch),
     }
 }
 
@@ -122,7 +123,7 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     match source.kind {
         SourceKind::Colossus => {
             let settings = Settings::of(&source, &launch.section("dataset")?);
-            return gyre_live_radar::run(launch, settings.map_err(|error| input(&error))?);
+            return gyre_stages::live_radar::run(launch, settings.map_err(|error| input(&error))?);
         }
         SourceKind::Ros2 => return ros2::receive(launch, &source, &launch.section("dataset")?),
         SourceKind::Recording => {}
@@ -133,7 +134,7 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     };
     // A simulation that was stored is played as a recording.
     let Some(simulation) = simulation.filter(|simulation| !simulation.output.store) else {
-        return gyre_radar_replay::run(launch);
+        return gyre_stages::radar_replay::run(launch);
     };
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
@@ -141,5 +142,5 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let (gyro, wheels) = (launch.section("gyro")?, launch.section("wheels")?);
     let samples = simulated_samples(&drive, (&gyro, &wheels), dataset.as_mut());
     let samples = samples.map_err(|error| input(&error))?;
-    gyre_radar_replay::play(launch, dataset, samples, Pace::OnDemand)
+    gyre_stages::radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

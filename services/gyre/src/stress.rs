@@ -3,28 +3,26 @@
 use std::{fs, process::ExitCode, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
+use gyre_messages::StageId;
 use gyre_results::{
     Content, Out,
     machine::{Machine, today},
 };
 use gyre_run::Scenario;
 use gyre_scan_matching::RefinementKind;
-use gyre_stress::{
-    MessageKind, Options, Others, Provenance, Report, TestedPipeline, report::Verdict,
-    witness_fault,
-};
 use gyre_terminal::{Failure, own, print};
+use gyre_tools::stress::{
+    Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
+};
 
 use crate::{
     cli::{RunArguments, StressArguments},
-    preflight::{self, Preflight},
-    program,
+    preflight, program,
     run::resolve,
     simulate,
 };
 
-/// The exit code of a stress test that could not be carried out, which says nothing of the
+/// The exit code of a stress test that could not be carried out, which is no verdict on the
 /// pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
 /// Duration of a scenario with `--quick`, s.
@@ -35,9 +33,6 @@ const RENDERED: usize = 240;
 
 /// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget
 /// are kept, 1 if not, and 2 if the test could not be carried out.
-///
-/// # Errors
-/// Standard output cannot be written.
 pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         for scenario in Scenario::ALL {
@@ -57,11 +52,8 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Does the work of a helper process.
-///
-/// # Errors
-/// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_stress::help(&own(), arguments)?;
+    gyre_tools::stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -97,7 +89,6 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),
         budget: configuration.budget.clone(),
-        kinds: kinds(&checked),
         shared_bytes: checked.footprint.total() as u64,
     };
     let options = Options {
@@ -117,19 +108,19 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let mut printed = Ok(());
     let judged = &mut |verdict: &str| printed = print::line(verdict);
     let note = &mut |line: &str| print::note(line);
-    let mut report = gyre_stress::stress(&tested, &options, note, judged);
+    let mut report = gyre_tools::stress::stress(&tested, &options, note, judged);
     report.provenance = provenance;
     report.write(out.path())?;
     printed?;
     print::line(format_args!(
-        "report in {}: report.md, report.json, report.svg",
+        "report in {}: report.json, and NAME.csv of each scenario",
         out.path().display()
     ))?;
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and
-/// is the same is kept.
+/// Stores a simulation, so that rendering does not bound the pipeline. An unchanged stored
+/// simulation is kept.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());
@@ -144,7 +135,7 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All scenarios but those of gyro and wheels that the run or its recording has no place for.
+/// All scenarios except faults of gyro and wheels that are absent from the run or its recording.
 fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
     let all = Scenario::ALL.into_iter();
     all.filter(|scenario| match witness_fault::lacks(tested, *scenario) {
@@ -155,22 +146,6 @@ fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
         }
     })
     .collect()
-}
-
-/// The messages whose hand-over is compared with copies: the largest ones, and one without a
-/// payload.
-fn kinds(checked: &Preflight) -> Vec<MessageKind> {
-    let kind = |name| {
-        let mut topics = topics(&checked.window);
-        let topic = topics.find(|topic| topic.name == name);
-        MessageKind {
-            topic: name,
-            bytes: topic.map_or(0, |topic| topic.max_sample_bytes(&checked.limits)),
-        }
-    };
-    [Scan::TOPIC, Masked::TOPIC, Motion::TOPIC]
-        .map(kind)
-        .to_vec()
 }
 
 fn require_stages(tested: &TestedPipeline, stages: &[StageId]) -> Result<(), Failure> {

@@ -8,19 +8,18 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
-use gyre_live_radar::{AskError, Sizes};
 use gyre_results::Out;
 use gyre_stage::{
     control::Status,
     run::{RootError, RunRoot},
     wake::Signals,
 };
+use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
 use gyre_terminal::{Failure, print};
 
 use crate::{notify::Notifier, preflight::ask, ros2};
 
-/// Time between two attempts.
 const PAUSE: Duration = Duration::from_secs(1);
 /// Time between two reports that the radar is waited for.
 const REPORT_EVERY: Duration = Duration::from_secs(60);
@@ -36,9 +35,6 @@ fn notice(error: &Failure) -> String {
 
 /// Asks the radar, until it answers. Meanwhile `gyre ps` shows the run, and `signals` are
 /// installed.
-///
-/// # Errors
-/// A radar that cannot be used or does not come; [`RootError::Interrupted`].
 pub fn for_radar(
     configuration: &Configuration,
     out: &Out,

@@ -10,11 +10,8 @@ use gyre_watch::{Endpoint, Server, Token};
 use crate::{cli::WatchArguments, earlier};
 
 /// Serves the page until a signal arrives. From another machine it is read with a token alone.
-///
-/// # Errors
-/// There is no such run, the token's file cannot be used, or the address cannot be served at.
 pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
-    // Before anything is served: one who watches the wrong folder is told at once.
+    // Before the server starts, so that a wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
         ObservedRun::writing_to(&run)?;

@@ -1,6 +1,6 @@
 //! The configuration of a recording that is played without a configuration file.
 //!
-//! The format gives the constants of the radar, which scans do not show: those of
+//! The format gives the constants of the radar, which scans do not show: the constants in
 //! `configs/NAME.toml`. Its scans give the threshold and the sizes of cells and beams.
 
 use std::path::Path;
@@ -27,10 +27,8 @@ const LONG_PERIOD_S: f64 = 0.5;
 /// Angle that a vehicle turns by in such a time, degrees.
 const LONG_REACH_DEG: f64 = 45.0;
 
-/// Settings that were found.
 #[derive(Clone, Debug)]
 pub struct Automatic {
-    /// The configuration.
     pub table: Table,
     /// The settings and their reasons, in a sentence.
     pub sentence: String,
@@ -39,28 +37,21 @@ pub struct Automatic {
 /// The reason why there are no settings.
 #[derive(Debug, Error)]
 pub enum AutomaticError {
-    /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// None of its scans can be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// There is no scan.
     #[error("the recording has no scans")]
     Empty,
     /// The configuration of a recorded run, or constants of a radar that TOML cannot hold.
     #[error(transparent)]
     Configuration(#[from] ConfigurationError),
-    /// The configuration of a recorded run is not TOML.
     #[error("the recording's configuration: {0}")]
     Recorded(String),
 }
 
-/// Returns the settings of a recording from its format, its `dataset.toml` and its scans; of a
-/// recorded run, those of the run. The options in `wished` go before those of the format.
-///
-/// # Errors
-/// A recording that cannot be opened, or of which no scan can be read.
+/// Returns the settings of a recording from its format, its `dataset.toml` and its scans; for a
+/// recorded run, the settings of the run. The options in `wished` override the format.
 pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, AutomaticError> {
     if gyre_recording::is_recording(data) {
         return of_recorded_run(data);
@@ -87,11 +78,8 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
-/// Returns the format of a recording and the constants of its radar: those of its `dataset.toml`,
-/// then those of its format. A recorded run has its own.
-///
-/// # Errors
-/// A recording that cannot be opened.
+/// Returns the format of a recording and the constants of its radar: from its `dataset.toml`, then
+/// from its format. A recorded run has its own.
 pub fn radar_constants(
     data: &Path,
     wished: &DatasetOptions,
@@ -106,12 +94,12 @@ pub fn radar_constants(
     })
 }
 
-/// Returns the configuration of the run that a recording is of, as far as it says what is computed.
+/// Returns the configuration of the recorded run, as far as it determines the computed result.
 fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let recording = gyre_recording::open_recording(data)?;
     let parsed: Result<Table, toml::de::Error> = recording.head().configuration.parse();
     let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
-    // The recording itself says what its scans are.
+    // The recording itself describes its scans.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
     let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);
     let is_beside = |gnss: &&mut Table| {
@@ -164,9 +152,6 @@ struct Measured {
 
 impl Measured {
     /// Reads some scans of a recording.
-    ///
-    /// # Errors
-    /// None of them can be read.
     fn of(dataset: &mut dyn Dataset) -> Result<Self, AutomaticError> {
         let mut scan = OwnedScan::with_limits(dataset.limits());
         let (mut counts, mut failure) = ([0_u64; 256], None);

@@ -17,16 +17,12 @@ pub struct CalibrationError {
     reason: String,
 }
 
-/// The sections of which a calibration may have any key: those of the radar, the gyro and the
-/// wheels.
+/// The sections where a calibration may have any key: radar, gyro and wheels.
 const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
 /// The sections whose key `min_range_m` a calibration may have.
 const RANGES: [&str; 2] = ["points", "raster"];
 
 /// Returns the constants in a file of `gyre calibrate` as overrides, as `dataset.key=value`.
-///
-/// # Errors
-/// A file that cannot be read, or has anything else.
 pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     let unusable = |reason: String| CalibrationError {
         file: file.to_owned(),
@@ -90,13 +86,13 @@ mod tests {
         storage::write(&file, text).unwrap();
         let ranges = ["points.min_range_m=7.5", "raster.min_range_m=7.5"];
         assert_eq!(overrides(&file).unwrap(), ranges);
-        let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\nlate_s = 1.58\n";
+        let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\ndelay_s = 1.58\n";
         storage::write(&file, text).unwrap();
-        let gyro = ["gyro.kind=\"auto\"", "gyro.late_s=1.58", "gyro.up=\"-z\""];
+        let gyro = ["gyro.delay_s=1.58", "gyro.kind=\"auto\"", "gyro.up=\"-z\""];
         assert_eq!(overrides(&file).unwrap(), gyro);
-        let text = "[wheels]\nkind = \"auto\"\nlate_s = 0.35\n";
+        let text = "[wheels]\nkind = \"auto\"\ndelay_s = 0.35\n";
         storage::write(&file, text).unwrap();
-        let wheels = ["wheels.kind=\"auto\"", "wheels.late_s=0.35"];
+        let wheels = ["wheels.delay_s=0.35", "wheels.kind=\"auto\""];
         assert_eq!(overrides(&file).unwrap(), wheels);
         for text in [
             "[dataset]\n[points]\nbeam_deg = 3\n",

@@ -42,7 +42,7 @@ pub struct Configuration {
     pub run: RunConfig,
     /// The recording to play.
     pub source: SourceConfig,
-    /// The format of the recording and the constants of its radar. A key that is left out is taken
+    /// The format of the recording and the constants of its radar. A key that is left out comes
     /// from the recording's `dataset.toml`, else from the format.
     pub dataset: DatasetOptions,
     /// A drive to simulate and play, instead of `source.data`.
@@ -80,18 +80,12 @@ fn is_whole(link: &LinkConfig) -> bool {
 
 impl Configuration {
     /// Reads a configuration and overrides keys of it with `section.key=value`.
-    ///
-    /// # Errors
-    /// A file that cannot be read, an unknown key, a value out of its bounds.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
         Self::resolve(Named::read_in(path, None)?.table, overrides)
     }
 
     /// As [`read`](Self::read), of a path or of the name of a configuration of the program, for a
     /// person. Returns sentences about its paths too.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
     pub fn named(
         path: &Path,
         overrides: &[String],
@@ -104,19 +98,12 @@ impl Configuration {
     }
 
     /// Creates a configuration from overrides `section.key=value` alone.
-    ///
-    /// # Errors
-    /// An unknown key, a value out of its bounds.
     pub fn of_overrides(overrides: &[String]) -> Result<Self, ConfigurationError> {
         Self::resolve(toml::Table::new(), overrides)
     }
 
     /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans.
     /// Returns a sentence about it too.
-    ///
-    /// # Errors
-    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value
-    /// out of its bounds.
     pub fn of_recording(
         data: &Path,
         overrides: &[String],
@@ -208,7 +195,7 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the scans are those of a radar on the network.
+    /// Returns whether the scans come from a radar on the network.
     pub fn is_radar(&self) -> bool {
         self.source.kind != SourceKind::Recording
     }
@@ -218,7 +205,7 @@ impl Configuration {
         self.link.side == Some(side)
     }
 
-    /// Leaves to the other side what it has: the robot has no SLAM, and the base has no scans of
+    /// Removes the sections of the other side: the robot has no SLAM, and the base has no scans of
     /// its own.
     pub fn leave_other_side(&mut self) {
         match self.link.side {
@@ -332,18 +319,12 @@ impl Configuration {
     }
 
     /// Returns the resolved configuration as TOML: a run from it repeats this run.
-    ///
-    /// # Errors
-    /// A value that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string_pretty(self)
     }
 
-    /// Returns the first key in which this configuration differs from `begun`, of those that the
-    /// result depends on. `None`: a run that was begun with it can be resumed with this.
-    ///
-    /// # Errors
-    /// A value that TOML cannot hold.
+    /// Returns the first result-relevant key that differs between this configuration and `begun`.
+    /// `None`: a run that was begun with it can be resumed with this.
     pub fn difference(&self, begun: &toml::Table) -> Result<Option<String>, toml::ser::Error> {
         let relevant = |table: &toml::Table| {
             let mut table = table.clone();

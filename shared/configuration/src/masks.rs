@@ -1,19 +1,16 @@
-//! The library that computes networks, and what the training of masks had otherwise.
+//! The library that computes networks, and the differences from the training of masks.
 
 use std::error::Error;
 
+use gyre_masking::networks::runtime::{INSTALL, RuntimeError};
 use gyre_masking::{Library, MaskKind, MaskingConfig, model::Card};
 use gyre_messages::StageId;
-use gyre_networks::runtime::{INSTALL, RuntimeError};
 use gyre_odometry::OdometryConfig;
 
 use crate::configuration::Configuration;
 
 /// Returns what [`describe_masks`] does, for a command that masks scans in its own process: it does
 /// not call a function of Python.
-///
-/// # Errors
-/// As [`describe_masks`].
 pub fn describe_masks_in_process(
     configuration: &Configuration,
 ) -> Result<Vec<String>, Box<dyn Error + Send + Sync>> {
@@ -30,9 +27,6 @@ pub fn describe_masks_in_process(
 
 /// Returns sentences: which library computes learned masks, and where a configuration differs from
 /// the one that its network was trained for. None without learned masks.
-///
-/// # Errors
-/// A model card that cannot be read, or ONNX Runtime missing where it is required.
 pub fn describe_masks(
     configuration: &Configuration,
 ) -> Result<Vec<String>, Box<dyn Error + Send + Sync>> {
@@ -59,9 +53,6 @@ pub fn describe_masks(
 }
 
 /// Returns a sentence: which library computes the network of moving objects. `None` without these.
-///
-/// # Errors
-/// ONNX Runtime is missing where it is required.
 pub fn describe_objects(
     configuration: &Configuration,
 ) -> Result<Option<String>, Box<dyn Error + Send + Sync>> {

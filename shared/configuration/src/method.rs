@@ -1,4 +1,4 @@
-//! The settings that decide what is computed.
+//! The settings that decide the computed result.
 
 use gyre_datasets::DatasetOptions;
 use gyre_objects::ObjectsConfig;
@@ -13,8 +13,8 @@ use crate::{
     strict::{section, within},
 };
 
-/// The sections of a configuration that say what is computed of which radar's scans: its file may
-/// have others, which are for a run of processes.
+/// The sections of a configuration that decide the result and the radar; its file may have other
+/// sections, which are for a run of processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.
@@ -62,9 +62,6 @@ impl MethodConfig {
     ];
 
     /// Takes the sections out of a configuration; those that are missing have their defaults.
-    ///
-    /// # Errors
-    /// An unknown key of a section, or a value of another type.
     pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
         Ok(Self {
             dataset: section(table, "dataset")?,
@@ -88,9 +85,6 @@ impl MethodConfig {
     }
 
     /// Checks the ranges of all values.
-    ///
-    /// # Errors
-    /// The first value that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigurationError> {
         let odometry = &self.odometry;
         within("raster", odometry.raster.validate())?;
@@ -103,7 +97,6 @@ impl MethodConfig {
         within("gyro", odometry.gyro.validate())?;
         within("wheels", odometry.wheels.validate())?;
         within("doppler", odometry.doppler.validate())?;
-        within("slam", self.slam.validate())?;
         within("gnss", self.gnss.validate())?;
         within("objects", self.objects.validate())
     }

@@ -10,11 +10,10 @@ use toml::{Table, Value};
 use crate::{ConfigurationError, strict};
 
 /// The keys that name files or folders.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 13] = [
     "run.ground_truth",
     "source.data",
     "simulation.drive.file",
-    "simulation.town.streets",
     "masking.model",
     "masking.runtime",
     "slam.map",
@@ -32,7 +31,6 @@ const RECORDING: &str = "record.file";
 /// A configuration as its file has it, but with each path absolute, or a file of the program.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// The sections.
     pub table: Table,
     notes: Vec<Note>,
 }
@@ -47,17 +45,11 @@ struct Note {
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
     /// is one beside it, else of the program, else, with a note, in the current folder.
-    ///
-    /// # Errors
-    /// As [`strict::read_table`]; a name that the program does not know.
     pub fn read(named: &Path) -> Result<Self, ConfigurationError> {
         Self::read_in(named, env::current_dir().ok())
     }
 
     /// As [`read`](Self::read), with this folder as the current one. `None`: it is not searched.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
     pub fn read_in(named: &Path, here: Option<PathBuf>) -> Result<Self, ConfigurationError> {
         let own = shipped(named);
         let mut table = match own.as_deref().and_then(gyre_shipped::text) {
@@ -87,12 +79,9 @@ impl Named {
     }
 }
 
-/// Replaces each path that is one from the current folder by the whole one, so that the resolved
-/// configuration names the same from any folder; else by that of the program's file that it names:
-/// paths of the command line.
-///
-/// # Errors
-/// A path that is not UTF-8.
+/// Replaces each relative path of an existing file by its absolute path, so that the resolved
+/// configuration names the same file from any folder. Other paths of the command line become the
+/// path of the program's file of that name.
 pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
     visit(table, |path, key| {
         let written = Path::new(path.as_str());
@@ -116,8 +105,8 @@ fn put(path: &mut String, found: PathBuf) -> Result<(), ConfigurationError> {
     Ok(())
 }
 
-/// Visits the paths of all keys, and those in the commands of stages: that of the program, others
-/// that begin with a dot, and that of a function of Python.
+/// Visits the paths of all keys, and the paths in the commands of stages: the program, others that
+/// begin with a dot, and a function of Python.
 fn visit(
     table: &mut Table,
     mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
@@ -166,14 +155,14 @@ pub fn shipped(named: &Path) -> Option<PathBuf> {
     }
 }
 
-/// Returns a question for the configuration of the program with the nearest name; empty if none is
-/// alike.
+/// Returns a question for the configuration of the program with the nearest name; empty without a
+/// similar name.
 pub fn suggestion(named: &Path) -> String {
     let known: Vec<&str> = gyre_shipped::configurations().map(|(it, _)| it).collect();
     strict::suggestion(&named.display().to_string(), &known)
 }
 
-/// Returns the error for a name that is neither that of a file nor known.
+/// Returns the error for a name that is neither a file nor known.
 fn unknown(named: &Path, error: ConfigurationError) -> ConfigurationError {
     let is_name = named.extension().is_none() && named.file_name() == Some(named.as_os_str());
     match is_name && !named.exists() {
@@ -239,7 +228,7 @@ impl Places<'_> {
     }
 }
 
-/// Returns whether a file has another content than that of the program.
+/// Returns whether a file differs from the program's file.
 fn differs(own: &Path, file: &Path) -> bool {
     let own = gyre_shipped::bytes(own);
     own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))

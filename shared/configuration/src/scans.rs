@@ -4,8 +4,8 @@
 use std::{ops::Range, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
-    WheelLog, check_first_scan,
+    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
+    check_first_scan,
 };
 use gyre_radar::NoDoppler;
 use gyre_run::PlayedFrom;
@@ -18,55 +18,40 @@ use crate::configuration::Configuration;
 /// Why the scans of a configuration cannot be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
-    /// Nothing to play.
     #[error(
         "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
     )]
     NoData,
-    /// A recording is needed.
     #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
-    Radar {
-        /// The radar.
-        radar: String,
-    },
-    /// The simulation cannot be rendered.
+    Radar { radar: String },
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
-    /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The first scan to play is behind the last one.
     #[error("source.first is {0}, but {1} has {n} scans, from {start} to {last}: give a smaller one", n = .2.len(), start = .2.start, last = .2.end - 1)]
     BeyondEnd(usize, String, Range<usize>),
-    /// The log of the gyro or of the wheels cannot be used.
+    /// The log of the gyro, of the wheels or of the GNSS receiver cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log of the GNSS receiver cannot be used.
-    #[error(transparent)]
-    Gnss(#[from] GnssLogError),
     /// Scans that lie in no folder, as those of a simulation.
     #[error(
         "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
     )]
     NoGnss,
-    /// A simulation without a gyro.
     #[error(
         "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
     )]
     NoGyro,
-    /// A simulation without wheels.
     #[error(
         "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\""
     )]
     NoWheels,
-    /// A radar that does not say the velocity.
     #[error("doppler.kind is `auto`, but {0}; with doppler.kind = \"none\" it is not used")]
     NoDoppler(NoDoppler),
 }
 
 /// An open recording or simulation.
 pub struct Played {
-    /// The scans.
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
@@ -75,9 +60,6 @@ pub struct Played {
 }
 
 /// Opens the recording or the simulation that is to be played.
-///
-/// # Errors
-/// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;
@@ -119,7 +101,7 @@ fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(
     }
 }
 
-/// Checks that the radar says its velocity by Doppler, if that is used.
+/// Checks that the radar reports its velocity by Doppler, if Doppler is used.
 fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
     match doppler.is_used() {
         true => check_first_scan(dataset).map_err(SourceError::NoDoppler),
@@ -129,9 +111,6 @@ fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(
 
 /// Returns the samples that go with the scans of a simulation: of its own gyro and wheels, unless
 /// other logs are named.
-///
-/// # Errors
-/// The simulation has no gyro or no wheels, or a log that cannot be used.
 pub fn simulated_samples(
     drive: &SimulatedDrive,
     (gyro, wheels): (&GyroConfig, &WheelsConfig),
@@ -157,9 +136,6 @@ pub fn simulated_samples(
 
 /// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
 /// results in `out`; `None` without GNSS.
-///
-/// # Errors
-/// No log, or one that cannot be used.
 pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, SourceError> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
@@ -170,9 +146,6 @@ pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<Gnss
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
-///
-/// # Errors
-/// The file cannot be read.
 pub fn with_stored_options(configuration: &Configuration) -> Result<Configuration, OpenError> {
     let mut resolved = configuration.clone();
     let data = &configuration.source.data;
@@ -183,10 +156,7 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
     Ok(resolved)
 }
 
-/// Returns what tells the recording of a run from another one; `None`: its configuration does.
-///
-/// # Errors
-/// A recording that cannot be opened.
+/// Returns the identification of a recording; `None`: its configuration does.
 pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
     if !plays_scans || configuration.streamed().is_some() {

@@ -10,7 +10,6 @@ use schemars::{Schema, generate::SchemaSettings};
 
 use crate::configuration::Configuration;
 
-/// Returns the reference.
 pub fn reference() -> String {
     markdown::reference(&generate())
 }

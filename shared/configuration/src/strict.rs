@@ -12,10 +12,7 @@ use crate::ConfigurationError;
 const ALIKE: f64 = 0.75;
 
 /// Reads a file.
-///
-/// # Errors
-/// A file that cannot be read, or is not TOML: the error names the place of the mistake, and shows
-/// nothing of the file, which may hold anything.
+/// An error names the place of the mistake and quotes nothing of the file, which may hold anything.
 pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
     let unreadable = |source| ConfigurationError::Unreadable {
         path: path.to_owned(),
@@ -29,9 +26,6 @@ pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
 }
 
 /// Parses a text; `path` is its name in errors.
-///
-/// # Errors
-/// A text that is not TOML.
 pub fn parse(path: &Path, text: &str) -> Result<Table, ConfigurationError> {
     let parsed: Result<Table, _> = text.parse();
     parsed.map_err(|error| ConfigurationError::Syntax {
@@ -40,8 +34,8 @@ pub fn parse(path: &Path, text: &str) -> Result<Table, ConfigurationError> {
     })
 }
 
-/// Returns the error for a folder that is named in place of a configuration: that of the results of
-/// a run, or a recording.
+/// Returns the error for a folder that is named in place of a configuration: the results of a run,
+/// or a recording.
 fn folder(path: &Path) -> ConfigurationError {
     let own = path.join("config.toml");
     let remedy = match own.is_file() {
@@ -70,9 +64,6 @@ pub fn syntax(text: &str, error: &toml::de::Error) -> String {
 }
 
 /// Returns a path as the value of a key.
-///
-/// # Errors
-/// A name that is not UTF-8.
 pub fn path_value(path: &Path) -> Result<Value, ConfigurationError> {
     let text = path.to_str();
     let text = text.ok_or_else(|| ConfigurationError::Name(path.to_owned()))?;
@@ -88,9 +79,6 @@ pub fn value(section: &str, reason: impl Display) -> ConfigurationError {
 }
 
 /// Names the section of a value that is out of its bounds.
-///
-/// # Errors
-/// That of the check.
 pub fn within<T, E: Display>(
     section: &str,
     checked: Result<T, E>,
@@ -99,9 +87,6 @@ pub fn within<T, E: Display>(
 }
 
 /// Takes a section out of the table; its defaults where it is missing.
-///
-/// # Errors
-/// An unknown key, or a value that does not fit.
 pub fn section<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -110,11 +95,7 @@ pub fn section<T: DeserializeOwned>(
     read(name, value)
 }
 
-/// Takes a section of sections out of the table, each of which must have one of the names in
-/// `known`.
-///
-/// # Errors
-/// Another name, an unknown key, or a value that does not fit.
+/// Takes a section of sections out of the table, each with one of the names in `known`.
 pub fn sections<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -130,7 +111,6 @@ pub fn sections<T: DeserializeOwned>(
         .collect()
 }
 
-/// Returns the error for an unknown key.
 pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     ConfigurationError::UnknownKey {
         section: section.to_owned(),
@@ -142,7 +122,7 @@ pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     }
 }
 
-/// Returns a question for the nearest known name; empty if none is alike.
+/// Returns a question for the nearest known name; empty without a similar name.
 pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
     let alike = |known: &&str| (strsim::jaro_winkler(name, known) * 1e6) as u64;
     let nearest = known.iter().copied().max_by_key(alike);
@@ -151,9 +131,6 @@ pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
 }
 
 /// Sets a key by an override `section.key=value`; the value is TOML, or else a plain string.
-///
-/// # Errors
-/// An override without section, key or value.
 pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> {
     let refused = || ConfigurationError::Override(sentence.to_owned());
     let (path, value) = sentence.split_once('=').ok_or_else(refused)?;
@@ -234,6 +211,11 @@ mod tests {
         assert_eq!(table["masking"]["kind"].as_str(), Some("none"));
         assert_eq!(table["raster"]["n"].as_integer(), Some(127));
         assert_eq!(table["stages"]["masking"]["command"][1].as_str(), Some("b"));
-        assert!(set(&mut table, "n=3").is_err() && set(&mut table, "masking").is_err());
+        for sentence in ["n=3", "masking", "=", "masking.threshold"] {
+            let error = set(&mut table, sentence).unwrap_err().to_string();
+            for word in ["--set", sentence, "section.key=value"] {
+                assert!(error.contains(word), "{error}");
+            }
+        }
     }
 }

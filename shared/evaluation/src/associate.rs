@@ -29,7 +29,7 @@ impl<'a> TimedPoses<'a> {
     }
 }
 
-/// The rule by which estimated poses are associated with ground-truth poses.
+/// The rule that associates estimated poses with ground-truth poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Association {
@@ -104,10 +104,6 @@ impl Coverage {
 
 /// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have
 /// none.
-///
-/// # Errors
-/// [`EvaluationError`] if a pose is invalid (not finite, no rotation), if stamps are missing or out
-/// of order (by time only), or if fewer than two poses are associated.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

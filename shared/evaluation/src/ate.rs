@@ -18,7 +18,7 @@ pub struct Ate {
     pub mean_m: f64,
     /// Largest distance, m.
     pub max_m: f64,
-    /// The alignment: the fixed frame of the estimate in that of the ground truth.
+    /// The alignment: the fixed frame of the estimate in the fixed frame of the ground truth.
     #[serde(serialize_with = "serialize_isometry")]
     pub truth_from_estimate: Pose,
 }
@@ -40,9 +40,9 @@ pub fn ate(matched: &MatchedPoses) -> Ate {
     }
 }
 
-/// Returns the rigid motion that aligns the positions of the estimate with those of the ground
-/// truth by least squares. Headings are not used. If the positions do not define the rotation (all
-/// in one place), it is 0.
+/// Returns the rigid motion that aligns the positions of the estimate with the ground truth by
+/// least squares. Headings are not used. If the positions do not define the rotation (all in one
+/// place), it is 0.
 pub fn align(matched: &MatchedPoses) -> Pose {
     align_positions(matched.estimate(), matched.truth())
 }

@@ -21,10 +21,10 @@ pub struct Bands {
 pub struct BandSample {
     /// Time since the first motion began, s.
     pub time_s: f64,
-    /// (x, y, yaw) of the estimate less those of the ground truth, along the axes of the aligned
-    /// pose; m, rad in (-pi, pi].
+    /// (x, y, yaw) of the estimate less (x, y, yaw) of the ground truth, along the axes of the
+    /// aligned pose; m, rad in (-pi, pi].
     pub error: Vector3<f64>,
-    /// Standard deviations of (x, y, yaw), those of the ground truth included; m, rad.
+    /// Standard deviations of (x, y, yaw), including the uncertainty of the ground truth; m, rad.
     pub sigma: Vector3<f64>,
 }
 

@@ -25,17 +25,13 @@ pub(crate) const LARGEST_COORDINATE_M: f64 = 1e9;
 
 /// The reason why two trajectories cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum EvaluationError {
-    /// A position is not finite, or further out than any vehicle drives.
     #[error("the position of pose {index} of the {side} is not within {limit:e} m: ({x_m}, {y_m})", limit = LARGEST_COORDINATE_M)]
     BadPosition {
-        /// Whose pose.
         side: Side,
-        /// The index, from 0.
         index: usize,
-        /// The pose's x, m.
         x_m: f64,
-        /// The pose's y, m.
         y_m: f64,
     },
     /// The cosine and sine of a pose do not lie on the unit circle.
@@ -43,35 +39,23 @@ pub enum EvaluationError {
         "the rotation of pose {index} of the {side} is invalid: its cosine and sine have length {length}, not 1"
     )]
     BadRotation {
-        /// Whose pose.
         side: Side,
-        /// The index, from 0.
         index: usize,
-        /// Length of (cosine, sine).
         length: f64,
     },
-    /// Association by time needs one stamp a pose.
     #[error("the {side} has {poses} poses but {stamps} stamps")]
     StampCount {
-        /// Whose stamps.
         side: Side,
-        /// Poses given.
         poses: usize,
-        /// Stamps given.
         stamps: usize,
     },
-    /// Stamps decrease.
     #[error(
         "the stamps of the {side} decrease at pose {index}: {stamp_ns} ns after {previous_ns} ns"
     )]
     DecreasingStamps {
-        /// Whose stamps.
         side: Side,
-        /// Index of the pose whose stamp is earlier than the one before.
         index: usize,
-        /// The stamp before, ns.
         previous_ns: i64,
-        /// The offending stamp, ns.
         stamp_ns: i64,
     },
     /// No pose of the estimate lies within the time span of the ground truth.
@@ -81,43 +65,26 @@ pub enum EvaluationError {
         span_s(.truth_ns)
     )]
     NoOverlap {
-        /// First and last stamp of the estimate, ns.
         estimate_ns: (i64, i64),
-        /// First and last stamp of the ground truth, ns.
         truth_ns: (i64, i64),
     },
-    /// Fewer than two poses are associated: there is no motion to compare.
     #[error(
         "{matched} of {estimate} estimated poses could be associated with the {truth} poses of the ground truth; at least 2 are needed"
     )]
     TooFew {
-        /// Associated poses.
         matched: usize,
-        /// Poses of the estimate.
         estimate: usize,
-        /// Poses of the ground truth.
         truth: usize,
     },
-    /// Poses that are to be compared one by one differ in number.
     #[error(
         "{estimate} estimated poses cannot be compared one by one with {truth} poses of the ground truth"
     )]
-    LengthMismatch {
-        /// Poses of the estimate.
-        estimate: usize,
-        /// Poses of the ground truth.
-        truth: usize,
-    },
-    /// A motion is not finite, or further than any vehicle drives.
+    LengthMismatch { estimate: usize, truth: usize },
     #[error("motion {index} is invalid: ({x_m} m, {y_m} m, {yaw_rad} rad)")]
     BadMotion {
-        /// The index, from 0.
         index: usize,
-        /// The pose's x, m.
         x_m: f64,
-        /// The pose's y, m.
         y_m: f64,
-        /// The pose's yaw, rad.
         yaw_rad: f64,
     },
     /// A motion does not end after its start, or starts before the end of the one before.
@@ -125,26 +92,19 @@ pub enum EvaluationError {
         "motion {index} is out of order: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
     )]
     MotionOutOfOrder {
-        /// The index, from 0.
         index: usize,
         /// End of the motion before, ns; for the first motion its own start.
         previous_ns: i64,
-        /// The earlier stamp, ns.
         from_ns: i64,
-        /// The later stamp, ns.
         to_ns: i64,
     },
-    /// No motion has both ground truth and a covariance.
     #[error(
         "none of {motions} motions has ground truth and covariance: {without_truth} without ground truth at both ends \
          (same clock?), {without_covariance} without a positive definite covariance"
     )]
     NoMatchedMotion {
-        /// Motions given.
         motions: usize,
-        /// Motions without ground truth at both ends.
         without_truth: usize,
-        /// Motions without a positive definite covariance.
         without_covariance: usize,
     },
 }

@@ -50,9 +50,7 @@ impl Axes {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HeadingFault {
-    /// The estimate.
     Estimate,
-    /// The ground truth.
     Truth,
     /// The paths do not show it.
     Unclear,

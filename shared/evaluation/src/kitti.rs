@@ -23,7 +23,6 @@ pub struct Kitti {
     pub rotation_deg_per_100m: f64,
     /// The same in degrees per km: 1000 times the "deg/m" of the KITTI leaderboard.
     pub rotation_deg_per_km: f64,
-    /// Number of segments.
     pub segments: usize,
     /// Poses from the start of a segment to the start of the next.
     pub step: NonZeroUsize,
@@ -34,13 +33,11 @@ pub struct Kitti {
 /// The KITTI errors of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KittiLength {
-    /// Segment length, m.
     pub length_m: f64,
     /// Translation error, % of the segment length.
     pub translation_percent: f64,
     /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
-    /// Number of segments.
     pub segments: usize,
 }
 

@@ -2,7 +2,7 @@
 //! with plots; and of tracked objects.
 //!
 //! The crate computes on slices of poses and stamps; files are read elsewhere. A
-//! [`Pose`](gyre_geometry::Pose) is that of the sensor in a fixed frame (REP-103: x forward, y
+//! [`Pose`](gyre_geometry::Pose) is the pose of the sensor in a fixed frame (REP-103: x forward, y
 //! left, yaw counter-clockwise); stamps are in ns. Estimate and ground truth may have different
 //! fixed frames.
 //!

@@ -1,11 +1,10 @@
-//! Places that are seen again: the relative poses that were measured there against those of a
-//! trajectory. A ground truth whose positions drift, as by GNSS, contradicts them too: what it does
-//! here it cannot judge.
+//! Revisited places: the relative poses measured there, compared with a trajectory. They cannot
+//! be judged by a ground truth whose positions drift, such as GNSS: the truth contradicts them too.
 
 use gyre_geometry::Pose;
 use serde::Serialize;
 
-/// Differences between measured relative poses and those of a trajectory.
+/// Differences between measured relative poses and a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoopErrors {
     /// The number of relative poses.
@@ -16,7 +15,8 @@ pub struct LoopErrors {
     pub rotation_rmse_deg: f64,
 }
 
-/// Compares pairs of a measured relative pose and that of a trajectory; `None` without any.
+/// Compares measured relative poses with the relative poses of a trajectory, in pairs; `None`
+/// without any.
 pub fn loop_errors(pairs: impl IntoIterator<Item = (Pose, Pose)>) -> Option<LoopErrors> {
     let (mut loops, mut square_m2, mut square_deg2) = (0, 0.0, 0.0);
     for (measured, by_trajectory) in pairs {

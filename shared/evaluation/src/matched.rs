@@ -14,10 +14,6 @@ pub struct MatchedPoses {
 
 impl MatchedPoses {
     /// Associates the poses one by one.
-    ///
-    /// # Errors
-    /// [`EvaluationError::LengthMismatch`], [`EvaluationError::TooFew`] below two poses,
-    /// [`EvaluationError::BadPosition`] and [`EvaluationError::BadRotation`].
     pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
         let (n, m) = (estimate.len(), truth.len());
         if n != m {
@@ -38,12 +34,10 @@ impl MatchedPoses {
         Ok(Self { estimate, truth })
     }
 
-    /// The estimated poses.
     pub fn estimate(&self) -> &[Pose] {
         &self.estimate
     }
 
-    /// The ground-truth poses.
     pub fn truth(&self) -> &[Pose] {
         &self.truth
     }

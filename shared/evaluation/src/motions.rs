@@ -78,11 +78,6 @@ pub(crate) struct Chain {
 impl MatchedMotions {
     /// Associates both ends of each motion with the ground truth, interpolated across gaps of up to
     /// `max_gap_ns`.
-    ///
-    /// # Errors
-    /// [`EvaluationError::BadMotion`] and [`EvaluationError::MotionOutOfOrder`] for invalid
-    /// motions, the errors of [`associate()`](crate::associate()) that concern the ground truth,
-    /// and [`EvaluationError::NoMatchedMotion`] if no motion has both ground truth and covariance.
     pub fn new(
         motions: &[TimedMotion],
         truth: TimedPoses<'_>,

@@ -12,8 +12,8 @@ const MIN_OFFSET_RAD: f64 = 0.25;
 /// standard deviation of 8 degrees it is 0.99.
 const MIN_AGREEMENT: f64 = 0.99;
 
-/// Returns the heading of the estimate minus that of the ground truth, rad, where all headings
-/// differ by the same large angle once the positions are aligned.
+/// Returns the heading of the estimate minus the heading of the ground truth, rad, where all
+/// headings differ by the same large angle once the positions are aligned.
 pub(crate) fn heading_offset_rad(
     matched: &MatchedPoses,
     truth_from_estimate: &Pose,

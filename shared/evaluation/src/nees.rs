@@ -3,10 +3,10 @@
 //!
 //! Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001,
 //! Sec. 5.4. The error of a segment of consecutive motions is e = (x, y, yaw) of the estimate less
-//! those of the ground truth, along the axes of its first frame; P is the covariance composed over
-//! the segment, plus that of the ground truth. The NEES e' inv(P) e of a consistent covariance has
-//! a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for the
-//! translation alone, or 1 for the yaw. Segments of one length share no motion.
+//! the ground truth, along the axes of its first frame; P is the covariance composed over the
+//! segment, plus the covariance of the ground truth. The NEES e' inv(P) e of a consistent
+//! covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2
+//! for the translation alone, or 1 for the yaw. Segments of one length share no motion.
 
 use std::num::NonZeroUsize;
 
@@ -16,7 +16,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
-/// The options of [`nees()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeesOptions {
     /// Segment lengths, in motions.
@@ -71,13 +70,11 @@ pub struct NeesLength {
 /// The NEES of a set of segments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesFigures {
-    /// Number of segments.
     pub segments: usize,
     /// x, y and yaw together.
     pub pose: NeesFigure,
     /// x and y.
     pub translation: NeesFigure,
-    /// Yaw.
     pub yaw: NeesFigure,
 }
 

@@ -24,15 +24,13 @@ use hota::Compared;
 /// A true object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueObject {
-    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,
     /// Velocity over ground, m/s; `None` if it is not known.
     pub velocity: Option<Vector2<f64>>,
-    /// Heading, rad.
     pub yaw_rad: f64,
-    /// True for what a tracker must find: motor vehicles.
+    /// True for motor vehicles, which a tracker must find.
     pub is_vehicle: bool,
     /// True if the sensor can see it in this scan.
     pub is_seen: bool,
@@ -41,7 +39,6 @@ pub struct TrueObject {
 /// A tracked object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedObject {
-    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,
@@ -49,9 +46,8 @@ pub struct TrackedObject {
     pub velocity: Vector2<f64>,
     /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
-    /// Heading, rad.
     pub yaw_rad: f64,
-    /// True if it is said to move. The others are not judged.
+    /// True if it is reported as moving. The others are not judged.
     pub moving: bool,
 }
 
@@ -71,7 +67,7 @@ pub struct ObjectOptions {
     pub max_range_m: f64,
     /// Lowest speed of a required object, m/s.
     pub min_speed_mps: f64,
-    /// Scans within that range in which it has been seen, the present one included.
+    /// Scans within that range that have shown it, including the present one.
     pub min_scans: usize,
     /// Largest distance between the centres of a pair, m: the length of a car.
     pub gate_m: f64,
@@ -91,7 +87,6 @@ impl Default for ObjectOptions {
 /// The figures of a drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
-    /// Scans.
     pub scans: usize,
     /// Required objects, each once.
     pub objects: usize,
@@ -179,7 +174,7 @@ pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErr
 /// The sums over the scans so far.
 #[derive(Default)]
 struct Count {
-    /// Scans in which each true object was seen within the range.
+    /// Scans that show each true object within the range.
     seen: BTreeMap<u64, usize>,
     /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,

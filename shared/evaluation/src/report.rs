@@ -17,7 +17,7 @@ pub struct Options {
     /// Poses from the start of a segment of KITTI and seg to the start of the next; published
     /// figures use 10 or 4.
     pub step: NonZeroUsize,
-    /// The rule by which poses are associated.
+    /// The rule that associates poses.
     pub association: Association,
 }
 
@@ -39,8 +39,9 @@ pub struct Evaluation {
     pub coverage: Coverage,
     /// The axes that were negated in the estimate.
     pub axes: Axes,
-    /// Heading of the estimate minus that of the ground truth, degrees, where all differ by one
-    /// large angle: the sensors are mounted otherwise, and metrics that use headings do not hold.
+    /// Heading of the estimate minus heading of the ground truth, degrees, if all differ by one
+    /// large angle: then the sensors are mounted differently, and metrics that use headings are
+    /// invalid.
     pub heading_offset_deg: Option<f64>,
     /// Path length of the ground truth over the matched poses, m.
     pub path_m: f64,
@@ -67,8 +68,7 @@ pub struct Evaluation {
 
 /// Compares `estimate` with `truth`.
 ///
-/// # Errors
-/// Those of [`associate()`]. A path that is too short for KITTI is no error.
+/// A path that is too short for KITTI is not an error.
 pub fn evaluate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

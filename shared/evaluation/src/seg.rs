@@ -18,7 +18,6 @@ use crate::{
 pub struct Seg {
     /// Mean over all segments of all lengths, % of the segment length.
     pub percent: f64,
-    /// Number of segments.
     pub segments: usize,
     /// Poses from the start of a segment to the start of the next.
     pub step: NonZeroUsize,
@@ -29,16 +28,14 @@ pub struct Seg {
 /// The segment error of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SegLength {
-    /// Segment length, m.
     pub length_m: f64,
     /// Mean RMSE, % of the segment length.
     pub percent: f64,
-    /// Number of segments.
     pub segments: usize,
 }
 
-/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned by
-/// itself; `None` if the path is not longer than 100 m.
+/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned
+/// separately; `None` if the path is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
     let mut errors = PerLength::new();
     for segment in segments(&matched.distance_m(), step) {

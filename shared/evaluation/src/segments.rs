@@ -3,7 +3,6 @@
 
 use std::num::NonZeroUsize;
 
-/// The segment lengths, m.
 pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
 /// One segment: from pose `first` to pose `last`, both included.

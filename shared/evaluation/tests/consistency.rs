@@ -160,7 +160,7 @@ fn twice_the_covariance_halves_the_ratio() {
     }
 }
 
-/// The poses drift, and each has noise of its own besides, as those of scans that are registered
+/// The poses drift, and each has additional noise of its own, as poses of scans that are registered
 /// with a map.
 #[test]
 fn motions_that_share_the_noise_of_their_poses_are_consistent_over_all_lengths() {

@@ -24,9 +24,6 @@ use crate::{
 pub use arguments::EvaluateArguments;
 
 /// Prints the errors of an estimate as a table or as JSON, and draws it.
-///
-/// # Errors
-/// A file that cannot be read, trajectories that do not overlap.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {
         return evaluate_objects(arguments);
@@ -115,10 +112,7 @@ impl Files {
     }
 }
 
-/// Returns the ground truth of a run: its own, or that of its recording.
-///
-/// # Errors
-/// A folder that has no results, a run without a ground truth.
+/// Returns the ground truth of a run: its own, or the truth of its recording.
 pub fn truth_of_run(run: &Path) -> Result<PathBuf, Failure> {
     let configuration = Configuration::read(&run.join("config.toml"), &[])?;
     let none = || {

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::out::SUMMARY;
 
-/// The part of a summary that says where the run is.
+/// The origin of a run in a summary.
 #[derive(Deserialize)]
 struct Georeferenced {
     gnss: Option<Placed>,
@@ -21,10 +21,7 @@ struct Placed {
 }
 
 /// Returns the place on the earth of the frame of `trajectory_slam.tum` in the results of a run;
-/// `None` if GNSS does not tell it.
-///
-/// # Errors
-/// A summary that cannot be read.
+/// `None` if GNSS does not determine it.
 pub fn georeference(run: &Path) -> Result<Option<Origin>, Failure> {
     let path = run.join(SUMMARY);
     if !path.is_file() {

@@ -1,4 +1,5 @@
-//! `journal/run.toml`: what the run was begun with. A run is resumed only with the same.
+//! `journal/run.toml`: the programs, the recording and the configuration at the start of the run. A
+//! run is resumed only with the same.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -24,14 +25,13 @@ pub struct Identity {
     /// Scans to play; `None`: without end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
-    /// The programs.
     programs: Programs,
-    /// The options to read the recording, those of its `dataset.toml` among them.
+    /// The options to read the recording, including its `dataset.toml`.
     dataset: DatasetOptions,
-    /// The recording; `None` for a simulation that is not stored, which its configuration tells.
+    /// The recording; `None` for a simulation that is not stored, which its configuration
+    /// determines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recording: Option<Fingerprint>,
-    /// The resolved configuration.
     pub configuration: toml::Table,
 }
 
@@ -48,7 +48,6 @@ pub enum Holds {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programs {
-    /// Gyre's version.
     version: String,
     /// BLAKE3 digest of Gyre's program.
     pub build: String,
@@ -57,7 +56,8 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Returns those of a run: the BLAKE3 digests of Gyre's program and of each replaced stage.
+    /// Returns the programs of a run: the BLAKE3 digests of Gyre's program and of each replaced
+    /// stage.
     pub fn new(build: String, replaced: BTreeMap<String, String>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -87,9 +87,6 @@ impl Programs {
 impl Identity {
     /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
     /// in `dataset`.
-    ///
-    /// # Errors
-    /// A recording that cannot be read, or a configuration that TOML cannot hold.
     pub fn of(
         configuration: &Configuration,
         programs: &Programs,
@@ -107,9 +104,6 @@ impl Identity {
     }
 
     /// Writes it, once for a run. It survives a power failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, out: &Out) -> Result<(), Failure> {
         let text = toml::to_string_pretty(self)?;
         let checksum = checksum(&text);
@@ -119,11 +113,7 @@ impl Identity {
         )?)
     }
 
-    /// Reads that of the run which the folder holds.
-    ///
-    /// # Errors
-    /// One sentence that says what is wrong with the file. It is written as a whole before the
-    /// first pose, so the run did not leave it like that.
+    /// Reads the identity of the run in the folder.
     pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -165,9 +155,6 @@ impl Identity {
     }
 
     /// Checks that this configuration and these programs continue the run.
-    ///
-    /// # Errors
-    /// One sentence that says what differs.
     pub fn require(
         &self,
         configuration: &Configuration,
@@ -186,9 +173,6 @@ impl Identity {
 
     /// Checks that the recording is the one that the run was begun with, and is read in the same
     /// way.
-    ///
-    /// # Errors
-    /// One sentence that says what differs.
     pub fn require_recording(&self, now: &Self, out: &Path, holds: Holds) -> Result<(), Failure> {
         let options = |of: &Self| toml::Table::try_from(of.dataset);
         if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
@@ -206,10 +190,7 @@ impl Identity {
 
     /// Returns whether a run of this configuration that begins now would compute the same and judge
     /// it by the same truth, if these are the replaced stages as in [`Programs::new`]. Gyre's own
-    /// build may be another one.
-    ///
-    /// # Errors
-    /// A recording that cannot be read.
+    /// build may differ.
     pub fn has_inputs_of(
         &self,
         configuration: &Configuration,

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
-    /// Time by which the clock of the ground truth was late, s, and which was taken out.
+    /// The removed delay of the clock of the ground truth, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     time_offset_s: Option<f64>,
     #[serde(flatten)]
@@ -25,8 +25,8 @@ pub struct Judgement {
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
-    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what
-    /// their covariance says, %.
+    /// Share of the poses whose error in x, y, yaw is within three standard deviations by their
+    /// covariance, %.
     #[serde(skip_serializing_if = "Option::is_none")]
     within_3_sigma_percent: Option<[f64; 3]>,
     #[serde(skip)]
@@ -54,7 +54,7 @@ impl Judgement {
 
     /// Adds the time offset of the ground truth that was taken out.
     pub fn with_time_offset(mut self, offset: Option<ClockOffset>) -> Self {
-        self.time_offset_s = offset.map(|offset| offset.late_s);
+        self.time_offset_s = offset.map(|offset| offset.delay_s);
         self
     }
 
@@ -65,9 +65,6 @@ impl Judgement {
 
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let matched = &self.evaluation.matched;
         let mut plots = vec![(
@@ -86,9 +83,9 @@ impl Judgement {
 
 impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(late_s) = self.time_offset_s {
-            let word = if late_s > 0.0 { "late" } else { "early" };
-            let by_s = late_s.abs();
+        if let Some(delay_s) = self.time_offset_s {
+            let word = if delay_s > 0.0 { "late" } else { "early" };
+            let by_s = delay_s.abs();
             writeln!(
                 f,
                 "time offset   the ground truth was {by_s:.2} s {word}: taken out"
@@ -109,7 +106,7 @@ impl fmt::Display for Judgement {
     }
 }
 
-/// Says so if the clock of the ground truth differs from the estimate's.
+/// Reports a clock of the ground truth that differs from the estimate's clock.
 pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
     let differs = |offset: &ClockOffset| offset.is_reliable() && !offset.agrees();
     if let Some(offset) = clock_offset(estimate, truth).filter(differs) {
@@ -121,9 +118,6 @@ pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
 }
 
 /// Returns the ground truth with the clock of the estimate, and the offset that was taken out.
-///
-/// # Errors
-/// The motions do not show an offset.
 pub fn without_time_offset(
     estimate: &Trajectory,
     truth: Trajectory,
@@ -135,14 +129,11 @@ pub fn without_time_offset(
              {MAX_OFFSET_S} s, or one of them has no times"
         )
     })?;
-    let late_ns = (found.late_s * 1e9).round() as i64;
+    let late_ns = (found.delay_s * 1e9).round() as i64;
     Ok((truth.earlier_by(late_ns), found))
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
-///
-/// # Errors
-/// Trajectories that do not overlap.
 pub fn judge(
     estimate: &Trajectory,
     truth: &Trajectory,
@@ -161,9 +152,6 @@ pub fn judge(
 }
 
 /// Compares motions with the truth against which their trajectory was evaluated.
-///
-/// # Errors
-/// A truth without times, without heading, or with other axes.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,
@@ -207,12 +195,12 @@ mod tests {
     const START_NS: i64 = 1_549_986_607_000_000_000;
 
     /// A drive of 100 s through bends, at `rate` Hz, by a clock that is late.
-    fn drive(rate: f64, late_s: f64) -> Trajectory {
+    fn drive(rate: f64, delay_s: f64) -> Trajectory {
         let (mut now, mut poses, mut stamps) = (Pose::identity(), Vec::new(), Vec::new());
         let steps = (100.0 * rate) as i64;
         for k in 0..steps {
             // Fine steps, so that the path does not depend on the rate.
-            stamps.push(START_NS + ((k as f64 / rate + late_s) * 1e9).round() as i64);
+            stamps.push(START_NS + ((k as f64 / rate + delay_s) * 1e9).round() as i64);
             poses.push(now);
             let fine = (1000.0 / rate) as i64;
             for part in 0..fine {
@@ -237,12 +225,12 @@ mod tests {
     #[test]
     fn clocks_that_differ_are_found_and_the_offset_is_taken_out() {
         let estimate = drive(4.0, 0.0);
-        for late_s in [18.0, 37.0, -18.0, 1.6] {
-            let truth = drive(10.0, late_s);
+        for delay_s in [18.0, 37.0, -18.0, 1.6] {
+            let truth = drive(10.0, delay_s);
             assert!(ate_m(&estimate, &truth) > 0.5);
             let (truth, offset) = without_time_offset(&estimate, truth).unwrap();
-            assert!((offset.late_s - late_s).abs() < 0.02, "{offset:?}");
-            assert!(ate_m(&estimate, &truth) < 0.1, "{late_s}");
+            assert!((offset.delay_s - delay_s).abs() < 0.02, "{offset:?}");
+            assert!(ate_m(&estimate, &truth) < 0.1, "{delay_s}");
         }
         let standing = Trajectory {
             poses: vec![Pose::identity(); estimate.len()],

@@ -5,11 +5,13 @@
 //! - [`write`](write()): all results, made from the journal in one pass;
 //! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
 //!   evaluation in it;
+//! - [`figures`]: all figures of a run, with their names and units;
 //! - [`georeference`]: the place of a run on the earth;
-//! - [`Identity`]: what the run was begun with;
+//! - [`Identity`]: the inputs of the run at its start;
 //! - [`evaluate`]: the report on a trajectory beside ground truth.
 
 pub mod evaluate;
+pub mod figures;
 mod georeference;
 mod identity;
 pub mod judgement;

@@ -1,4 +1,4 @@
-//! The places that a user names for what a command writes, and the lock of such a folder.
+//! The output paths of commands, and the lock of an output folder.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -45,8 +45,8 @@ const LOCK: &str = ".lock";
 /// in the folder are of the complete run.
 pub const REPLACED: &str = "journal.replaced";
 
-/// The content that a command writes into a folder: the command, the file or folder by which an
-/// earlier content of its own is recognised, and the names of the files that it replaces.
+/// The content that a command writes into a folder: the command, the file or folder that identifies
+/// earlier content of its own, and the names of the files that it replaces.
 #[derive(Clone, Copy, Debug)]
 pub struct Content(&'static str, &'static str, &'static str);
 
@@ -59,7 +59,7 @@ impl Content {
     pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");
     pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");
     pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
-    pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json report.md report.svg");
+    pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json");
     pub const SHADOW: Self = Self("gyre shadow", LOCK, "shadow.csv shadow.json shadow.txt");
     pub const BATCH: Self = Self("gyre batch", "rows", "results.csv times.csv");
     pub const SIMULATION: Self = Self("gyre simulate", "simulation.toml", "dataset.toml ground_truth.tum azimuth_poses.npy objects.csv imu.csv wheels.csv gnss.csv Navtech_Polar.txt");
@@ -67,9 +67,6 @@ impl Content {
 
 impl Content {
     /// Checks that this content replaces only files of its own command in a folder.
-    ///
-    /// # Errors
-    /// A file in the place of the folder, or content of another command or of somebody else.
     pub fn require_place(&self, folder: &Path) -> Result<(), OutError> {
         let (Self(command, mark, files), path) = (self, folder.display());
         let refused = |reason| Err(OutError::Refused(reason));
@@ -111,9 +108,6 @@ fn owner(folder: &Path) -> Option<String> {
 
 /// Writes a page to a path that a user has named: into a new file, in the place of a file that
 /// contains the mark of such pages, or to a FIFO or a device.
-///
-/// # Errors
-/// Anything else at the path, or a file that cannot be written.
 pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     let unwritable = |source| OutError::Unwritable {
         path: to.to_owned(),
@@ -140,10 +134,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     storage::write(&file, page).map_err(|error| unwritable(error.source))
 }
 
-/// Checks that the results in the folder of a run are those of its configuration.
-///
-/// # Errors
-/// A run that replaces an earlier one has not ended.
+/// Checks that the results in the folder of a run belong to its configuration.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
     let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {
@@ -155,7 +146,7 @@ pub fn require_results(run: &Path) -> Result<(), OutError> {
     }
 }
 
-/// Why a place cannot be that of what a command writes, or of results.
+/// Why a path is invalid for the output of a command, or for results.
 #[derive(Debug, Error)]
 pub enum OutError {
     /// It cannot be written.
@@ -171,7 +162,7 @@ pub enum OutError {
     Held {
         /// The folder.
         path: PathBuf,
-        /// The process, where the system tells: `, process 123 (gyre)`.
+        /// The process, if the system reports it: `, process 123 (gyre)`.
         holder: String,
     },
     /// Something else is there, which the sentence names.
@@ -187,27 +178,17 @@ pub struct Out {
 }
 
 /// Returns the full name of a folder of results, which need not exist yet.
-///
-/// # Errors
-/// The system does not tell the working directory.
 pub fn absolute(out: &Path) -> io::Result<PathBuf> {
     out.canonicalize().or_else(|_| std::path::absolute(out))
 }
 
 impl Out {
     /// Creates and locks the folder for a run.
-    ///
-    /// # Errors
-    /// As [`lock_for`](Self::lock_for).
     pub fn lock(path: &Path) -> Result<Self, OutError> {
         Self::lock_for(path, Content::RUN)
     }
 
     /// Creates and locks the folder for this content. Nothing else in it is changed.
-    ///
-    /// # Errors
-    /// A folder that has other content, that cannot be written, or to which another command is
-    /// writing.
     pub fn lock_for(path: &Path, content: Content) -> Result<Self, OutError> {
         let unwritable = |source| OutError::Unwritable {
             path: path.to_owned(),

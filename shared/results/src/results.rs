@@ -1,8 +1,8 @@
 //! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same
 //! files.
 //!
-//! The journal is read once, from its start to its end, and nothing is kept of it but what a result
-//! needs: a month takes no more memory than a minute. Only an evaluation needs all poses.
+//! The journal is read once, from its start to its end, and only the inputs of results are kept: a
+//! month takes no more memory than a minute. Only an evaluation needs all poses.
 
 mod estimate;
 mod files;
@@ -38,21 +38,17 @@ pub use map::map_options;
 /// The files that were written.
 #[derive(Debug)]
 pub struct Results {
-    /// Poses in the journal of which there are results.
+    /// Poses in the journal that have results.
     pub poses: usize,
     /// True if the journal has its end.
     pub ended: bool,
-    /// The summary to print.
     pub summary: Summary,
 }
 
 /// Writes all files from the journal. Each is written aside first, and none takes its place before
 /// all are complete; a result of an earlier session that cannot be made any more is removed. They
-/// survive a power failure when this returns. Those in place stay if `make_way`, which is called
-/// before the first one is replaced, says that results of so many poses do not replace them.
-///
-/// # Errors
-/// A journal that cannot be read, a file that cannot be written.
+/// survive a power failure when this returns. Existing results stay if `make_way`, which is called
+/// before the first one is replaced, decides that results of so many poses do not replace them.
 pub fn write(
     configuration: &Configuration,
     out: &Out,
@@ -159,7 +155,7 @@ fn add_corrected(
     files.add("graph.g2o", slam.graph_g2o())?;
     let mut summary = slam.summary();
     summary.odometry = slam.errors_of(odometry);
-    // Why a truth cannot be used is said where odometry is evaluated.
+    // The evaluation of odometry reports an unusable truth.
     let truth = truth.and_then(|path| read_trajectory(path).ok());
     let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
         return Ok(summary);

@@ -9,14 +9,14 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_latency::{Latency, Percentiles};
 use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
+use gyre_run::latency::{Latency, Percentiles};
 use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::{judgement::Judgement, machine::Machine};
+use crate::{figures, judgement::Judgement, machine::Machine};
 
 pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
 pub use gnss::GnssSummary;
@@ -33,7 +33,6 @@ pub struct Session<'a> {
     /// True if each scan that cannot be read is a problem: of recordings of runs and bags, whose
     /// scans were read once.
     pub needs_all: bool,
-    /// Wall-clock time.
     pub wall: Duration,
     /// Shared memory; `None` if no process was started, because only results were missing.
     pub footprint: Option<&'a Footprint>,
@@ -67,7 +66,7 @@ impl Mask {
     }
 }
 
-/// Why the results of a run that has played all scans are hardly those of its recording.
+/// Why the results of a run that has played all scans are unreliable.
 #[derive(Clone, Debug, Error, Serialize)]
 #[error("{0}")]
 #[serde(transparent)]
@@ -122,7 +121,6 @@ pub struct Measured {
     pub counts: Counts,
     /// The path.
     pub course: Course,
-    /// Latencies.
     pub latency: Latency,
     /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
@@ -192,9 +190,6 @@ pub enum Form {
 
 impl Summary {
     /// Returns it in a form.
-    ///
-    /// # Errors
-    /// A figure that JSON cannot hold.
     pub fn text(&self, form: Form) -> serde_json::Result<String> {
         match form {
             Form::Brief => Ok(self.in_brief()),
@@ -203,12 +198,17 @@ impl Summary {
         }
     }
 
-    /// The counts of scans.
+    /// Returns the figures as `summary.json` has them.
+    fn figures(&self) -> serde_json::Value {
+        // A figure that JSON cannot hold is null there.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Returns why the results of all scans are hardly those of the recording.
+    /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }
@@ -290,99 +290,21 @@ impl fmt::Display for Summary {
             "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
             c.processed, self.wall_s, self.scans_per_s
         )?;
-        writeln!(
-            f,
-            "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
-            c.published, c.dropped, c.unreadable, c.missing, c.breaks
-        )?;
-        if let Some(lost) = &c.lost {
-            let (azimuths, scans, unplaced) = (lost.azimuths, lost.scans, lost.unplaced);
-            writeln!(
-                f,
-                "lost azimuths {azimuths} in {scans} scans  unplaced {unplaced}"
-            )?;
-        }
-        if let Some(m) = &c.motions {
-            writeln!(
-                f,
-                "motions refined {} ({} by a second hypothesis)\n\
-                 weak {}  predicted {}  stationary {}",
-                m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
-            )?;
-            if m.along_walls > 0 {
-                let along = m.along_walls;
-                writeln!(
-                    f,
-                    "along walls without structure {along}: the radar does not see how far"
-                )?;
+        let figures = self.figures();
+        for (title, rows) in figures::GROUPS
+            .iter()
+            .filter(|it| it.0 != figures::ACCURACY)
+        {
+            writeln!(f, "\n{title}")?;
+            for row in *rows {
+                if let Some(text) = row.text(&figures) {
+                    writeln!(f, "  {:41}{text}", row.name)?;
+                }
             }
-        }
-        if let Some(gyro) = &c.gyro {
-            writeln!(
-                f,
-                "turns by the gyro {} of {}  doubted {}  refused {}  bias {:.2e} +- {:.0e} rad/s",
-                gyro.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                gyro.doubted,
-                gyro.refused,
-                gyro.bias_radps,
-                gyro.bias_sigma_radps
-            )?;
-        }
-        if let Some(wheels) = &c.wheels {
-            writeln!(
-                f,
-                "distances by the wheels {} of {}  slips {}  predicted {}  scale {:.4} +- {:.4}",
-                wheels.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                wheels.slips,
-                wheels.predicted,
-                wheels.scale,
-                wheels.scale_sigma
-            )?;
-        }
-        if let Some(doppler) = &c.doppler {
-            writeln!(
-                f,
-                "velocities by Doppler {} of {}  refused {}  predicted {}  scale {:.4} +- {:.4}",
-                doppler.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                doppler.refused,
-                doppler.predicted,
-                doppler.scale,
-                doppler.scale_sigma
-            )?;
-        }
-        if let Some(mask) = &self.mask {
-            writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
-        }
-        if !self.restarts.is_empty() {
-            let restarts: Vec<_> = self
-                .restarts
-                .iter()
-                .map(|(stage, times)| format!("{stage} {times}"))
-                .collect();
-            let recovery: Vec<_> = self
-                .recovery_ms
-                .iter()
-                .map(|ms| format!("{ms:.0}"))
-                .collect();
-            writeln!(
-                f,
-                "restarts {}  recovered after {} ms",
-                restarts.join(", "),
-                recovery.join(", ")
-            )?;
         }
         self.latency_table(f)?;
         if let Some(evaluation) = &self.evaluation {
             writeln!(f, "\n{evaluation}")?;
-        }
-        if let Some(slam) = &self.slam {
-            writeln!(f, "\n{slam}")?;
-        }
-        if let Some(gnss) = &self.gnss {
-            writeln!(f, "{gnss}")?;
         }
         let corrected = match self.slam {
             Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o, map.png",

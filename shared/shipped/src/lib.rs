@@ -1,7 +1,7 @@
 //! The program's own files: its configurations, the networks, and a trajectory.
 //!
-//! Each has a path that begins with `gyre:`, as `gyre:configs/oxford.toml`, by which [`bytes`]
-//! returns its content. What is not in the program itself may be in the folder `share/gyre` of its
+//! Each has a path that begins with `gyre:`, as `gyre:configs/oxford.toml`, and [`bytes`] returns
+//! its content. Files that are not in the program itself may be in the folder `share/gyre` of its
 //! installation, where the larger networks are.
 
 use std::{
@@ -13,7 +13,7 @@ use std::{
 const PREFIX: &str = "gyre:";
 /// The folder of the configurations.
 const CONFIGURATIONS: &str = "configs";
-/// The folder of other files, from that of the program.
+/// The folder of other files, relative to the program's folder.
 const SHARE: &str = "../share/gyre";
 
 macro_rules! files {
@@ -32,8 +32,6 @@ const FILES: &[(&str, &[u8])] = files![
     "configs/fast-mbym.toml"
     "configs/fomo.toml"
     "configs/k2pi-checchin.toml"
-    "configs/k2pi-loop.toml"
-    "configs/k2pi-open.toml"
     "configs/k2pi.toml"
     "configs/mbym.toml"
     "configs/mulran.toml"
@@ -42,7 +40,6 @@ const FILES: &[(&str, &[u8])] = files![
     "configs/navtech-ras6.toml"
     "configs/oxford.toml"
     "configs/radiate.toml"
-    "configs/simulated-oxford.toml"
     "configs/stop-and-go.toml"
     "configs/stop-and-go.tum"
     "models/gyre-255.onnx"

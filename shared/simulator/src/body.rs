@@ -1,4 +1,4 @@
-//! Bodies: scatterers that reflect and walls that hide what is behind them, standing or moving.
+//! Bodies: scatterers that reflect and walls that hide the space behind them, standing or moving.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -30,25 +30,12 @@ impl Aspect {
             Self::Facing { normal, sharpness } => normal.dot(&direction).max(0.0).powf(sharpness),
         }
     }
-
-    /// The mean of [`Aspect::gain`] over all directions: that of a power of the cosine over a
-    /// circle is about `1 / sqrt(2 pi (sharpness + 0.64))`.
-    pub fn mean_gain(&self) -> f64 {
-        match *self {
-            Self::AllRound => 1.0,
-            Self::Facing { sharpness, .. } => {
-                1.0 / (std::f64::consts::TAU * (sharpness + 0.64)).sqrt()
-            }
-        }
-    }
 }
 
-/// A point scatterer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatterer {
     /// Position, world frame, metres.
     pub position: Point2<f64>,
-    /// Radar cross-section, square metres.
     pub cross_section_m2: f64,
     /// The dependence on direction.
     pub aspect: Aspect,
@@ -65,9 +52,6 @@ pub struct Wall {
     pub to: Point2<f64>,
     /// Two-way share of the power that passes: 0 to 1.
     pub transmission: f64,
-    /// Share of the power that is mirrored: 0 (rough) to 1 (a sheet of metal).
-    pub mirror: f64,
-    /// The body.
     pub body: u32,
 }
 
@@ -100,17 +84,6 @@ impl Scatterer {
 }
 
 impl Wall {
-    /// A wall that mirrors nothing.
-    pub fn rough(from: Point2<f64>, to: Point2<f64>, transmission: f64, body: u32) -> Self {
-        Self {
-            from,
-            to,
-            transmission,
-            mirror: 0.0,
-            body,
-        }
-    }
-
     /// The same wall on a body that stands at `pose`.
     pub fn moved(&self, pose: &Pose) -> Self {
         Self {
@@ -124,26 +97,8 @@ impl Wall {
 /// Scatterers and walls.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
-    /// The scatterers.
     pub scatterers: Vec<Scatterer>,
-    /// The walls.
     pub walls: Vec<Wall>,
-}
-
-impl Body {
-    /// Scatterers without walls.
-    pub fn of(scatterers: Vec<Scatterer>) -> Self {
-        Self {
-            scatterers,
-            walls: vec![],
-        }
-    }
-
-    /// Adds all of another body.
-    pub fn extend(&mut self, other: Body) {
-        self.scatterers.extend(other.scatterers);
-        self.walls.extend(other.walls);
-    }
 }
 
 /// A moving body at an instant.
@@ -165,22 +120,4 @@ impl Moving<'_> {
             self.pose.rotation,
         )
     }
-}
-
-/// The moving bodies around the sensor.
-pub trait Movers: Send + Sync {
-    /// Visits all bodies within `reach_m` of `centre` at a time of the drive, always in the same
-    /// order.
-    fn visit<'a>(
-        &'a self,
-        time_s: f64,
-        centre: Point2<f64>,
-        reach_m: f64,
-        see: &mut dyn FnMut(Moving<'a>),
-    );
-}
-
-/// No moving bodies.
-impl Movers for () {
-    fn visit<'a>(&'a self, _: f64, _: Point2<f64>, _: f64, _: &mut dyn FnMut(Moving<'a>)) {}
 }

@@ -26,7 +26,6 @@ pub enum SimulatorError {
     Drive {
         /// The file.
         path: PathBuf,
-        /// The reason.
         reason: String,
     },
     /// More scans are wanted than the drive lasts.
@@ -41,18 +40,9 @@ pub enum SimulatorError {
         /// The duration of the drive, seconds.
         duration_s: f64,
     },
-    /// The drive leaves the streets of the town.
-    #[error(
-        "the drive leaves the streets of `simulation.town.streets` {at_s:.1} s after its start: add its trajectory to them"
-    )]
-    OffStreets {
-        /// The time, seconds after the start of the drive.
-        at_s: f64,
-    },
     /// The output folder holds files of another dataset.
     #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {
-        /// The folder.
         folder: PathBuf,
         /// The first foreign file.
         other: String,
@@ -81,7 +71,6 @@ pub enum SimulatorError {
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The path.
         path: PathBuf,
         /// The system's error.
         source: std::io::Error,
@@ -89,7 +78,6 @@ pub enum SimulatorError {
     /// A folder could not be listed.
     #[error("cannot list {}: {source}", folder.display())]
     List {
-        /// The folder.
         folder: PathBuf,
         /// The system's error.
         source: std::io::Error,

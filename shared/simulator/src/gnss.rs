@@ -1,10 +1,9 @@
 //! A GNSS receiver: the section `[simulation.gnss]`, and the log that it leaves.
 
-use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use gyre_samples::{Geographic, LocalPlane, RawFix};
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -12,130 +11,71 @@ use serde::{Deserialize, Serialize};
 
 use crate::episodes::Episodes;
 use crate::stream::Stream;
-use crate::{TunnelConfig, error::SimulatorError, limits::require_within, path::Path};
+use crate::{error::SimulatorError, limits::require_within, path::Path};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "gnss.csv";
 /// The first row of the file.
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
-/// Time between the places of the path by which its length is measured, seconds.
-const STEP_S: f64 = 0.05;
+/// Standard deviation of each fix along each axis, and of the error that lasts (orbits and
+/// atmosphere), m: a receiver of a car without corrections.
+const NOISE_M: f64 = 0.3;
+const BIAS_M: f64 = 1.0;
+/// Time after which a third of that error is left, s.
+const BIAS_LASTS_S: f64 = 60.0;
+/// Time between holes without a fix, and the duration of each, s.
+const HOLE_EVERY_S: f64 = 40.0;
+const HOLE_S: f64 = 15.0;
+/// The origin of the world, whose x axis points to the east.
+const ORIGIN: Geographic = Geographic {
+    latitude_deg: 50.0,
+    longitude_deg: 10.0,
+};
 
-/// A GNSS receiver beside the radar. In a tunnel it has no fix.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// A GNSS receiver whose antenna is that of the radar.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulatedGnssConfig {
-    /// Fixes a second. Default: 0, no receiver, and then the other keys have no effect.
+    /// Fixes a second. Default: 0, no receiver, and then the other key has no effect.
     pub rate_hz: f64,
-    /// The seed of its errors. Default: the seed of the simulation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seed: Option<u64>,
-    /// Standard deviation of each fix along each axis, m.
-    pub noise_m: f64,
-    /// Standard deviation along each axis of the error that lasts, m: orbits and atmosphere.
-    pub bias_m: f64,
-    /// Time after which a third of that error is left, s.
-    pub bias_lasts_s: f64,
-    /// Time between reflections, s, one in each such time; 0 for none.
-    pub reflection_every_s: f64,
-    /// Duration of a reflection, s.
-    pub reflection_s: f64,
-    /// Distance by which a reflection moves the fixes, all in one direction, m.
-    pub reflection_m: f64,
-    /// Time between holes without a fix, s, one in each such time; 0 for none.
-    pub hole_every_s: f64,
-    /// Duration of a hole, s.
-    pub hole_s: f64,
-    /// Time by which stamps are late against the radar's, s.
-    pub late_s: f64,
-    /// Share of the fixes that are lost.
-    pub lost: f64,
-    /// The antenna in the frame of the radar: x forward, y left, m.
-    pub lever_m: [f64; 2],
-    /// Latitude and longitude of the origin of the town, whose x axis points to the east, degrees.
-    pub origin_deg: [f64; 2],
-}
-
-impl Default for SimulatedGnssConfig {
-    /// A receiver of a car without corrections.
-    fn default() -> Self {
-        Self {
-            rate_hz: 0.0,
-            seed: None,
-            noise_m: 0.3,
-            bias_m: 1.0,
-            bias_lasts_s: 60.0,
-            reflection_every_s: 0.0,
-            reflection_s: 0.0,
-            reflection_m: 15.0,
-            hole_every_s: 0.0,
-            hole_s: 0.0,
-            late_s: 0.0,
-            lost: 0.0,
-            lever_m: [0.0, 0.0],
-            origin_deg: [50.0, 10.0],
-        }
-    }
+    /// True if there is no fix for 15 s in each 40 s.
+    pub faults: bool,
 }
 
 impl SimulatedGnssConfig {
-    /// Returns whether all keys are as configurations leave them out.
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        let [latitude_deg, longitude_deg] = self.origin_deg;
-        for (key, value, min, max) in [
-            ("gnss.rate_hz", self.rate_hz, 0.0, 100.0),
-            ("gnss.noise_m", self.noise_m, 0.0, 100.0),
-            ("gnss.bias_m", self.bias_m, 0.0, 100.0),
-            ("gnss.bias_lasts_s", self.bias_lasts_s, 0.1, 1e6),
-            ("gnss.reflection_every_s", self.reflection_every_s, 0.0, 1e6),
-            (
-                "gnss.reflection_s",
-                self.reflection_s,
-                0.0,
-                self.reflection_every_s,
-            ),
-            ("gnss.reflection_m", self.reflection_m, 0.0, 1e4),
-            ("gnss.hole_every_s", self.hole_every_s, 0.0, 1e6),
-            ("gnss.hole_s", self.hole_s, 0.0, self.hole_every_s),
-            ("gnss.late_s", self.late_s, -1e6, 1e6),
-            ("gnss.lost", self.lost, 0.0, 1.0),
-            ("gnss.lever_m", self.lever_m[0], -20.0, 20.0),
-            ("gnss.lever_m", self.lever_m[1], -20.0, 20.0),
-            ("gnss.origin_deg", latitude_deg, -85.0, 85.0),
-            ("gnss.origin_deg", longitude_deg, -180.0, 180.0),
-        ] {
-            require_within(key, value, min, max)?;
-        }
-        Ok(())
+        require_within("gnss.rate_hz", self.rate_hz, 0.0, 100.0)
     }
 }
 
 /// The fixes during a drive, whose start is `start_ns` and which ends `end_s` later, by their
 /// stamps. `None` without a receiver.
 pub(crate) fn fixes(
-    (config, tunnels): (&SimulatedGnssConfig, &[TunnelConfig]),
+    config: &SimulatedGnssConfig,
     seed: u64,
     path: &dyn Path,
     (start_ns, end_s): (i64, f64),
 ) -> Option<Vec<RawFix>> {
     (config.rate_hz > 0.0).then(|| {
-        let mut receiver = Receiver::new(config, seed, path);
+        let plane = LocalPlane::new(ORIGIN, 0.0);
+        let mut rng = Stream::GnssErrors.generator(seed);
+        let mut holes = Episodes::new(HOLE_EVERY_S, HOLE_S, Stream::GnssHoles.generator(seed));
+        let kept = (-1.0 / (config.rate_hz * BIAS_LASTS_S)).exp();
+        let fresh_m = BIAS_M * (1.0 - kept * kept).sqrt();
+        let mut bias_m = normal(&mut rng) * BIAS_M;
         let count = (end_s * config.rate_hz).ceil() as usize;
         let fix = |index: usize| {
             let time_s = index as f64 / config.rate_hz;
-            let place = receiver.measure(time_s, tunnels)?;
-            Some(RawFix {
-                stamp_ns: start_ns + ((time_s + config.late_s) * 1e9).round() as i64,
+            bias_m = bias_m * kept + normal(&mut rng) * fresh_m;
+            let error_m = bias_m + normal(&mut rng) * NOISE_M;
+            let is_hole = holes.begin_s(time_s).is_some() && config.faults;
+            let antenna = path.pose(time_s).translation.vector + error_m;
+            let place = plane.place([antenna.x, antenna.y]);
+            (!is_hole).then(|| RawFix {
+                stamp_ns: start_ns + (time_s * 1e9).round() as i64,
                 at: [place.latitude_deg, place.longitude_deg],
-                sigma_m: config.noise_m.hypot(config.bias_m),
+                sigma_m: NOISE_M.hypot(BIAS_M),
                 ..RawFix::default()
             })
         };
@@ -143,7 +83,7 @@ pub(crate) fn fixes(
     })
 }
 
-/// The fixes as CSV: the numbers read from it are those of the fixes.
+/// The fixes as CSV: a reader gets exactly the numbers of the fixes.
 pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {
@@ -154,90 +94,6 @@ pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
     text.into_bytes()
 }
 
-struct Receiver<'a> {
-    config: &'a SimulatedGnssConfig,
-    path: &'a dyn Path,
-    plane: LocalPlane,
-    rng: ChaCha8Rng,
-    bias_m: Vector2<f64>,
-    reflections: Episodes,
-    directions: ChaCha8Rng,
-    /// When the last reflection began, s, and where it moves the fixes to.
-    reflection: (f64, Vector2<f64>),
-    holes: Episodes,
-    /// Time up to which the way is measured, s, and the way, m.
-    way: (f64, f64),
-}
-
-impl<'a> Receiver<'a> {
-    fn new(config: &'a SimulatedGnssConfig, seed: u64, path: &'a dyn Path) -> Self {
-        let [latitude_deg, longitude_deg] = config.origin_deg;
-        let origin = Geographic {
-            latitude_deg,
-            longitude_deg,
-        };
-        let mut rng = Stream::GnssErrors.generator(seed);
-        let bias_m = normal(&mut rng) * config.bias_m;
-        let reflections = Stream::GnssReflections.generator(seed);
-        let holes = Stream::GnssHoles.generator(seed);
-        Self {
-            config,
-            path,
-            plane: LocalPlane::new(origin, 0.0),
-            rng,
-            bias_m,
-            reflections: Episodes::new(config.reflection_every_s, config.reflection_s, reflections),
-            directions: Stream::GnssDirections.generator(seed),
-            reflection: (f64::NEG_INFINITY, Vector2::zeros()),
-            holes: Episodes::new(config.hole_every_s, config.hole_s, holes),
-            way: (0.0, 0.0),
-        }
-    }
-
-    /// The place that is measured at a time of the drive, s; `None` without a fix.
-    fn measure(&mut self, time_s: f64, tunnels: &[TunnelConfig]) -> Option<Geographic> {
-        let config = self.config;
-        let kept = (-1.0 / (config.rate_hz * config.bias_lasts_s)).exp();
-        let fresh = config.bias_m * (1.0 - kept * kept).sqrt();
-        self.bias_m = self.bias_m * kept + normal(&mut self.rng) * fresh;
-        let noise_m = normal(&mut self.rng) * config.noise_m;
-        let is_lost = self.rng.random::<f64>() < config.lost;
-        let error_m = self.bias_m + noise_m + self.reflected(time_s);
-        let driven_m = self.driven_m(time_s);
-        let is_inside = |tunnel: &TunnelConfig| {
-            (tunnel.from_m..tunnel.from_m + tunnel.length_m).contains(&driven_m)
-        };
-        let has_none = self.holes.begin_s(time_s).is_some() || tunnels.iter().any(is_inside);
-        let antenna = self.path.pose(time_s) * Point2::from(config.lever_m) + error_m;
-        (!is_lost && !has_none).then(|| self.plane.place([antenna.x, antenna.y]))
-    }
-
-    /// Where a reflection moves a fix, m.
-    fn reflected(&mut self, time_s: f64) -> Vector2<f64> {
-        let Some(begin_s) = self.reflections.begin_s(time_s) else {
-            return Vector2::zeros();
-        };
-        if begin_s > self.reflection.0 {
-            let (sin, cos) = (TAU * self.directions.random::<f64>()).sin_cos();
-            self.reflection = (begin_s, Vector2::new(cos, sin) * self.config.reflection_m);
-        }
-        self.reflection.1
-    }
-
-    /// The way that the radar has driven at a time of the drive, s; times ascend.
-    fn driven_m(&mut self, time_s: f64) -> f64 {
-        let (mut at_s, mut driven_m) = self.way;
-        while at_s < time_s {
-            let next_s = (at_s + STEP_S).min(time_s);
-            let [from, to] = [at_s, next_s].map(|s| self.path.pose(s).translation.vector);
-            driven_m += (to - from).norm();
-            at_s = next_s;
-        }
-        self.way = (at_s, driven_m);
-        driven_m
-    }
-}
-
 /// Two numbers of the standard normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
     Vector2::from_fn(|_, _| rng.sample(StandardNormal))
@@ -246,116 +102,38 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SimulationConfig, Simulator, drive::DriveKind};
-
-    /// A drive of some seconds, its fixes, and the true places of the radar at their times, m.
-    fn simulated(
-        gnss: SimulatedGnssConfig,
-        tunnels: Vec<TunnelConfig>,
-    ) -> (Vec<RawFix>, Vec<Vector2<f64>>) {
-        let mut config = SimulationConfig {
-            scans: Some(120),
-            gnss,
-            tunnels,
-            ..SimulationConfig::default()
-        };
-        config.drive.kind = DriveKind::Town;
-        config.drive.speed_mps = 8.0;
-        config.drive.length_m = 300.0;
-        let simulator = Simulator::new(&config).expect("a drive");
-        let fixes = simulator.gnss_fixes().unwrap_or_default();
-        let plane = LocalPlane::new(
-            RawFix {
-                at: config.gnss.origin_deg,
-                ..RawFix::default()
-            }
-            .geographic(),
-            0.0,
-        );
-        let errors = fixes.iter().map(|fix| {
-            let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
-            let antenna = simulator.path().pose(time_s) * Point2::from(config.gnss.lever_m);
-            Vector2::from(plane.east_north(fix.geographic())) - antenna.coords
-        });
-        let errors = errors.collect();
-        (fixes, errors)
-    }
-
-    fn exact() -> SimulatedGnssConfig {
-        SimulatedGnssConfig {
-            rate_hz: 10.0,
-            noise_m: 0.0,
-            bias_m: 0.0,
-            late_s: 1.5,
-            lever_m: [0.5, -1.0],
-            ..SimulatedGnssConfig::default()
-        }
-    }
+    use crate::{SimulationConfig, Simulator};
 
     #[test]
-    fn without_a_rate_there_is_no_receiver_and_an_exact_one_is_at_its_antenna() {
-        assert!(
-            simulated(SimulatedGnssConfig::default(), Vec::new())
-                .0
-                .is_empty()
-        );
-        let (fixes, errors_m) = simulated(exact(), Vec::new());
-        assert_eq!(fixes.len(), 300);
-        assert!(errors_m.iter().all(|error_m| error_m.norm() < 1e-6));
-    }
-
-    #[test]
-    fn errors_have_the_standard_deviation_that_is_said_and_last() {
-        let gnss = SimulatedGnssConfig {
-            rate_hz: 100.0,
-            noise_m: 0.2,
-            bias_m: 2.0,
-            bias_lasts_s: 0.2,
-            ..exact()
+    fn fixes_err_by_as_much_as_they_say_and_holes_have_none() {
+        let simulated = |faults: bool| {
+            let gnss = SimulatedGnssConfig {
+                rate_hz: 5.0,
+                faults,
+            };
+            let config = SimulationConfig {
+                scans: Some(1600),
+                gnss,
+                ..SimulationConfig::default()
+            };
+            let simulator = Simulator::new(&config).expect("a drive");
+            let fixes = simulator.gnss_fixes().unwrap_or_default();
+            (simulator, fixes)
         };
-        let (fixes, errors_m) = simulated(gnss, Vec::new());
-        let mean = |of: &dyn Fn(usize) -> f64| {
-            (0..errors_m.len() - 20).map(of).sum::<f64>() / (errors_m.len() - 20) as f64
+        let (simulator, fixes) = simulated(false);
+        let plane = LocalPlane::new(ORIGIN, 0.0);
+        let square_m2 = |fix: &RawFix| {
+            let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9;
+            let truth = simulator.path().pose(time_s).translation.vector;
+            (Vector2::from(plane.east_north(fix.geographic())) - truth).norm_squared()
         };
-        let variance_m2 = mean(&|at| 0.5 * errors_m[at].norm_squared());
-        let stated_m2 = fixes[0].sigma_m.powi(2);
-        assert!(
-            (0.7..1.4).contains(&(variance_m2 / stated_m2)),
-            "{variance_m2}"
-        );
-        let later = mean(&|at| 0.5 * errors_m[at].dot(&errors_m[at + 20])) / variance_m2;
-        assert!((later - (-1.0f64).exp()).abs() < 0.2, "{later}");
-    }
-
-    #[test]
-    fn reflections_move_fixes_together_and_holes_and_tunnels_have_none() {
-        let reflected = SimulatedGnssConfig {
-            reflection_every_s: 10.0,
-            reflection_s: 2.0,
-            ..exact()
-        };
-        let (_, errors_m) = simulated(reflected, Vec::new());
-        let moved: Vec<_> = errors_m.iter().filter(|it| it.norm() > 1.0).collect();
-        assert!((55..=65).contains(&moved.len()), "{}", moved.len());
-        assert!((moved[1] - moved[0]).norm() < 1e-6 && (moved[0].norm() - 15.0).abs() < 1e-6);
-        assert!((moved[25] - moved[0]).norm() > 1e-3);
-        let with_holes = SimulatedGnssConfig {
-            hole_every_s: 10.0,
-            hole_s: 3.0,
-            ..exact()
-        };
-        let count = simulated(with_holes, Vec::new()).0.len();
-        assert!((205..=215).contains(&count), "{count}");
-        let tunnel = TunnelConfig {
-            from_m: 40.0,
-            length_m: 60.0,
-        };
-        let (fixes, _) = simulated(exact(), vec![tunnel]);
-        let gaps_ns = fixes
-            .windows(2)
-            .map(|pair| pair[1].stamp_ns - pair[0].stamp_ns);
-        let longest_s = gaps_ns.max().unwrap_or_default() as f64 * 1e-9;
-        // 60 m at up to 8 m/s.
-        assert!((7.0..20.0).contains(&longest_s), "{longest_s}");
+        let mean_m2 = fixes.iter().map(square_m2).sum::<f64>() / fixes.len() as f64;
+        let stated = 2.0 * fixes[0].sigma_m.powi(2);
+        assert_eq!(fixes.len(), 2000);
+        assert!((0.3..3.0).contains(&(mean_m2 / stated)), "{mean_m2}");
+        let holes = simulated(true).1.len();
+        assert!((1200..1300).contains(&holes), "{holes}");
+        let without = Simulator::new(&SimulationConfig::default()).expect("a drive");
+        assert_eq!(without.gnss_fixes(), None);
     }
 }

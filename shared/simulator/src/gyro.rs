@@ -3,8 +3,8 @@
 //! In the order of the data:
 //!
 //! - [`config`]: the configuration; [`profile`]: gyros that can be bought;
-//! - `attitude`: the vehicle's rates of rotation and accelerations, from its path and the hills;
-//! - `errors`: what the sensor makes of them;
+//! - `attitude`: the vehicle's rate of rotation and acceleration, from its path;
+//! - `errors`: the errors of the sensor;
 //! - `clock`: the stamps, and which samples are lost;
 //! - `log`: the samples as a log has them.
 
@@ -17,6 +17,5 @@ pub mod profile;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use attitude::Vehicle;
 pub use config::SimulatedGyroConfig;
 pub use profile::{GyroFigures, GyroProfile};

@@ -33,9 +33,6 @@ pub(crate) fn encode(
 
 /// Writes an image as a whole or not at all, whatever ends the process or the machine; `buffer` is
 /// working memory.
-///
-/// # Errors
-/// [`SimulatorError::Encode`] or [`SimulatorError::Storage`].
 pub(crate) fn write_image(
     path: &Path,
     size: ImageSize,

@@ -4,4 +4,6 @@
 pub(crate) mod boreas;
 pub(crate) mod oxford;
 pub(crate) mod radiate;
-pub(crate) mod side_file;
+
+/// A file beside the images: its path in the dataset's folder, and its content.
+pub(crate) type SideFile = (std::path::PathBuf, Vec<u8>);

@@ -3,9 +3,6 @@
 use crate::error::SimulatorError;
 
 /// Checks that `value` lies in `min..=max`.
-///
-/// # Errors
-/// [`SimulatorError::Config`] with the key, if it does not.
 pub(crate) fn require_within(
     key: &'static str,
     value: f64,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-use crate::body::{NO_BODY, Wall};
+use crate::body::Wall;
 
 /// Side of a cell, metres: a few walls in each, some ten cells between the sensor and most
 /// scatterers.
@@ -44,11 +44,6 @@ impl WallGrid {
         grid
     }
 
-    /// All walls, in the given order.
-    pub fn walls(&self) -> &[Wall] {
-        &self.walls
-    }
-
     fn sort(&mut self) {
         let mut cells: Vec<Vec<u32>> = vec![Vec::new(); self.columns * self.rows];
         for (index, wall) in self.walls.iter().enumerate() {
@@ -71,39 +66,8 @@ impl WallGrid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Two-line share of the power that passes between two points; see
-    /// [`crate::World::transmission`].
-    pub fn transmission(
-        &self,
-        from: Point2<f64>,
-        to: Point2<f64>,
-        body: u32,
-        negligible: f64,
-    ) -> f64 {
-        let mut passed = 1.0;
-        let mut walk = CellWalk::new(self, from, to);
-        let mut entered = 0.0;
-        while let Some((column, row, left)) = walk.next_cell() {
-            if let Some(cell) = self.cell(column, row) {
-                // A wall lies in several cells, but the line crosses it in one of them only.
-                let span = entered..left;
-                passed *= self.crossed(cell, from, to - from, body, span);
-                if passed < negligible {
-                    return passed;
-                }
-            }
-            entered = left;
-        }
-        passed
-    }
-
     /// Visits all walls between two points; see [`crate::World::walls_between`].
-    pub fn between(
-        &self,
-        from: Point2<f64>,
-        to: Point2<f64>,
-        see: &mut impl FnMut(u32, &Wall, f64),
-    ) {
+    pub fn between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(&Wall, f64)) {
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;
         while let Some((column, row, left)) = walk.next_cell() {
@@ -116,7 +80,7 @@ impl WallGrid {
                 if let Some(share) =
                     crossing(from, to - from, wall).filter(|share| (entered..left).contains(share))
                 {
-                    see(index, wall, share);
+                    see(wall, share);
                 }
             }
             entered = left;
@@ -125,23 +89,6 @@ impl WallGrid {
 
     fn walls_in(&self, cell: usize) -> &[u32] {
         &self.cell_walls[self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize]
-    }
-
-    fn crossed(
-        &self,
-        cell: usize,
-        from: Point2<f64>,
-        line: Vector2<f64>,
-        body: u32,
-        span: std::ops::Range<f64>,
-    ) -> f64 {
-        self.walls_in(cell)
-            .iter()
-            .map(|&index| &self.walls[index as usize])
-            .filter(|wall| body == NO_BODY || wall.body != body)
-            .filter(|wall| crossing(from, line, wall).is_some_and(|share| span.contains(&share)))
-            .map(|wall| wall.transmission)
-            .product()
     }
 }
 
@@ -162,7 +109,7 @@ pub fn crossing(from: Point2<f64>, line: Vector2<f64>, wall: &Wall) -> Option<f6
 struct CellWalk {
     cell: [i64; 2],
     step: [i64; 2],
-    /// Share of the line at which it leaves the cell in x and in y.
+    /// Share of the line where it leaves the cell in x and in y.
     next: [f64; 2],
     /// Share of the line that lies in one cell in x and in y.
     stride: [f64; 2],
@@ -197,7 +144,7 @@ impl CellWalk {
         walk
     }
 
-    /// Column, row, and the share of the line at which it leaves the cell (1 in the last).
+    /// Column, row, and the share of the line where it leaves the cell (1 in the last).
     fn next_cell(&mut self) -> Option<(i64, i64, f64)> {
         if self.done {
             return None;
@@ -230,16 +177,22 @@ mod tests {
             let from = point(rng);
             let to =
                 from + Vector2::new(rng.random_range(-15.0..15.0), rng.random_range(-15.0..15.0));
-            Wall::rough(from, to, 0.5, i % 7)
+            Wall {
+                from,
+                to,
+                transmission: 0.5,
+                body: i % 7,
+            }
         };
         let walls: Vec<Wall> = (0..120).map(|i| wall(i, &mut rng)).collect();
         let grid = WallGrid::new(walls.clone());
         let mut hits = 0;
         for _ in 0..500 {
             let (from, to) = (point(&mut rng), point(&mut rng));
-            let crossed = |w: &&Wall| w.body != 3 && crossing(from, to - from, w).is_some();
-            let count = walls.iter().filter(crossed).count() as i32;
-            let found = grid.transmission(from, to, 3, 0.0).log(0.5).round() as i32;
+            let crossed = |w: &&Wall| crossing(from, to - from, w).is_some();
+            let count = walls.iter().filter(crossed).count();
+            let mut found = 0;
+            grid.between(from, to, &mut |_, _| found += 1);
             assert_eq!(found, count, "{from} to {to}");
             hits += count;
         }
@@ -255,15 +208,18 @@ mod tests {
             for (from, to) in [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))]
                 .map(|(a, b)| (point_at(a), point_at(b)))
             {
-                let grid = WallGrid::new(vec![Wall::rough(from, to, 0.5, 1)]);
+                let grid = WallGrid::new(vec![Wall {
+                    from,
+                    to,
+                    transmission: 0.5,
+                    body: 1,
+                }]);
                 let across = Vector2::new((to - from).y, (to - from).x) + Vector2::new(0.7, 0.7);
                 let middle = nalgebra::center(&from, &to);
                 for line in [across, -across] {
-                    assert_eq!(
-                        grid.transmission(middle - line, middle + line, NO_BODY, 0.0),
-                        0.5,
-                        "{from} to {to}, {line}"
-                    );
+                    let mut found = 0;
+                    grid.between(middle - line, middle + line, &mut |_, _| found += 1);
+                    assert_eq!(found, 1, "{from} to {to}, {line}");
                 }
             }
         }
@@ -271,19 +227,5 @@ mod tests {
 
     fn point_at((x, y): (f64, f64)) -> Point2<f64> {
         Point2::new(x, y)
-    }
-
-    #[test]
-    fn nothing_hides_in_an_empty_world() {
-        let grid = WallGrid::new(Vec::new());
-        assert_eq!(
-            grid.transmission(
-                Point2::new(-3.0, 2.0),
-                Point2::new(90.0, -70.0),
-                NO_BODY,
-                0.0
-            ),
-            1.0
-        );
     }
 }

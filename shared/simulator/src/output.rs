@@ -56,7 +56,6 @@ impl FromStr for OutputFormat {
 }
 
 impl OutputFormat {
-    /// All formats.
     pub const ALL: [Self; 3] = [Self::Oxford, Self::Boreas, Self::Radiate];
 
     /// The name in configurations and on the command line.

@@ -31,16 +31,13 @@ pub enum Profile {
 pub enum Chirp {
     /// Approaching objects are measured too near.
     Rising,
-    /// Approaching objects are measured too far.
-    Falling,
-    /// Rising in even azimuths and falling in odd ones, as each azimuth's metadata says.
+    /// Rising in even azimuths and falling in odd ones, as recorded in each azimuth's metadata.
     Alternating,
 }
 
 /// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Azimuths of a turn.
     pub azimuths: usize,
     /// Range bins of an azimuth.
     pub bins: usize,
@@ -66,12 +63,9 @@ pub struct Sampling {
 /// The transmitter and receiver of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
-    /// Carrier frequency, GHz.
     pub carrier_ghz: f64,
     /// Two-way half-power width of the beam, radians.
     pub beam_rad: f64,
-    /// Two-way half-power height of the beam, radians.
-    pub beam_height_rad: f64,
     /// Distance between two independent range cells, metres, given the window.
     pub cell_m: f64,
     /// Power received from 1 m² is this over the fourth power of the range, at long range, in the
@@ -83,14 +77,12 @@ pub struct Receiver {
     /// Range below which power rises with the square, metres: near objects lie below the beam of
     /// the antenna on the roof.
     pub near_m: f64,
-    /// Power at which the receiver saturates, in its units.
+    /// Saturation power of the receiver, in its units.
     pub full_scale: f32,
     /// True if powers are rounded to whole units.
     pub whole_powers: bool,
     /// Mean power of the receiver's noise by range: (m, dB above the unit), interpolated.
     pub floor_db: &'static [(f64, f64)],
-    /// Mean power of the transmitter's ringing in the first metres, likewise.
-    pub ringing_db: &'static [(f64, f64)],
 }
 
 impl Receiver {
@@ -145,15 +137,6 @@ impl Sampling {
 }
 
 impl Profile {
-    /// All radars.
-    pub const ALL: [Self; 5] = [
-        Self::Cts350xOxford,
-        Self::Cts350xRadiate,
-        Self::Cir204h,
-        Self::Ras6,
-        Self::K2pi,
-    ];
-
     /// The sampling of this radar.
     pub fn sampling(self) -> Sampling {
         let oxford = Sampling {
@@ -214,8 +197,6 @@ impl Profile {
         let oxford = Receiver {
             carrier_ghz: 76.5,
             beam_rad: 1.1f64.to_radians(),
-            // 1.8 degrees one way, widened downwards.
-            beam_height_rad: 0.045,
             cell_m: 0.24,
             constant: 1.6e11,
             filter_m: 60.0,
@@ -223,7 +204,6 @@ impl Profile {
             full_scale: 1.0e7,
             whole_powers: true,
             floor_db: &OXFORD_FLOOR,
-            ringing_db: &OXFORD_RINGING,
         };
         match self {
             Self::Cts350xOxford => oxford,
@@ -232,7 +212,6 @@ impl Profile {
                 full_scale: 2.0e8,
                 whole_powers: false,
                 floor_db: &RADIATE_FLOOR,
-                ringing_db: &RADIATE_RINGING,
                 ..oxford
             },
             // No recording was available: Oxford's values, with the longer cell of its smaller
@@ -246,24 +225,19 @@ impl Profile {
                 constant: 1.5e12,
                 full_scale: 1.0e8,
                 floor_db: &RAS6_FLOOR,
-                ringing_db: &RAS6_RINGING,
                 ..oxford
             },
             // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz,
-            // which is 0.6 m. A gain of 20 dB with such a narrow beam implies a fan beam, assumed
-            // 20 degrees high one way. Assumptions are the sensitivity, by which 1 m² at 100 m, the
-            // maximum range, is 16 dB above the floor, the filter and the floor. The first bin is
-            // at 3 m, so no ringing is visible.
+            // which is 0.6 m. Assumptions are the sensitivity (1 m² at 100 m, the maximum range, is
+            // 16 dB above the floor), the filter and the floor.
             Self::K2pi => Receiver {
                 carrier_ghz: 24.0,
                 beam_rad: 3.0f64.to_radians(),
-                beam_height_rad: 0.25,
                 cell_m: 0.6,
                 constant: 2.0e10,
                 filter_m: 40.0,
                 whole_powers: false,
                 floor_db: &K2PI_FLOOR,
-                ringing_db: &[],
                 ..oxford
             },
         }
@@ -272,26 +246,7 @@ impl Profile {
 
 /// Floors are measured in empty azimuths of real scans; K2Pi's is assumed.
 const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];
-const OXFORD_RINGING: [(f64, f64); 8] = [
-    (0.2, 19.7),
-    (0.6, 22.2),
-    (0.8, 24.2),
-    (1.0, 23.7),
-    (1.25, 19.7),
-    (1.5, 15.2),
-    (2.0, 11.2),
-    (2.7, 2.0),
-];
 const RADIATE_FLOOR: [(f64, f64); 2] = [(5.0, 10.0), (100.0, 9.6)];
-const RADIATE_RINGING: [(f64, f64); 7] = [
-    (0.2, 29.5),
-    (1.5, 29.0),
-    (1.75, 26.0),
-    (2.0, 24.0),
-    (2.5, 18.5),
-    (3.0, 16.5),
-    (4.0, 6.0),
-];
 const RAS6_FLOOR: [(f64, f64); 7] = [
     (3.0, 17.0),
     (55.0, 16.0),
@@ -300,15 +255,5 @@ const RAS6_FLOOR: [(f64, f64); 7] = [
     (150.0, 13.1),
     (225.0, 11.6),
     (300.0, 10.2),
-];
-const RAS6_RINGING: [(f64, f64); 8] = [
-    (0.2, 39.5),
-    (0.8, 42.0),
-    (1.0, 41.7),
-    (1.25, 37.7),
-    (1.5, 34.5),
-    (2.0, 28.0),
-    (2.5, 22.0),
-    (3.5, 10.0),
 ];
 const K2PI_FLOOR: [(f64, f64); 2] = [(3.0, 8.0), (100.0, 6.0)];

@@ -1,26 +1,28 @@
 //! A simulated drive in a dataset format: images with their names, side files and ground truth. It
 //! can be written to a disk or streamed into a pipeline.
 
+mod render_ahead;
+
 use std::path::PathBuf;
 
-use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
+use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_radar::{OwnedScan, ScanSlot};
 use gyre_samples::Sample;
 
+use crate::cars;
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
 use crate::gyro::log;
-use crate::layout::side_file::SideFile;
+use crate::layout::SideFile;
 use crate::layout::{boreas, oxford, radiate};
-use crate::objects;
 use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
 use crate::sensor::Sensor;
-use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::truth;
 use crate::{gnss, wheels};
+use render_ahead::Ahead;
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]
@@ -32,21 +34,12 @@ pub struct SimulatedDrive {
 }
 
 impl SimulatedDrive {
-    /// Builds the town and the path.
-    ///
-    /// # Errors
-    /// As [`Simulator::new`]; [`SimulatorError::Config`] if the radar does not fit the format.
+    /// Builds the path and what stands along it.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
-        } else if is_on(config.effects.lost_azimuths) {
-            return Err(SimulatorError::Config {
-                key: "effects.lost_azimuths",
-                value: "true".to_owned(),
-                expected: "false but for output.format = \"radiate\": in other formats the azimuth of each row is written beside it".to_owned(),
-            });
         }
         Ok(Self {
             simulator,
@@ -56,7 +49,6 @@ impl SimulatedDrive {
         })
     }
 
-    /// The simulator.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -73,7 +65,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
+    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),
@@ -81,7 +73,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Number of scans.
     pub fn scans(&self) -> usize {
         self.simulator.scans()
     }
@@ -171,8 +162,8 @@ impl SimulatedDrive {
         ));
         let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
         files.push((
-            objects::FILE.into(),
-            objects::csv(&self.simulator, stamps_ns),
+            cars::FILE.into(),
+            truth::objects_csv(&self.simulator, stamps_ns),
         ));
         files.extend(
             self.gyro_samples()
@@ -193,7 +184,7 @@ impl SimulatedDrive {
     }
 
     /// Returns the azimuths of a scan that the host loses, in order: see
-    /// [`Effects::lost_azimuths`](crate::Effects::lost_azimuths).
+    /// [`SensorConfig::lost_azimuths`](crate::SensorConfig::lost_azimuths).
     pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
         match self.output {
             OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, self.seed, index),
@@ -203,15 +194,26 @@ impl SimulatedDrive {
 
     /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
-        let (sensor, scan) = (
-            self.simulator.sensor(),
-            OwnedScan::with_limits(self.simulator.limits()),
-        );
         Renderer {
             drive: self.clone(),
-            sensor,
-            scan,
+            sensor: self.simulator.sensor(),
+            scan: OwnedScan::with_limits(self.simulator.limits()),
+            ahead: None,
         }
+    }
+
+    /// Returns a renderer that renders the next images on all processors.
+    pub(crate) fn renderer_ahead(&self) -> Renderer {
+        Renderer {
+            ahead: Some(Ahead::default()),
+            ..self.renderer()
+        }
+    }
+
+    /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
+    /// processors.
+    pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+        gyre_datasets::open_source(Box::new(self.renderer_ahead()), options)
     }
 }
 
@@ -220,12 +222,33 @@ pub struct Renderer {
     drive: SimulatedDrive,
     sensor: Sensor,
     scan: OwnedScan,
+    ahead: Option<Ahead>,
 }
 
 impl Renderer {
-    /// The drive that is rendered.
-    pub fn drive(&self) -> &SimulatedDrive {
-        &self.drive
+    fn render(&mut self, index: usize, pixels: &mut [u8]) {
+        let simulator = &self.drive.simulator;
+        match self.drive.output {
+            OutputFormat::Radiate => {
+                let geometry =
+                    simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
+                radiate::transpose(
+                    &self.scan.bytes,
+                    geometry.stride,
+                    geometry.first_byte,
+                    pixels,
+                );
+                self.lose_azimuths(index, pixels);
+            }
+            // An image of these formats is the sweep as it is rendered.
+            OutputFormat::Oxford | OutputFormat::Boreas => {
+                let mut slot = ScanSlot {
+                    bytes: pixels,
+                    ..self.scan.slot()
+                };
+                simulator.render_into(index, &mut self.sensor, &mut slot);
+            }
+        }
     }
 
     /// Loses azimuths of an image as the host does: the image before may have lost some too.
@@ -233,7 +256,7 @@ impl Renderer {
         let azimuths = self.drive.lost_azimuths(index);
         if let Some(before) = index.checked_sub(1).filter(|_| !azimuths.is_empty()) {
             let mut recorded_before = vec![0; pixels.len()];
-            self.draw(before, &mut recorded_before);
+            self.render(before, &mut recorded_before);
             let columns = self.drive.image_size().width;
             radiate::lose(pixels, &recorded_before, columns, &azimuths);
         }
@@ -266,27 +289,9 @@ impl ImageSource for Renderer {
 
     /// Gives the same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
-        let simulator = &self.drive.simulator;
-        match self.drive.output {
-            OutputFormat::Radiate => {
-                let geometry =
-                    simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
-                radiate::transpose(
-                    &self.scan.bytes,
-                    geometry.stride,
-                    geometry.first_byte,
-                    pixels,
-                );
-                self.lose_azimuths(index, pixels);
-            }
-            // An image of these formats is the sweep as it is rendered.
-            OutputFormat::Oxford | OutputFormat::Boreas => {
-                let mut slot = ScanSlot {
-                    bytes: pixels,
-                    ..self.scan.slot()
-                };
-                simulator.render_into(index, &mut self.sensor, &mut slot);
-            }
+        let ahead = self.ahead.as_mut();
+        if !ahead.is_some_and(|ahead| ahead.take(&self.drive, index, pixels)) {
+            self.render(index, pixels);
         }
     }
 }

@@ -7,10 +7,17 @@
 //! it. The header is written here since `ndarray-npy` and `npyz` would add a Python parser (pest)
 //! and a C build for these ten lines.
 
-use gyre_geometry::Pose;
-use gyre_radar::Trajectory;
+use std::fmt::Write;
 
+use gyre_geometry::{Pose, xy_yaw};
+use gyre_radar::Trajectory;
+use nalgebra::Point2;
+
+use crate::body::Moving;
+use crate::cars::{FIRST_BODY, HALF_M, HEADER, REPORTED_M};
+use crate::profile::Receiver;
 use crate::simulator::Simulator;
+use crate::world::World;
 
 /// `ground_truth.tum` as bytes. `stamps_ns` are the times of the scans.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
@@ -70,4 +77,47 @@ fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
     header.extend((padded as u16).to_le_bytes());
     header.extend(format!("{dictionary:<width$}\n", width = padded - 1).into_bytes());
     header
+}
+
+/// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.
+pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: impl Iterator<Item = i64>) -> Vec<u8> {
+    let mut text = format!("{HEADER}\n");
+    let receiver = simulator.config().sensor.receiver();
+    for (scan, stamp_ns) in stamps_ns.enumerate() {
+        let (start_ns, _) = simulator.span();
+        let time_s = (stamp_ns - start_ns) as f64 * 1e-9;
+        let place = Point2::from(simulator.path().pose(time_s).translation.vector);
+        for car in simulator.cars().near(place, REPORTED_M, time_s) {
+            let [visible, power] = best_echo(simulator.world(), &receiver, place, &car);
+            let object = car.body.walls[0].body - FIRST_BODY;
+            let ([x, y, yaw], [length, width]) = (xy_yaw(&car.pose), HALF_M);
+            let [vx, vy]: [f64; 2] = car.velocity.into();
+            // Writing to memory cannot fail.
+            let _ = writeln!(
+                text,
+                "{scan},{stamp_ns},{object},car,{x:.4},{y:.4},{yaw:.6},{vx:.4},{vy:.4},{:.2},{:.2},{visible:.4},{:.1}",
+                2.0 * length,
+                2.0 * width,
+                20.0 * power.max(1.0).log10()
+            );
+        }
+    }
+    text.into_bytes()
+}
+
+/// The largest share of the power that passes to a part of a car, and the power of its strongest
+/// echo, without scintillation and speckle.
+fn best_echo(world: &World, receiver: &Receiver, from: Point2<f64>, car: &Moving<'_>) -> [f64; 2] {
+    let parts = car.body.scatterers.iter().map(|part| {
+        let there = part.moved(&car.pose);
+        let ray = from - there.position;
+        let range_m = ray.norm().max(1.0);
+        let passed = world.transmission(from, there.position, there.body);
+        let gain = there.aspect.gain(ray / range_m);
+        let power = there.cross_section_m2 * gain * receiver.sensitivity(range_m);
+        [passed, power * passed]
+    });
+    parts.fold([0.0; 2], |best: [f64; 2], part| {
+        [best[0].max(part[0]), best[1].max(part[1])]
+    })
 }

@@ -4,7 +4,6 @@ use nalgebra::Point2;
 
 use crate::body::{Body, Scatterer, Wall};
 use crate::occlusion::WallGrid;
-use crate::relief::Relief;
 
 /// Metres a side of the tiles that scatterers are sorted into.
 const TILE_M: f64 = 16.0;
@@ -20,7 +19,6 @@ pub struct World {
     /// `tile_start[t]..tile_start[t + 1]` are the scatterers of tile `t`.
     tile_start: Vec<usize>,
     walls: WallGrid,
-    relief: Relief,
 }
 
 impl World {
@@ -54,22 +52,9 @@ impl World {
             rows,
             tile_start,
             walls: WallGrid::new(walls),
-            relief: Relief::LEVEL,
         }
     }
 
-    /// The same world on another ground; without it, it is level.
-    #[must_use]
-    pub fn on(self, relief: Relief) -> Self {
-        Self { relief, ..self }
-    }
-
-    /// The ground.
-    pub fn relief(&self) -> Relief {
-        self.relief
-    }
-
-    /// All scatterers.
     pub fn scatterers(&self) -> &[Scatterer] {
         &self.scatterers
     }
@@ -94,30 +79,23 @@ impl World {
         (top..bottom).map(row)
     }
 
-    /// All walls.
-    pub fn walls(&self) -> &[Wall] {
-        self.walls.walls()
-    }
-
     /// Two-way share of the power that passes between two points; walls of `body` are ignored.
-    /// Stops as soon as the share is below `negligible`.
-    pub fn transmission(
-        &self,
-        from: Point2<f64>,
-        to: Point2<f64>,
-        body: u32,
-        negligible: f64,
-    ) -> f64 {
-        self.walls.transmission(from, to, body, negligible)
+    pub fn transmission(&self, from: Point2<f64>, to: Point2<f64>, body: u32) -> f64 {
+        let mut passed = 1.0;
+        self.walls_between(from, to, &mut |wall, _| {
+            if wall.body != body {
+                passed *= wall.transmission;
+            }
+        });
+        passed
     }
 
-    /// Visits the walls between two points, each once: its number in [`World::walls`], and the
-    /// share of the line at which it is crossed.
+    /// Visits the walls between two points, each once, with the share of the line up to the wall.
     pub fn walls_between(
         &self,
         from: Point2<f64>,
         to: Point2<f64>,
-        see: &mut impl FnMut(u32, &Wall, f64),
+        see: &mut impl FnMut(&Wall, f64),
     ) {
         self.walls.between(from, to, see);
     }
@@ -135,7 +113,10 @@ mod tests {
         let scatterers = (0..40)
             .flat_map(|i| (0..20).map(move |j| scatterer(at(i, j))))
             .collect();
-        let world = World::new(Body::of(scatterers));
+        let world = World::new(Body {
+            scatterers,
+            walls: Vec::new(),
+        });
         assert_eq!(world.scatterers().len(), 800);
         for (place, reach_m) in [
             ((0.0, 0.0), 30.0),

@@ -36,9 +36,6 @@ pub struct Summary {
 }
 
 /// Calls [`write_dataset_on`] with one thread for each processor.
-///
-/// # Errors
-/// As [`write_dataset_on`].
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,
@@ -58,10 +55,6 @@ pub fn write_dataset(
 /// The files are the same, byte for byte, for the same configuration and any number of threads.
 /// Images of an earlier call with the same configuration are kept, if it was interrupted or had
 /// fewer scans; the first and the last of them are compared with newly rendered ones.
-///
-/// # Errors
-/// [`SimulatorError`] if `config` cannot be simulated, if `out` holds another dataset or images of
-/// unknown origin, if another process writes to it, or if it cannot be written.
 pub fn write_dataset_on(
     threads: NonZeroUsize,
     config: &SimulationConfig,

@@ -5,9 +5,6 @@
 mod common;
 
 mod dataset;
-mod effects;
 mod recorded_drives;
 mod simulated_drive;
-mod streets_along;
 mod sweep;
-mod town;

@@ -7,6 +7,12 @@ use gyre_datasets::read_trajectory;
 use gyre_simulator::Path;
 use gyre_simulator::path::recorded::{Excerpt, read};
 
+const WHOLE: Excerpt = Excerpt {
+    from_s: 0.0,
+    for_s: f64::INFINITY,
+    rate_hz: 4.0,
+};
+
 fn real_files() -> Vec<PathBuf> {
     let Some(root) = std::env::var_os("GYRE_DATA") else {
         println!("skipped: GYRE_DATA is not set");
@@ -43,7 +49,7 @@ fn derivative(drive: &dyn Path, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> V
 fn real_drives_stay_close_to_their_poses() {
     for path in real_files() {
         let started = Instant::now();
-        let drive = read(&path, Excerpt::default()).unwrap();
+        let drive = read(&path, WHOLE).unwrap();
         let loaded = started.elapsed();
         let given = read_trajectory(&path).unwrap();
         let seconds = |i: usize| {
@@ -79,7 +85,7 @@ fn real_drives_stay_close_to_their_poses() {
 #[test]
 fn real_drives_respect_the_limits_of_a_car() {
     for path in real_files() {
-        let drive = read(&path, Excerpt::default()).unwrap();
+        let drive = read(&path, WHOLE).unwrap();
         let velocity = |time: f64| drive.velocity(time).into();
         let heading = |time: f64| {
             [
@@ -125,7 +131,7 @@ fn excerpt_starts_at_the_origin_and_stands_before_and_after() {
             Excerpt {
                 from_s: 300.0,
                 for_s: 60.0,
-                ..Excerpt::default()
+                ..WHOLE
             },
         )
         .unwrap();
@@ -143,7 +149,7 @@ fn files_that_cannot_be_driven_are_rejected_by_name() {
     let rotated = folder.path().join("rotated.tum");
     let line = |i: u32| format!("{}.0 0 {} 0 0 0 0 1\n", 1_600_000_000 + i, 5 * i);
     std::fs::write(&rotated, (0..50).map(line).collect::<String>()).unwrap();
-    let error = read(&rotated, Excerpt::default()).unwrap_err().to_string();
+    let error = read(&rotated, WHOLE).unwrap_err().to_string();
     assert!(
         error.contains("rotated.tum") && error.contains("0 % of its length"),
         "{error}"
@@ -152,7 +158,7 @@ fn files_that_cannot_be_driven_are_rejected_by_name() {
         &rotated,
         Excerpt {
             from_s: 900.0,
-            ..Excerpt::default()
+            ..WHOLE
         },
     )
     .unwrap_err()
@@ -164,12 +170,12 @@ fn files_that_cannot_be_driven_are_rejected_by_name() {
         "1600000000.0 0 0 0 0 0 0 1\n1600000001.0 5e5 0 0 0 0 0 1\n",
     )
     .unwrap();
-    let error = read(&jumping, Excerpt::default()).unwrap_err().to_string();
+    let error = read(&jumping, WHOLE).unwrap_err().to_string();
     assert!(
         error.contains("jumps by 500000.0 m within 1.000 s"),
         "{error}"
     );
-    let missing = read(std::path::Path::new("nowhere.csv"), Excerpt::default())
+    let missing = read(std::path::Path::new("nowhere.csv"), WHOLE)
         .unwrap_err()
         .to_string();
     assert!(missing.contains("nowhere.csv"), "{missing}");

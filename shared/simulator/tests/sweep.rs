@@ -3,18 +3,18 @@
 use std::f64::consts::TAU;
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::{Pose, Twist};
-use gyre_radar::OwnedScan;
+use gyre_geometry::Twist;
+use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::body::{NO_BODY, Scatterer, Wall};
 use gyre_simulator::profile::{Profile, Sampling};
-use gyre_simulator::{Body, Effects, Path, SensorConfig, SimulationConfig, Simulator};
+use gyre_simulator::{
+    Body, Path, Realism, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, World,
+};
 use nalgebra::Point2;
 
-use crate::effects::scene::Setup;
-
-/// Ringing fills the first bins; no point is placed there.
-const FIRST_FREE_BIN: usize = 80;
 const AZIMUTHS: usize = 400;
+/// Bins of the first metres; no point is placed there.
+const FIRST_FREE_BIN: usize = 80;
 
 fn sampling() -> Sampling {
     Profile::Cts350xOxford.sampling()
@@ -22,38 +22,45 @@ fn sampling() -> Sampling {
 
 fn point(x: f64, y: f64) -> Body {
     let scatterer = Scatterer::all_round(Point2::new(x, y), 30.0, NO_BODY);
-    Body::of(vec![scatterer])
-}
-
-/// A path whose time 0 is the start of the sweep instead of its middle.
-struct FromStart<'a>(&'a dyn Path);
-
-impl Path for FromStart<'_> {
-    fn pose(&self, time_s: f64) -> Pose {
-        self.0.pose(time_s + 0.124_687)
+    Body {
+        scatterers: vec![scatterer],
+        walls: Vec::new(),
     }
 }
 
-/// Measures with all effects but those that move or hide a single point.
-fn sweep(body: Body, path: &dyn Path, doppler_s: f64) -> OwnedScan {
-    let effects = Effects {
-        encoder_wobble: false,
-        dropped_azimuths: false,
-        interference: false,
-        ..Effects::ALL
+/// A sweep that begins at time 0 of the path.
+fn measured(body: Body, path: &dyn Path, sensor: &SensorConfig, realism: Realism) -> OwnedScan {
+    let Sampling {
+        azimuths,
+        period_us,
+        ..
+    } = sensor.sampling();
+    let time = SweepTime {
+        start_us: 0,
+        period_us,
+        azimuths,
+        epoch_us: 0,
     };
+    let world = World::new(body);
+    let scene = Scene {
+        world: &world,
+        movers: &[],
+        path,
+        blind: false,
+    };
+    let bytes = azimuths * sensor.sampling().stride();
+    let mut scan = OwnedScan::with_limits(ScanLimits { bytes, azimuths });
+    let mut radar = Sensor::new(sensor, realism == Realism::Exact, 7);
+    scan.geometry = radar.sweep(scene, time, 0, &mut scan.slot());
+    scan
+}
+
+fn sweep(body: Body, path: &dyn Path, doppler_s: f64) -> OwnedScan {
     let sensor = SensorConfig {
         doppler_s: Some(doppler_s),
         ..SensorConfig::default()
     };
-    let setup = Setup {
-        body,
-        path: &FromStart(path),
-        sensor,
-        effects,
-        ..Setup::default()
-    };
-    setup.scan()
+    measured(body, path, &sensor, Realism::Exact)
 }
 
 /// Azimuth and bin of the maximum power, each the middle of the plateau caused by rounding.
@@ -160,7 +167,12 @@ fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
 
 #[test]
 fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
-    let wall = |x: f64| Wall::rough(Point2::new(x, -5.0), Point2::new(x, 5.0), 0.01, 1);
+    let wall = |x: f64| Wall {
+        from: Point2::new(x, -5.0),
+        to: Point2::new(x, 5.0),
+        transmission: 0.01,
+        body: 1,
+    };
     let power = |walls: Vec<Wall>| {
         let scan = sweep(
             Body {
@@ -179,26 +191,58 @@ fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
     };
     let open = i32::from(power(vec![]));
     let hidden = open - i32::from(power(vec![wall(20.0)]));
-    // 20 dB in steps of half a decibel, plus noise.
+    // 20 dB in steps of half a decibel.
     assert!((36..=44).contains(&hidden), "{hidden} counts");
     assert!((open - i32::from(power(vec![wall(40.0)]))).abs() <= 2);
 }
 
 #[test]
-fn empty_world_gives_noise_and_ringing_only() {
-    let scan = sweep(Body::default(), &Twist::default(), 0.0);
-    let far = (0..AZIMUTHS)
-        .flat_map(|azimuth| &scan.view().row(azimuth)[2800..])
-        .map(|&power| f64::from(power));
-    let mean = far.clone().sum::<f64>() / far.clone().count() as f64;
-    assert!((3.0..8.0).contains(&mean), "mean {mean}");
-    assert!(far.fold(0.0, f64::max) < 40.0);
-    let ringing = scan.view().row(0)[..30]
-        .iter()
-        .map(|&power| f64::from(power))
-        .sum::<f64>()
-        / 30.0;
-    assert!(ringing > 25.0, "{ringing}");
+fn an_empty_world_gives_the_noise_of_the_receiver_and_an_exact_radar_none() {
+    let mean = |noise_db: f64, realism: Realism| {
+        let sensor = SensorConfig {
+            noise_db,
+            ..SensorConfig::default()
+        };
+        let scan = measured(Body::default(), &Twist::default(), &sensor, realism);
+        let powers = (0..AZIMUTHS).flat_map(|azimuth| scan.view().row(azimuth)[100..].to_vec());
+        powers.map(f64::from).sum::<f64>() / (AZIMUTHS * (sampling().bins - 100)) as f64
+    };
+    let noise = mean(0.0, Realism::Plain);
+    assert!((3.0..8.0).contains(&noise), "{noise}");
+    // Half a decibel is a count.
+    let louder = mean(20.0, Realism::Plain) - mean(10.0, Realism::Plain);
+    assert!((18.0..22.0).contains(&louder), "{louder}");
+    assert_eq!(mean(0.0, Realism::Exact), 0.0);
+}
+
+#[test]
+fn a_radar_of_its_own_measures_a_point_where_it_is() {
+    let sensor = SensorConfig {
+        bins: Some(300),
+        bin_m: Some(0.5),
+        azimuths: Some(720),
+        period_s: Some(0.1),
+        beam_deg: Some(0.5),
+        range_offset_m: Some(0.0),
+        ..SensorConfig::default()
+    };
+    sensor.validate().unwrap();
+    let scan = measured(
+        point(0.0, -60.25),
+        &Twist::default(),
+        &sensor,
+        Realism::Exact,
+    );
+    let geometry = scan.geometry;
+    assert_eq!((geometry.azimuths, geometry.bins), (720, 300));
+    let brightest = |azimuth: usize| scan.view().row(azimuth).iter().copied().max();
+    let azimuth = (0..720).max_by_key(|azimuth| brightest(*azimuth)).unwrap();
+    assert!(azimuth.abs_diff(180) <= 1, "{azimuth}");
+    let row = scan.view().row(180).to_vec();
+    let bin = (0..300).max_by_key(|bin| row[*bin]).unwrap();
+    assert!(bin.abs_diff(120) <= 1, "{bin}");
+    let wide = row.iter().filter(|power| **power > row[bin] - 6).count();
+    assert!(wide <= 3, "{wide} bins within 3 dB");
 }
 
 /// Mean power, and the share of bins above 60.
@@ -224,7 +268,7 @@ fn simulated() -> Vec<OwnedScan> {
 }
 
 #[test]
-fn powers_are_distributed_as_in_a_town() {
+fn powers_are_distributed_as_in_a_street() {
     let (mean, bright) = statistics(&simulated());
     assert!((6.0..22.0).contains(&mean), "mean {mean}");
     assert!((0.008..0.045).contains(&bright), "share above 60: {bright}");

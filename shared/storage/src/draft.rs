@@ -11,7 +11,7 @@ use std::{
 use crate::record::{self, Operation};
 use crate::{File, StorageError, folder::sync_folder};
 
-/// The name of a draft is that of its file between these.
+/// The name of a draft is the name of its file between these.
 const AHEAD: &str = ".";
 const BEHIND: &str = ".tmp";
 /// Processes that write drafts of one file at once.
@@ -53,9 +53,6 @@ impl Write for Appended {
 
 impl Draft {
     /// Creates the draft of the file at `path`.
-    ///
-    /// # Errors
-    /// A file that cannot be created.
     pub fn create(path: &Path) -> Result<Self, StorageError> {
         let failed = StorageError::at("write", path);
         for writer in 0..WRITERS {
@@ -79,9 +76,6 @@ impl Draft {
     }
 
     /// Adds text or bytes at the end.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
         self.writer
             .write_all(bytes.as_ref())
@@ -91,9 +85,6 @@ impl Draft {
     /// Makes the draft the content of the file: after a kill or a power failure the file has the
     /// whole of the old or of the new content. The new one is sure to survive once the folder is
     /// synchronised too ([`sync_folder`]).
-    ///
-    /// # Errors
-    /// The rest cannot be written, or the file cannot be replaced.
     pub fn commit(mut self) -> Result<(), StorageError> {
         let failed = StorageError::at("write", &self.path);
         self.writer.flush().map_err(&failed)?;
@@ -135,9 +126,6 @@ pub fn is_draft(path: &Path) -> bool {
 }
 
 /// Replaces a file as a whole. It survives a power failure when this returns.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
     let mut draft = Draft::create(path)?;
     draft.append(bytes)?;

@@ -11,7 +11,6 @@ use crate::{File, GroupSync, StorageError, create_folder};
 #[derive(Debug, Error)]
 #[error("another process is writing to {path}")]
 pub struct Busy {
-    /// The file.
     pub path: PathBuf,
 }
 
@@ -23,12 +22,8 @@ pub struct DurableFile {
 }
 
 impl DurableFile {
-    /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of
-    /// what it finds there what the process goes on from, before the thread starts.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or that another process changes; an error of
-    /// `prepare`.
+    /// Opens or creates a file and its folder, and locks it for this process. `prepare` turns the
+    /// existing content into a state from where the process continues, before the thread starts.
     pub fn open<E: From<StorageError> + From<Busy>>(
         path: &Path,
         prepare: impl FnOnce(&File) -> Result<(), E>,
@@ -46,40 +41,29 @@ impl DurableFile {
         })
     }
 
-    /// Returns the file.
     pub fn file(&self) -> &File {
         &self.file
     }
 
     /// Fills `bytes` with the content of a slot; false if the file ends before.
-    /// [`Checksum::is_right`] says whether it is whole.
-    ///
-    /// # Errors
-    /// The file cannot be read.
+    /// [`Checksum::is_right`] checks whether it is whole.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
 
-    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts what was written.
-    ///
-    /// # Errors
-    /// The file cannot be written.
+    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts the writes.
     pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
         self.file.write_at(bytes, slots.offset(slot))
     }
 
     /// Counts a change that has been made. Waits while [`GroupSync::LIMIT`] are in danger.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn changed(&self) -> Result<(), StorageError> {
         self.sync.changed()
     }
 
     /// Waits until all changes that were counted survive a power failure.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn finish(&self) -> Result<(), StorageError> {
         self.sync.finish()
     }
@@ -96,19 +80,16 @@ impl DurableFile {
 pub struct Slots {
     /// The offset of the first one.
     pub start: u64,
-    /// The size of each.
     pub bytes: usize,
 }
 
 impl Slots {
-    /// Returns the offset of a slot.
     pub const fn offset(&self, slot: u64) -> u64 {
         self.start + slot * self.bytes as u64
     }
 }
 
-/// The place of a CRC-32 by which the content of a slot is known to be whole. Numbers are
-/// little-endian.
+/// The place of a CRC-32 that proves the content of a slot whole. Numbers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Checksum {
     /// The first eight bytes, with one more bit set: it is never zero, as in an empty slot.
@@ -135,7 +116,7 @@ impl Checksum {
         }
     }
 
-    /// Returns whether the checksum is that of the content.
+    /// Returns whether the checksum matches the content.
     #[must_use]
     pub fn is_right(self, slot: &[u8]) -> bool {
         match self {

@@ -52,9 +52,6 @@ pub struct File {
 impl File {
     /// Opens a file to read and change it, or creates it. The name of a new one survives a power
     /// failure.
-    ///
-    /// # Errors
-    /// A file that cannot be opened or created.
     pub fn open_or_create(path: &Path) -> Result<Self, StorageError> {
         let failed = StorageError::at("write", path);
         let mut options = OpenOptions::new();
@@ -108,15 +105,11 @@ impl File {
         }))
     }
 
-    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Returns another handle of the same file.
-    ///
-    /// # Errors
-    /// The process has too many open files.
     pub fn try_clone(&self) -> Result<Self, StorageError> {
         let file = self
             .file
@@ -131,9 +124,6 @@ impl File {
     /// Locks the file for this process, and waits up to a second for one that was killed and is not
     /// gone yet: it keeps its lock until the system has closed its files. False if another process
     /// keeps the lock.
-    ///
-    /// # Errors
-    /// A file system without locks.
     pub fn lock(&self) -> Result<bool, StorageError> {
         let since = Instant::now();
         loop {
@@ -150,10 +140,7 @@ impl File {
         }
     }
 
-    /// Checks that the file still has its name. Without it nobody else finds what is written.
-    ///
-    /// # Errors
-    /// Another program has removed the file, or put another one in its place.
+    /// Checks that the file still has its name. Without it no other process finds the written data.
     pub fn require_name(&self) -> Result<(), StorageError> {
         let failed = StorageError::at("keep", &self.path);
         let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
@@ -168,9 +155,6 @@ impl File {
     }
 
     /// Returns the length, bytes.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn length(&self) -> Result<u64, StorageError> {
         let metadata = self
             .file
@@ -180,9 +164,6 @@ impl File {
     }
 
     /// Fills `bytes` from `offset` on; false if the file ends before.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<bool, StorageError> {
         match self.file.read_exact_at(bytes, offset) {
             Ok(()) => Ok(true),
@@ -203,9 +184,7 @@ impl File {
 
     /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of
     /// them.
-    ///
-    /// # Errors
-    /// The file cannot be written, but see [`continue_when_full`].
+    /// A full disk is not an error after [`continue_when_full`].
     pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
         if was_full() {
             return Ok(());
@@ -224,9 +203,6 @@ impl File {
     }
 
     /// Cuts the file, or extends it by zeros.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn set_length(&self, length: u64) -> Result<(), StorageError> {
         self.file
             .set_len(length)
@@ -239,10 +215,7 @@ impl File {
         Ok(())
     }
 
-    /// Cuts off what is behind `end`, if there is anything.
-    ///
-    /// # Errors
-    /// The file cannot be read or written.
+    /// Cuts off the bytes behind `end`, if there are any.
     pub fn cut_to(&self, end: u64) -> Result<(), StorageError> {
         match self.length()? > end {
             true => self.set_length(end),
@@ -251,10 +224,7 @@ impl File {
     }
 
     /// Makes all that was written before survive a power failure.
-    ///
-    /// # Errors
-    /// The system could not write all of it. What is lost is unknown, and a second attempt does not
-    /// tell.
+    /// After an error the lost data are unknown, and a second attempt does not reveal the loss.
     pub fn sync(&self) -> Result<(), StorageError> {
         #[cfg(feature = "record")]
         let id = record::sync_begins(&self.path);

@@ -6,11 +6,8 @@ use crate::StorageError;
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
 
-/// Makes the names in a folder survive a power failure: those of its new, renamed and removed
+/// Makes the names in a folder survive a power failure: the names of its new, renamed and removed
 /// files. An empty path, as above a bare name, is the current folder.
-///
-/// # Errors
-/// The folder cannot be synchronised.
 pub fn sync_folder(folder: &Path) -> Result<(), StorageError> {
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),
@@ -25,9 +22,6 @@ pub fn sync_folder(folder: &Path) -> Result<(), StorageError> {
 }
 
 /// Creates a folder and those above it, unless they exist. The names survive a power failure.
-///
-/// # Errors
-/// A folder that cannot be created.
 pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
     if folder.is_dir() {
         return Ok(());
@@ -64,9 +58,6 @@ fn open_to_owner(folder: &Path) -> io::Result<()> {
 }
 
 /// Removes a file, if there is one. [`sync_folder`] makes that survive a power failure.
-///
-/// # Errors
-/// A file that cannot be removed.
 pub fn remove(path: &Path) -> Result<(), StorageError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -79,9 +70,6 @@ pub fn remove(path: &Path) -> Result<(), StorageError> {
 
 /// Gives a file or a folder another name in the same file system. [`sync_folder`] makes that
 /// survive a power failure. False: there is nothing of that name.
-///
-/// # Errors
-/// It cannot be renamed.
 pub fn rename(from: &Path, to: &Path) -> Result<bool, StorageError> {
     match fs::rename(from, to) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),

@@ -34,7 +34,7 @@ struct Progress {
     /// The number of changes that somebody waits for.
     awaited: u64,
     ending: bool,
-    /// Why a synchronisation has failed. There is none after it.
+    /// Why a synchronisation has failed. No synchronisation follows it.
     failure: Option<(io::ErrorKind, String)>,
 }
 
@@ -103,9 +103,6 @@ impl GroupSync {
     pub const INTERVAL: Duration = Duration::from_secs(1);
 
     /// Starts with a synchronisation of what earlier processes may have written.
-    ///
-    /// # Errors
-    /// The process has too many open files or threads.
     pub fn start(file: &File) -> Result<Self, StorageError> {
         let shared = Arc::new(Shared {
             progress: Mutex::new(Progress {
@@ -128,9 +125,7 @@ impl GroupSync {
     }
 
     /// Counts a change that has been made. Waits while [`Self::LIMIT`] are in danger.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn changed(&self) -> Result<(), StorageError> {
         let mut progress = self.shared.lock();
         progress.made += 1;
@@ -146,9 +141,7 @@ impl GroupSync {
     }
 
     /// Waits until all changes are safe. Dropped without that, nobody learns of a failure.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn finish(&self) -> Result<(), StorageError> {
         let mut progress = self.shared.lock();
         let made = progress.made;

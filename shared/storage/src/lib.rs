@@ -2,19 +2,19 @@
 //!
 //! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and
 //!   renamed.
-//! - [`File`] is changed in place; what has not been synchronised when the power fails may be there
-//!   in part. A process can [continue when the disk is full](continue_when_full).
+//! - [`File`] is changed in place; after a power failure, unsynchronised changes may be there in
+//!   part. A process can [continue when the disk is full](continue_when_full).
 //! - [`GroupSync`] synchronises such a file in the background.
 //! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`],
 //!   each with a [`Checksum`].
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`lock`]: locks of files.
-//! - [`open()`], [`read_text`] and [`read_bytes`] read files that may come from elsewhere: no
-//!   pipes or devices, and up to a size. [`quoted`] quotes what is in them.
+//! - [`open()`], [`read_text`] and [`read_bytes`] read files of unknown origin: no pipes or
+//!   devices, and up to a size. [`quoted`] quotes their content.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
-//! synchronised. Everything that must survive is written through this crate, so that a test can
-//! record each change (feature `record`) and replay what a power failure would have left of them.
+//! synchronised. All data that must survive are written through this crate, so that a test can
+//! record each change (feature `record`) and replay the possible states after a power failure.
 
 mod draft;
 mod durable;
@@ -50,9 +50,7 @@ pub use quoted::quoted;
 pub struct StorageError {
     /// The operation: `read`, `write`, `keep`, `synchronise`, `rename`, `remove`.
     pub action: &'static str,
-    /// The file or folder.
     pub path: PathBuf,
-    /// The system error.
     pub source: io::Error,
 }
 

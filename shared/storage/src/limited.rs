@@ -19,9 +19,6 @@ const MARK: &str = "\u{feff}";
 const UTF_16: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
 
 /// Opens a file to read it.
-///
-/// # Errors
-/// A file that cannot be read; a folder, a pipe or a device.
 pub fn open(path: &Path) -> io::Result<File> {
     // Without waiting: a pipe that nobody writes to would never be opened.
     let file = OpenOptions::new()
@@ -47,9 +44,6 @@ fn name(kind: FileType) -> &'static str {
 }
 
 /// Reads a text of at most `limit` bytes, without a byte order mark before it.
-///
-/// # Errors
-/// A file that cannot be read, is larger, or is not UTF-8.
 pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
     let bytes = read_bytes(path, limit)?;
     let mut text = String::from_utf8(bytes).map_err(|error| {
@@ -67,9 +61,6 @@ pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
 }
 
 /// Reads a file of at most `limit` bytes.
-///
-/// # Errors
-/// A file that cannot be read, or is larger, or is [no file](open).
 pub fn read_bytes(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let too_large = || {

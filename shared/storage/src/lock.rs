@@ -20,22 +20,16 @@ use rustix::{
 pub enum Attempt {
     /// It is locked as long as this file is open.
     Locked(File),
-    /// Another process holds the lock: `process 123 (gyre)`, where the system tells.
+    /// Another process holds the lock: `process 123 (gyre)`, if the system reports it.
     Held(Option<String>),
 }
 
 /// Creates and locks a file, without waiting. The file is the owner's alone.
-///
-/// # Errors
-/// The file cannot be opened or locked.
 pub fn try_lock(path: &Path) -> io::Result<Attempt> {
     lock(path, true)
 }
 
 /// Locks a file that exists, without waiting.
-///
-/// # Errors
-/// There is no such file, or it cannot be opened or locked.
 pub fn try_lock_existing(path: &Path) -> io::Result<Attempt> {
     lock(path, false)
 }

@@ -1,6 +1,6 @@
 //! A log: a file of records of any length, each with a checksum, that grows at its end.
 //!
-//! One process appends, others read what is complete meanwhile. Each record is one `write`. A
+//! One process appends, others read complete records meanwhile. Each record is one `write`. A
 //! record that is cut short by a death is the last one; a thread synchronises the file, so that a
 //! power failure takes or damages at most the last [`GroupSync::LIMIT`](crate::GroupSync::LIMIT)
 //! records. Those are cut off when the log is opened. Any other damaged record was whole once, and
@@ -27,43 +27,33 @@ use crate::{Busy, DurableFile, StorageError};
 pub use reader::LogReader;
 use records::{Records, encode};
 
-/// The start of a log: what its records are, and their version.
+/// The start of a log: the kind of its records, and their version.
 pub type LogMagic = [u8; 16];
 
-/// The longest record. So the memory for reading one is bounded, whatever the file says.
+/// The longest record. So the memory for reading one is bounded, even for a damaged file.
 const MAX_BYTES: usize = 16 << 20;
 /// Records for which memory is taken at once.
 const MANY: usize = 4096;
 
-/// An error of a log.
 #[derive(Debug, Error)]
 pub enum LogError {
-    /// The file cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
-    /// The file is not such a log, or of another version.
     #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A record is not what was written.
+    Foreign { path: PathBuf },
     #[error("{path} is damaged at record {record}, although it had been written whole")]
     Damaged {
-        /// The file.
         path: PathBuf,
         /// The number of the record, from 0.
         record: usize,
     },
-    /// A record is what was written, and not of the kind of this log.
+    /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
     Malformed {
-        /// The file.
         path: PathBuf,
         /// The number of the record, from 0.
         record: usize,
     },
-    /// Another process appends to the file.
     #[error(transparent)]
     Busy(#[from] Busy),
 }
@@ -81,13 +71,9 @@ pub struct Log {
 }
 
 impl Log {
-    /// Opens or creates a log, and cuts off what a death or a power failure has left of the last
-    /// records. Of the others only the headers are read. What is in the log then survives a power
-    /// failure.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is not such a log, is damaged, or to which another
-    /// process writes.
+    /// Opens or creates a log, and cuts off incomplete last records, left by a death or a power
+    /// failure. Of the others only the headers are read. The contents of the log then survive a
+    /// power failure.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
         let mut records = Records::new(path, magic);
         let file = DurableFile::open(path, |file| {
@@ -119,18 +105,14 @@ impl Log {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records of up to so many bytes: none is allocated for
-    /// each.
+    /// Allocates the memory for appending records of up to `bytes` bytes: later appends allocate
+    /// nothing.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes + records::MARGIN);
         self.records.reserve(MANY);
     }
 
     /// Appends a record. A reader sees it when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised or that another program has removed, or a
-    /// record of more than 16 MiB.
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
@@ -149,9 +131,6 @@ impl Log {
     /// Counts a change of another file that is of use only with the records that were appended. At
     /// most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of them are made before the records
     /// survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
         match self.file.safe() >= Some(self.appended) {
             true => Ok(()),
@@ -165,18 +144,12 @@ impl Log {
     }
 
     /// Makes all records survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), LogError> {
         self.file.file().require_name()?;
         Ok(self.file.finish()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.
-    ///
-    /// # Errors
-    /// [`LogError::Damaged`], or a file that cannot be read.
     ///
     /// # Panics
     /// There are no more than `index` records.
@@ -191,9 +164,6 @@ impl Log {
 
     /// Keeps the first `records` records and cuts off those behind them. The cut survives a power
     /// failure.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         if records < self.len() {
             self.records.truncate(records);

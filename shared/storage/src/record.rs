@@ -11,54 +11,43 @@ use std::{
 /// A change of a file or folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Operation {
-    /// A new folder.
     CreateFolder(PathBuf),
-    /// A new, empty file.
     Create(PathBuf),
     /// Bytes written at an offset.
     Write {
-        /// The file.
         path: PathBuf,
         /// The place of the first byte.
         offset: u64,
-        /// The bytes.
         bytes: Vec<u8>,
     },
     /// A file cut or extended.
     SetLength {
-        /// The file.
         path: PathBuf,
         /// The new length, bytes.
         length: u64,
     },
-    /// A synchronisation begins.
     SyncBegins {
-        /// The file.
         path: PathBuf,
         /// The number of the synchronisation.
         id: u64,
     },
-    /// It has ended: what was written before it began survives.
+    /// It has ended: writes before its begin survive.
     SyncEnds {
-        /// The file.
         path: PathBuf,
         /// The number of the synchronisation.
         id: u64,
     },
-    /// A file renamed, in place of another one.
+    /// A file renamed, in place of an existing one.
     Rename {
-        /// The old name.
         from: PathBuf,
-        /// The new name.
         to: PathBuf,
     },
-    /// A file removed.
     Remove(PathBuf),
     /// The names in a folder survive from here on.
     SyncFolder(PathBuf),
 }
 
-/// Records the changes below a folder while it lives, those of all threads of this process.
+/// Records the changes below a folder while it lives, by all threads of this process.
 #[derive(Debug)]
 pub struct Recorder(PathBuf);
 

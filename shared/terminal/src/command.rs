@@ -11,9 +11,6 @@ pub fn own() -> PathBuf {
 }
 
 /// Returns the program and the arguments of a `--command`, as a shell would part them.
-///
-/// # Errors
-/// No program, or a quote that is not closed.
 pub fn words(command: &str) -> Result<Vec<String>, Failure> {
     match shlex::split(command) {
         Some(words) if !words.is_empty() => Ok(words),
@@ -22,9 +19,6 @@ pub fn words(command: &str) -> Result<Vec<String>, Failure> {
 }
 
 /// Returns the time that an option gives in seconds.
-///
-/// # Errors
-/// A number below 0, or none that is finite.
 pub fn seconds(option: &str, seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds)
         .map_err(|_| format!("{option} is {seconds}, but must be 0 or more").into())

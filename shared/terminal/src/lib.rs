@@ -1,7 +1,8 @@
-//! The terminal: what a program of Gyre says to the person there, and how it ends.
+//! The terminal: a program's messages to the person there, and its end.
 
 mod command;
 mod failure;
+pub mod inputs;
 pub mod print;
 mod program;
 mod wrap;

@@ -11,17 +11,11 @@ use crate::{
 };
 
 /// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
-///
-/// # Errors
-/// Any other failure to write.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     printed(writeln!(io::stdout(), "{text}"))
 }
 
 /// Prints lines of names and values, on a terminal so that they fit it.
-///
-/// # Errors
-/// As [`line()`].
 pub fn values(text: impl Display) -> Result<(), Failure> {
     match io::stdout().is_terminal() {
         true => line(wrap_values(&text.to_string(), WIDTH).join("\n")),
@@ -30,9 +24,6 @@ pub fn values(text: impl Display) -> Result<(), Failure> {
 }
 
 /// Returns whether standard output was written, in a sentence.
-///
-/// # Errors
-/// Any failure but a closed pipe.
 pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -52,8 +43,8 @@ pub fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// Replaces what a terminal would take as a command: names and words of files are quoted as they
-/// are.
+/// Replaces characters that a terminal would execute as commands: names and words of files are
+/// quoted unchanged.
 fn printable(text: &str) -> String {
     let plain = |c: char| {
         if c.is_control() && c != '\n' {

@@ -14,17 +14,11 @@ pub const INTERRUPTED: u8 = 130;
 
 /// Parses the command line. Help is printed to standard output, a wrong argument to standard error,
 /// and the exit code is returned.
-///
-/// # Errors
-/// Help that was asked for, or a wrong argument.
 pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
     parse_as(P::command(), program)
 }
 
-/// As [`parse`], by this command, whose arguments are those of `P`.
-///
-/// # Errors
-/// As [`parse`].
+/// As [`parse`], by this command, whose arguments are `P`'s.
 pub fn parse_as<P: Parser>(command: clap::Command, program: &str) -> Result<P, ExitCode> {
     let matches = command.max_term_width(WIDTH).try_get_matches();
     let parsed = matches.and_then(|matches| P::from_arg_matches(&matches));

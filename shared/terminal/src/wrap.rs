@@ -11,7 +11,7 @@ pub fn wrap(text: &str, columns: usize) -> Vec<String> {
         .collect()
 }
 
-/// Breaks lines of names and values like [`wrap`]; a value goes on below its own column.
+/// Breaks lines of names and values like [`wrap`]; a value continues below its own column.
 pub fn wrap_values(text: &str, columns: usize) -> Vec<String> {
     let lines = text.split('\n').flat_map(|line| {
         let (name, value) = line.split_at(value_start(line, columns / 2));

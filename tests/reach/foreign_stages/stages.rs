@@ -1,4 +1,4 @@
-//! Stages that send a fault: each does what its topic needs and no more.
+//! Stages that send a fault: each does only the minimum for its topic.
 
 use std::{env, path::Path, thread, time::Duration};
 
@@ -200,7 +200,7 @@ impl Stage for ForeignMasking {
 fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let dataset = gyre_datasets::open(&config.data, &DatasetOptions::default()).unwrap();
-    let tolerance = gyre_radar_replay::tolerance(&config);
+    let tolerance = gyre_stages::radar_replay::tolerance(&config);
     source::run(launch, &mut ForeignSource { fault, dataset }, &tolerance)
 }
 

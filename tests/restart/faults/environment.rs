@@ -1,22 +1,14 @@
-//! The clock and the shared memory of the machine.
+//! The clock of the machine.
 
-use std::{
-    fs::{self, File},
-    os::fd::AsRawFd,
-};
+use std::fs;
 
 use rand::{Rng, seq::IndexedRandom};
 
-use super::{
-    results::fill,
-    scene::{Outcome, Scene},
-    tools,
-};
-use crate::common::wrapped;
+use super::{scene::Scene, tools};
 
 /// The clock of the day is set, up to years ahead or back. Nothing but the stamps of logs depends
 /// on it.
-pub fn clock_step(scene: &mut Scene) -> Option<Outcome> {
+pub fn clock_step(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let clock = run.folder().join("clock");
     fs::write(&clock, "+0").unwrap();
@@ -41,37 +33,6 @@ pub fn clock_step(scene: &mut Scene) -> Option<Outcome> {
     if scene.one_in(2) {
         scene.kill_stage(&running);
     }
-    let outcome = scene.finished(&run, &running.finish());
-    stepped.map(|()| outcome)
-}
-
-/// A small `/dev/shm` of the run's own is filled by something else.
-pub fn shared_memory_full(scene: &mut Scene) -> Option<Outcome> {
-    let announced = scene.drive.undisturbed().shared_memory_bytes;
-    let bytes = (announced as f64 * scene.rng.random_range(0.8..2.0)) as u64;
-    let run = scene.run();
-    let mount = format!("mount -t tmpfs -o size={bytes} tmpfs /dev/shm && exec \"$@\"");
-    let own = wrapped(
-        &["unshare", "--mount", "sh", "-c", &mount, "sh"],
-        &run.command(),
-    );
-    let mut running = run.start_as(own);
-    running.await_poses_or_end(1);
-    // Holds it when the processes are gone.
-    let shared_memory = File::open(format!("/proc/{}/root/dev/shm", running.pid())).ok();
-    if let (Some(()), Some(folder)) = (scene.moment(&mut running), &shared_memory) {
-        let place = format!("/proc/self/fd/{}", folder.as_raw_fd());
-        fill(place.as_ref(), scene.rng.random_range(0..64 << 10));
-        scene.kill_stage(&running);
-    }
-    let ended = running.finish();
-    if let Some(folder) = shared_memory {
-        let left = fs::read_dir(format!("/proc/self/fd/{}", folder.as_raw_fd())).unwrap();
-        let left: Vec<_> = left
-            .map(|file| file.unwrap().file_name())
-            .filter(|name| name != "filler")
-            .collect();
-        assert!(left.is_empty(), "{left:?} are left in /dev/shm");
-    }
-    Some(scene.survived(&run, &ended))
+    scene.finished(&run, &running.finish());
+    stepped
 }

@@ -4,43 +4,45 @@ use std::{fs, path::Path};
 
 use rand::Rng;
 
-use super::{
-    drive::{PERIOD_S, Results},
-    scene::{Outcome, Scene},
-};
+use super::scene::Scene;
 
 /// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A
 /// stage is killed besides.
-pub fn gaps(scene: &mut Scene) -> Option<Outcome> {
-    let scans = scene.drive.scans;
+pub fn gaps(scene: &mut Scene) -> Option<()> {
+    let scans = scene.configuration.poses;
     let gap = scene.rng.random_range(scans / 6..scans / 3);
     let first = scene.rng.random_range(2..scans - gap - 2);
     let missing: Vec<usize> = (0..scans / 12)
         .map(|_| scene.rng.random_range(0..scans))
         .collect();
     let recording = scene
-        .drive
+        .configuration
         .copy(|scan| !(first..first + gap).contains(&scan) && !missing.contains(&scan));
-    let alone = scene.drive.run_of(recording.path(), "max");
+    let alone = scene.configuration.run_of(recording.path(), "max");
     alone.complete();
 
     let gap_s = 2.0;
-    let rate = (gap as f64 * PERIOD_S / gap_s).min(1000.0);
-    let run = scene.drive.run_of(recording.path(), &format!("{rate:.3}"));
+    let rate = (gap as f64 * scene.configuration.period_s / gap_s).min(1000.0);
+    let run = scene
+        .configuration
+        .run_of(recording.path(), &format!("{rate:.3}"));
     let run = run.set("run.stall_timeout_s=1");
     let mut running = run.start();
     scene.moment(&mut running)?;
     scene.kill_stage(&running);
     let ended = running.finish();
-    Some(scene.finished_with(&Results::of(&alone), &run, &ended))
+    scene.finished_with(&scene.configuration.results(&alone), &run, &ended);
+    Some(())
 }
 
 /// The images are moved away, and come back soon or only after the end.
-pub fn vanishes(scene: &mut Scene) -> Option<Outcome> {
-    let recording = scene.drive.copy(|_| true);
+pub fn vanishes(scene: &mut Scene) -> Option<()> {
+    let recording = scene.configuration.copy(|_| true);
     let images = folder_of_images(recording.path());
     let away = recording.path().join("away");
-    let run = scene.drive.run_of(recording.path(), scene.drive.rate);
+    let run = scene
+        .configuration
+        .run_of(recording.path(), scene.configuration.rate());
     let mut running = run.start();
     running.await_poses_or_end(1);
     scene.moment(&mut running)?;
@@ -56,7 +58,8 @@ pub fn vanishes(scene: &mut Scene) -> Option<Outcome> {
     if away.exists() {
         fs::rename(&away, &images).unwrap();
     }
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
 fn folder_of_images(recording: &Path) -> std::path::PathBuf {

@@ -5,70 +5,74 @@ use std::time::Duration;
 use gyre_journal::{self as journal, checkpoint};
 use gyre_messages::FollowerId;
 use gyre_slam::{Keyframe, Place, Query, records_path};
-use rand::{Rng, seq::IndexedRandom};
+use rand::{
+    Rng,
+    seq::{IndexedRandom, SliceRandom},
+};
 use rustix::process::Signal;
 
-use super::{
-    scene::{Outcome, Scene},
-    watch::Watch,
-};
-use crate::common::{STAGES, send};
+use super::{scene::Scene, watch::Watch};
+use crate::common::{Running, send};
 
 /// No process waits longer between two writes.
 const NO_MORE_WRITES: Duration = Duration::from_secs(2);
 /// Storms in a run: a process is restarted five times at most.
 const STORMS: usize = 4;
+/// Deaths of one process in a run.
+const LIVES: usize = 8;
 
-/// One stage after the other.
-pub fn stage(scene: &mut Scene) -> Option<Outcome> {
+/// All processes in random order, each at a moment of its own.
+pub fn each(scene: &mut Scene) -> Option<()> {
+    let mut names = scene.processes();
+    names.shuffle(&mut scene.rng);
     let run = scene.run();
     let mut running = run.start();
-    let mut killed = None;
-    for _ in 0..scene.rng.random_range(1..=3) {
-        if scene.moment(&mut running).is_some() {
-            killed = killed.or(scene.kill_stage(&running));
-        }
+    for (name, poses) in names.iter().zip(scene.moments(names.len())) {
+        running.await_poses_or_end(poses);
+        scene.pause(20);
+        scene.kill(&mut running, name)?;
     }
-    let outcome = scene.finished(&run, &running.finish());
-    killed.map(|()| outcome)
+    scene.finished(&run, &running.finish());
+    scene.restarted(&run, &names)
 }
 
-/// Two to all stages at once.
-pub fn several(scene: &mut Scene) -> Option<Outcome> {
+/// Two to all processes at once.
+pub fn together(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
-    running.await_stages();
+    let mut names = scene.processes();
+    scene.await_processes(&mut running)?;
     scene.moment(&mut running)?;
-    let mut stages: Vec<_> = running.stages().into_values().collect();
-    while stages.len() > 2 && !scene.one_in(4) {
-        stages.swap_remove(scene.rng.random_range(0..stages.len()));
+    while names.len() > 2 && !scene.one_in(4) {
+        names.swap_remove(scene.rng.random_range(0..names.len()));
     }
-    stages.iter().for_each(|pid| send(*pid, Signal::KILL));
-    let outcome = scene.finished(&run, &running.finish());
-    (stages.len() > 1).then_some(outcome)
+    let living = running.stages();
+    let killed = names.iter().filter_map(|name| living.get(name));
+    killed.for_each(|pid| send(*pid, Signal::KILL));
+    scene.finished(&run, &running.finish());
+    scene.restarted(&run, &names)
 }
 
-/// A stage in the first milliseconds of its life, and perhaps its successor too.
-pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
+/// A process in the first milliseconds of its life, and perhaps its successor too.
+pub fn at_the_start(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
-    let followers = [FollowerId::LoopClosure, FollowerId::Trajectory];
-    let all = [&STAGES[..], &followers.map(FollowerId::name)].concat();
-    let stage = all.choose(&mut scene.rng)?;
-    let first = running.await_stage(stage);
+    let name = scene.processes().choose(&mut scene.rng)?.clone();
+    let first = running.await_stage(&name);
     scene.pause(30);
     send(first, Signal::KILL);
     if scene.one_in(2) {
-        let second = running.await_other_stage(stage, first);
+        let second = running.await_other_stage(&name, first);
         scene.pause(30);
         send(second, Signal::KILL);
     }
-    Some(scene.finished(&run, &running.finish()))
+    scene.finished(&run, &running.finish());
+    Some(())
 }
 
-/// A process at a write of a file from which its successor continues: refinement has two of them
-/// for each of its keyframes.
-pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
+/// A process at a write of a file that its successor continues from: refinement writes two such
+/// files for each of its keyframes.
+pub fn at_a_write(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     let (integration, closing) = ("pose-integration", FollowerId::LoopClosure.name());
@@ -80,21 +84,60 @@ pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
         (closing, records_path::<Query>(run.out())),
     ];
     let (stage, file) = writes.choose(&mut scene.rng)?;
-    running.await_poses_or_end(scene.rng.random_range(1..scene.drive.scans));
+    running.await_poses_or_end(scene.rng.random_range(scene.configuration.moments()));
     let pid = *running.stages().get(*stage)?;
     let writes = scene.rng.random_range(1..=4);
     Watch::of(file)?.wait(writes, NO_MORE_WRITES, |_| true)?;
     send(pid, Signal::KILL);
-    Some(scene.finished(&run, &running.finish()))
+    scene.finished(&run, &running.finish());
+    Some(())
+}
+
+/// The process whose state a restart restores, in many of its lives.
+pub fn again_and_again(scene: &mut Scene) -> Option<()> {
+    let name = scene.configuration.stateful;
+    let run = scene.run();
+    let run = run.set(&format!("stages.{name}.restart.limit=1000"));
+    let mut running = run.start();
+    for poses in scene.moments(LIVES) {
+        running.await_poses_or_end(poses);
+        scene.pause(40);
+        scene.kill(&mut running, name)?;
+    }
+    scene.finished(&run, &running.finish());
+    scene.restarted(&run, &[name.to_owned()])
+}
+
+/// A process when all poses are there: its death does not take them back.
+pub fn after_the_last_pose(scene: &mut Scene) -> Option<()> {
+    let run = scene.run();
+    let mut running = run.start();
+    let name = scene.processes().choose(&mut scene.rng)?.clone();
+    let pid = running.await_stage(&name);
+    running.await_poses_or_end(scene.configuration.poses);
+    send(pid, Signal::KILL);
+    scene.finished(&run, &running.finish());
+    Some(())
+}
+
+/// A process that somebody else asks to end.
+pub fn politely(scene: &mut Scene) -> Option<()> {
+    let name = scene.processes().choose(&mut scene.rng)?.clone();
+    let run = scene.run();
+    let mut running = run.start();
+    running.await_poses_or_end(scene.moments(1)[0]);
+    send(*running.stages().get(&name)?, Signal::TERM);
+    scene.finished(&run, &running.finish());
+    scene.restarted(&run, &[name])
 }
 
 /// Most of all processes together, again and again, and now and then the supervisor with them: the
-/// same command goes on.
-pub fn storms(scene: &mut Scene) -> Option<Outcome> {
+/// same command continues.
+pub fn storms(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     for storm in 1..=STORMS {
-        running.await_poses_or_end(storm * scene.drive.scans / STORMS);
+        running.await_poses_or_end(storm * scene.configuration.poses / STORMS);
         scene.pause(50);
         if running.is_over() {
             break;
@@ -108,22 +151,24 @@ pub fn storms(scene: &mut Scene) -> Option<Outcome> {
             running = run.start();
         }
     }
-    Some(scene.finished(&run, &running.finish()))
+    scene.finished(&run, &running.finish());
+    Some(())
 }
 
-/// The supervisor, up to three times; its stages follow it.
-pub fn supervisor(scene: &mut Scene) -> Option<Outcome> {
+/// The supervisor, up to five times; its stages follow it.
+pub fn supervisor(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
-    for _ in 0..scene.rng.random_range(1..=3) {
+    for _ in 0..scene.rng.random_range(1..=5) {
         let mut running = run.start();
         scene.moment(&mut running)?;
         running.kill_supervisor();
     }
-    Some(scene.resumed(&run))
+    scene.resumed(&run);
+    Some(())
 }
 
 /// The supervisor while it writes the results.
-pub fn at_the_results(scene: &mut Scene) -> Option<Outcome> {
+pub fn at_the_results(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(1);
@@ -131,19 +176,41 @@ pub fn at_the_results(scene: &mut Scene) -> Option<Outcome> {
     let writes = scene.rng.random_range(1..=20);
     watch.wait(writes, Duration::from_secs(60), |file| file != "log.jsonl")?;
     running.kill_supervisor();
-    Some(scene.resumed(&run))
+    scene.resumed(&run);
+    Some(())
 }
 
-/// SIGINT or SIGTERM. Before there is anything to remove, it simply ends the process.
-pub fn interrupt(scene: &mut Scene) -> Option<Outcome> {
+/// SIGINT or SIGTERM in the middle. The same command continues.
+pub fn interrupt(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
-    scene.moment(&mut running)?;
+    running.await_poses_or_end(scene.moments(1)[0]);
+    interrupted(scene, running, Some(130))?;
+    assert_eq!(run.summary()["ending"], "interrupted");
+    scene.resumed(&run);
+    Some(())
+}
+
+/// SIGINT or SIGTERM while the processes start. Before there is anything to remove, the signal
+/// simply ends the process.
+pub fn interrupt_at_the_start(scene: &mut Scene) -> Option<()> {
+    let run = scene.run();
+    for _ in 0..LIVES {
+        let running = run.start();
+        scene.pause(60);
+        interrupted(scene, running, None)?;
+    }
+    scene.resumed(&run);
+    Some(())
+}
+
+/// Interrupts a run. It ends with this code, or, where `None` is permitted, by the signal.
+fn interrupted(scene: &mut Scene, running: Running, least: Option<i32>) -> Option<()> {
     running.signal(*[Signal::INT, Signal::TERM].choose(&mut scene.rng)?);
     let ended = running.finish();
     if ended.status.success() {
-        return Some(scene.finished(&run, &ended));
+        return None;
     }
-    assert!(matches!(ended.code(), Some(130) | None), "{ended:?}");
-    Some(scene.resumed(&run))
+    assert!([Some(130), least].contains(&ended.code()), "{ended:?}");
+    Some(())
 }

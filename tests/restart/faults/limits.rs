@@ -1,18 +1,14 @@
-//! Limits of memory, descriptors and processes.
+//! Limits of memory and descriptors.
 
 use std::fs;
 
 use rand::Rng;
-use rustix::process::Signal;
 
-use super::{
-    scene::{Outcome, Scene},
-    tools::{AS_NOBODY, give_to_nobody, limit},
-};
-use crate::common::{Ended, Pid, Run, assert_nothing_left, assert_nothing_left_of, send, wrapped};
+use super::{scene::Scene, tools::limit};
+use crate::common::{Ended, Pid, Run, assert_nothing_left, wrapped};
 
 /// Address space: little for the whole run, or nothing more for a process in the middle.
-pub fn memory(scene: &mut Scene) -> Option<Outcome> {
+pub fn memory(scene: &mut Scene) -> Option<()> {
     let run = scene.run().set("run.stall_timeout_s=3");
     if scene.one_in(3) {
         let bytes = 10_f64.powf(scene.rng.random_range(7.0..10.0)) as u64;
@@ -20,7 +16,8 @@ pub fn memory(scene: &mut Scene) -> Option<Outcome> {
         let ended = run
             .start_as(wrapped(&["prlimit", &limit], &run.command()))
             .end();
-        return Some(out_of_memory(scene, &run, &ended));
+        out_of_memory(scene, &run, &ended);
+        return Some(());
     }
     let mut running = run.start();
     scene.moment(&mut running)?;
@@ -35,17 +32,18 @@ pub fn memory(scene: &mut Scene) -> Option<Outcome> {
     );
     scene.kill_stage(&running);
     let ended = running.end();
-    Some(out_of_memory(scene, &run, &ended))
+    out_of_memory(scene, &run, &ended);
+    Some(())
 }
 
 /// A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack cannot
 /// grow (SIGSEGV). For the supervisor that is as good as a kill.
-fn out_of_memory(scene: &Scene, run: &Run, ended: &Ended) -> Outcome {
+fn out_of_memory(scene: &Scene, run: &Run, ended: &Ended) {
     if ended.code().is_none() {
         return scene.resumed(run);
     }
     assert_nothing_left(run.out());
-    scene.survived(run, ended)
+    scene.survived(run, ended);
 }
 
 fn address_space(pid: Pid) -> Option<u64> {
@@ -58,7 +56,7 @@ fn address_space(pid: Pid) -> Option<u64> {
 }
 
 /// Descriptors: few for the whole run, or no more for a process in the middle.
-pub fn descriptors(scene: &mut Scene) -> Option<Outcome> {
+pub fn descriptors(scene: &mut Scene) -> Option<()> {
     // A process without descriptors may hang.
     let run = scene.run().set("run.stall_timeout_s=3");
     if scene.one_in(3) {
@@ -66,7 +64,8 @@ pub fn descriptors(scene: &mut Scene) -> Option<Outcome> {
         let ended = run
             .start_as(wrapped(&["prlimit", &limit], &run.command()))
             .finish();
-        return Some(scene.survived(&run, &ended));
+        scene.survived(&run, &ended);
+        return Some(());
     }
     let mut running = run.start();
     scene.moment(&mut running)?;
@@ -78,24 +77,6 @@ pub fn descriptors(scene: &mut Scene) -> Option<Outcome> {
     limit(pid, "nofile", open + scene.rng.random_range(0..3));
     scene.kill_stage(&running);
     let ended = running.finish();
-    Some(scene.survived(&run, &ended))
-}
-
-/// The user may have no more processes: for a moment, or until the end.
-pub fn processes(scene: &mut Scene) -> Option<Outcome> {
-    let run = scene.run();
-    give_to_nobody(&run);
-    let mut running = run.start_as(wrapped(&AS_NOBODY, &run.command()));
-    running.await_stages();
-    scene.moment(&mut running)?;
-    let (pid, root) = (running.pid(), running.root()?);
-    limit(pid, "nproc", 1);
-    send(scene.stage(&running)?, Signal::KILL);
-    if scene.one_in(2) {
-        scene.pause(1000);
-        limit(pid, "nproc", 10_000);
-    }
-    let ended = running.finish();
-    assert_nothing_left_of(&root);
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }

@@ -1,192 +1,179 @@
-//! Faults into real processes: each kind disturbs a `gyre run` in one way, and says how the run may
-//! end. A run finishes with the results of the undisturbed one, or ends with a sentence and the
-//! same command resumes to them, or is refused with a sentence.
+//! Same bytes: a row for each pair of a configuration and a fault. A fault disturbs a `gyre run` at
+//! random moments. The run finishes with the results of the undisturbed one, or ends with one
+//! sentence and the same command resumes to them.
 //!
-//! One fault of each kind, on a short simulated drive, belongs to the tests of every change, unless
-//! another test has that fault too. All of them, on a real drive with refinement and learned masks:
+//! A row prints its seed. `GYRE_FAULTS_SEED` repeats a seed; `GYRE_FAULTS_EVENTS` is the number of
+//! faults of each row, with one seed after the other:
 //!
 //! ```sh
-//! cargo test --release -p gyre --test pipeline on_a_real_drive -- --ignored --nocapture
+//! GYRE_FAULTS_EVENTS=20 cargo test --release -p gyre --test pipeline faults::nightly::radiate -- --ignored
 //! ```
-//!
-//! All runs are with SLAM, so a stage is a follower too, and what must be the same are the
-//! corrected trajectory and its loops as well.
-//!
-//! `GYRE_FAULTS_KIND` selects one kind by its name, `GYRE_FAULTS_SEED` the first seed,
-//! `GYRE_FAULTS_EVENTS` the number of faults of each kind. So a fault is repeated by its kind, its
-//! seed and 1. The short drive takes the first two as well.
 
-mod drive;
+pub mod configurations;
 mod environment;
 mod input;
 mod kills;
 mod limits;
-mod programs;
 mod results;
 mod scene;
-mod stops;
-mod table;
 mod tools;
 mod watch;
 
-use std::{
-    env,
-    io::{self, Write},
-    panic::{self, AssertUnwindSafe},
-    sync::OnceLock,
-};
+use std::env;
 
-use drive::Drive;
-use scene::{Outcome, Scene};
-use table::Table;
+use configurations::Configuration;
+use scene::Scene;
 use tools::Need;
 
-/// Faults of each kind on the real drive.
-const EVENTS: u64 = 20;
 /// Attempts at a fault that comes too late, because the run is over.
 const ATTEMPTS: usize = 20;
 
 /// A kind of faults.
-struct Kind {
-    name: &'static str,
+#[derive(Clone, Copy)]
+struct Fault {
+    /// Runs a configuration, disturbs the run, and judges its results; `None` if the run ended
+    /// before the fault.
+    strike: fn(&mut Scene) -> Option<()>,
     /// The requirements on the machine.
     needs: &'static [Need],
-    /// Runs a drive, disturbs it, and judges how it ended; `None` if it ended before the fault.
-    strike: fn(&mut Scene) -> Option<Outcome>,
 }
 
-/// Lists the kinds, with a test each.
-macro_rules! kinds {
-    ($($(#[$when:meta])* $name:ident: $strike:path, $needs:expr;)*) => {
-        const KINDS: &[Kind] = &[$(Kind { name: stringify!($name), needs: &$needs, strike: $strike }),*];
+/// Faults by name, as the rows have them.
+mod kinds {
+    #![allow(non_upper_case_globals)]
 
-        $(#[test]
-        $(#[$when])*
-        fn $name() {
-            one_on_the_short_drive(stringify!($name));
+    use super::{Fault, Need, environment, input, kills, limits, results};
+
+    macro_rules! kinds {
+        ($($name:ident: $strike:path $(, $need:ident)*;)*) => {
+            $(pub const $name: Fault = Fault { strike: $strike, needs: &[$(Need::$need),*] };)*
+        };
+    }
+
+    kinds! {
+        each_process_is_killed: kills::each;
+        processes_are_killed_together: kills::together;
+        a_process_is_killed_as_it_starts: kills::at_the_start;
+        a_process_is_killed_as_it_writes: kills::at_a_write;
+        a_process_is_killed_again_and_again: kills::again_and_again;
+        a_process_is_killed_after_the_last_pose: kills::after_the_last_pose;
+        a_process_is_asked_to_end: kills::politely;
+        processes_are_killed_in_storms: kills::storms;
+        the_supervisor_is_killed: kills::supervisor;
+        the_supervisor_is_killed_as_it_writes_results: kills::at_the_results;
+        the_run_is_interrupted: kills::interrupt;
+        the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
+        the_disk_is_full: results::disk_full, Mounts;
+        input_and_output_fail: results::io_errors, Fiu;
+        files_may_not_grow: results::file_size_limit, Prlimit;
+        the_results_are_read_only: results::read_only, Mounts, OtherUser;
+        the_results_vanish: results::vanish;
+        the_recording_has_gaps: input::gaps;
+        the_recording_vanishes: input::vanishes;
+        the_clock_is_set: environment::clock_step, Faketime;
+        memory_runs_out: limits::memory, Prlimit;
+        descriptors_run_out: limits::descriptors, Prlimit;
+    }
+}
+
+/// A test for each fault of each configuration.
+macro_rules! rows {
+    ($attributes:tt $($configuration:ident: $($fault:ident)*;)*) => {
+        $(mod $configuration {
+            $(row! { $attributes $configuration $fault })*
         })*
     };
 }
 
-kinds! {
-    #[ignore = "nightly: restart::killed_stages has this fault too"]
-    a_stage_is_killed: kills::stage, [];
-    #[ignore = "nightly: restart::killed_stages has this fault too"]
-    stages_are_killed_together: kills::several, [];
-    #[ignore = "nightly: restart::killed_stages has this fault too"]
-    a_stage_is_killed_as_it_starts: kills::at_the_start, [];
-    a_stage_is_killed_as_it_writes: kills::at_a_write, [];
-    processes_are_killed_in_storms: kills::storms, [];
-    #[ignore = "nightly: method::pipeline has this fault too"]
-    the_supervisor_is_killed: kills::supervisor, [];
-    the_supervisor_is_killed_as_it_writes_results: kills::at_the_results, [];
-    #[ignore = "nightly: method::pipeline has this fault too"]
-    the_run_is_interrupted: kills::interrupt, [];
-    #[ignore = "nightly: operate::commands has this fault too"]
-    a_process_stops_for_a_while: stops::for_a_while, [];
-    #[ignore = "nightly: operate::commands has this fault too"]
-    a_stage_stops_for_good: stops::for_good, [];
-    the_disk_is_full: results::disk_full, [Need::Mounts];
-    input_and_output_fail: results::io_errors, [Need::Fiu];
-    files_may_not_grow: results::file_size_limit, [Need::Prlimit];
-    the_results_are_read_only: results::read_only, [Need::Mounts, Need::OtherUser];
-    the_results_vanish: results::vanish, [];
-    #[ignore = "nightly: restart::full_disk has this fault too"]
-    nobody_can_be_told: results::full_terminal, [];
-    the_recording_has_gaps: input::gaps, [];
-    the_recording_vanishes: input::vanishes, [];
-    the_clock_is_set: environment::clock_step, [Need::Faketime];
-    #[ignore = "nightly: restart::shared_memory has this fault too"]
-    shared_memory_fills_up: environment::shared_memory_full, [Need::Mounts];
-    memory_runs_out: limits::memory, [Need::Prlimit];
-    descriptors_run_out: limits::descriptors, [Need::Prlimit];
-    #[ignore = "nightly: restart::supervisor has this fault too"]
-    no_process_can_be_started: limits::processes, [Need::Prlimit, Need::OtherUser];
-    #[ignore = "nightly: restart::identity has this fault too"]
-    the_program_is_replaced: programs::replaced, [];
-    #[ignore = "nightly: restart::results has this fault too"]
-    a_second_run_has_the_same_results: programs::second_run, [Need::Mounts];
+macro_rules! row {
+    ({$($attribute:tt)*} $configuration:ident $fault:ident) => {
+        #[test]
+        $($attribute)*
+        fn $fault() {
+            use crate::restart::faults::{configurations, kinds, strike};
+            strike(&configurations::$configuration(), &kinds::$fault);
+        }
+    };
 }
 
-/// Prints past the capture of the tests' output, so that what is skipped is seen.
-fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+rows! {
+    {}
+    plain: each_process_is_killed processes_are_killed_together a_process_is_killed_as_it_starts
+        a_process_is_killed_again_and_again a_process_is_asked_to_end the_supervisor_is_killed
+        the_run_is_interrupted the_run_is_interrupted_as_it_starts the_recording_has_gaps
+        the_recording_vanishes;
+    slam: each_process_is_killed a_process_is_killed_as_it_writes processes_are_killed_in_storms
+        the_supervisor_is_killed the_supervisor_is_killed_as_it_writes_results the_disk_is_full
+        input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
+        the_clock_is_set memory_runs_out descriptors_run_out;
+    loops: each_process_is_killed;
+    gap: processes_are_killed_together;
+    unreadable: each_process_is_killed;
+    lost_azimuths: each_process_is_killed a_process_is_killed_again_and_again;
+    standstill: a_process_is_killed_again_and_again;
+    joint_search: each_process_is_killed;
+    gyro_and_wheels: each_process_is_killed the_supervisor_is_killed;
+    doppler: the_supervisor_is_killed;
+    network_of_one_scan: each_process_is_killed;
+    network_of_two_scans: each_process_is_killed processes_are_killed_together
+        a_process_is_killed_again_and_again;
+    network_at_an_unreadable_scan: processes_are_killed_together;
+    network_in_rten: each_process_is_killed;
+    simulation: each_process_is_killed the_supervisor_is_killed;
+    replayed: each_process_is_killed;
+    python: each_process_is_killed;
 }
 
-fn number(variable: &str, default: u64) -> u64 {
-    let set = env::var(variable).ok();
-    set.map_or(default, |text| {
-        text.parse()
-            .unwrap_or_else(|_| panic!("{variable} is {text}: not a number"))
-    })
-}
-
-fn selected(kind: &Kind) -> bool {
-    env::var("GYRE_FAULTS_KIND").map_or(true, |name| name == kind.name)
-}
-
-fn lacking(kind: &Kind) -> Option<&'static str> {
-    let lacking = kind.needs.iter().find_map(|need| need.lacking());
-    if let Some(reason) = lacking {
-        say(&format!("skipped: {}: {reason}", kind.name));
+mod nightly {
+    rows! {
+        {#[ignore = ".ci/nightly: more rows"]}
+        plain: a_process_is_killed_after_the_last_pose;
+        small_map: a_process_is_killed_again_and_again the_supervisor_is_killed;
+        gap: each_process_is_killed;
+        gyro_and_wheels: processes_are_killed_in_storms;
+        doppler: each_process_is_killed;
+        network_of_two_scans: the_supervisor_is_killed;
+        network_at_a_gap: processes_are_killed_together;
+        objects: a_process_is_killed_again_and_again the_run_is_interrupted;
+        gnss: a_process_is_killed_again_and_again;
+        loops: processes_are_killed_together a_process_is_killed_as_it_starts
+            a_process_is_killed_as_it_writes a_process_is_killed_after_the_last_pose
+            processes_are_killed_in_storms the_supervisor_is_killed
+            the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
+            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            descriptors_run_out;
+        radiate: each_process_is_killed processes_are_killed_together
+            a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes
+            processes_are_killed_in_storms the_supervisor_is_killed
+            the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
+            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            descriptors_run_out;
     }
-    lacking
 }
 
-fn strike(kind: &Kind, drive: &Drive, seed: u64) -> Outcome {
-    let mut scene = Scene::new(drive, seed);
-    (0..ATTEMPTS)
-        .find_map(|_| (kind.strike)(&mut scene))
-        .unwrap_or_else(|| panic!("{ATTEMPTS} runs ended before the fault"))
+fn number(variable: &str) -> Option<u64> {
+    let set = env::var(variable).ok()?;
+    let number = set.parse();
+    Some(number.unwrap_or_else(|_| panic!("{variable} is {set}, but must be a number")))
 }
 
-fn one_on_the_short_drive(name: &str) {
-    static DRIVE: OnceLock<Drive> = OnceLock::new();
-    let kind = KINDS.iter().find(|kind| kind.name == name).unwrap();
-    if !selected(kind) || lacking(kind).is_some() {
+/// Strikes a run of the configuration, where the machine can do that.
+fn strike(configuration: &Configuration, fault: &Fault) {
+    if !configuration.is_possible() {
         return;
     }
-    let seed = number("GYRE_FAULTS_SEED", 1);
-    println!("GYRE_FAULTS_KIND={name} GYRE_FAULTS_SEED={seed}");
-    strike(kind, DRIVE.get_or_init(Drive::short), seed);
-}
-
-#[test]
-#[ignore = "takes an hour; see the head of this file"]
-fn all_kinds_on_a_real_drive() {
-    if let Some(drive) = Drive::real() {
-        all_kinds(&drive);
+    if let Some(missing) = fault.needs.iter().find_map(|need| need.missing()) {
+        println!("skipped: {missing}");
+        return;
     }
-}
-
-#[test]
-#[ignore = "takes a quarter of an hour; see the head of this file"]
-fn all_kinds_on_a_drive_with_loops() {
-    all_kinds(&Drive::with_loops());
-}
-
-fn all_kinds(drive: &Drive) {
-    let (first, events) = (
-        number("GYRE_FAULTS_SEED", 1),
-        number("GYRE_FAULTS_EVENTS", EVENTS),
-    );
-    say(&format!(
-        "GYRE_FAULTS_SEED={first}, {events} faults of each kind"
-    ));
-    let mut table = Table::default();
-    for kind in KINDS.iter().filter(|kind| selected(kind)) {
-        if let Some(reason) = lacking(kind) {
-            table.skip(kind.name, reason);
-            continue;
-        }
-        for seed in first..first + events {
-            println!("\n== {} {seed}", kind.name);
-            let struck = panic::catch_unwind(AssertUnwindSafe(|| strike(kind, drive, seed)));
-            let outcome = struck.map_err(|_| seed);
-            say(&format!("{} {seed}: {}", kind.name, table::word(&outcome)));
-            table.add(kind.name, outcome);
-        }
+    let first = number("GYRE_FAULTS_SEED").unwrap_or_else(|| rand::random::<u16>().into());
+    for seed in first..first + number("GYRE_FAULTS_EVENTS").unwrap_or(1) {
+        println!("GYRE_FAULTS_SEED={seed}");
+        let mut scene = Scene::new(configuration, seed);
+        (0..ATTEMPTS)
+            .find_map(|_| (fault.strike)(&mut scene))
+            .unwrap_or_else(|| panic!("{ATTEMPTS} runs ended before the fault"));
     }
-    say(&table.to_string());
-    assert!(table.findings().is_empty(), "{:#?}", table.findings());
 }

@@ -10,10 +10,10 @@ use rand::{Rng, seq::IndexedRandom};
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
-    scene::{Outcome, Scene, assert_one_sentence},
+    scene::{Scene, assert_one_sentence},
     tools::{AS_NOBODY, Mount, give_to_nobody, limit},
 };
-use crate::common::{Run, Running, assert_nothing_left_of, wrapped};
+use crate::common::{Run, assert_nothing_left_of, wrapped};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
@@ -21,7 +21,7 @@ const PLENTY: u64 = 256 << 20;
 const FILLER: &str = "filler";
 
 /// Leaves at most `leave` bytes of the file system at `place`.
-pub fn fill(place: &Path, leave: u64) {
+fn fill(place: &Path, leave: u64) {
     let free = statvfs(place).unwrap();
     let bytes = (free.f_bavail * free.f_frsize).saturating_sub(leave);
     let filler = fs::File::create(place.join(FILLER)).unwrap();
@@ -30,8 +30,8 @@ pub fn fill(place: &Path, leave: u64) {
 }
 
 /// The disk is too small, or becomes full in the middle; then there is room again.
-pub fn disk_full(scene: &mut Scene) -> Option<Outcome> {
-    let bytes = scene.drive.undisturbed().bytes;
+pub fn disk_full(scene: &mut Scene) -> Option<()> {
+    let bytes = scene.configuration.undisturbed().bytes;
     let run = scene.run();
     let small = scene.one_in(2);
     let size = match small {
@@ -50,12 +50,13 @@ pub fn disk_full(scene: &mut Scene) -> Option<Outcome> {
     let ended = running.finish();
     let _ = fs::remove_file(run.out().join(FILLER));
     mount.remount(&format!("size={PLENTY}"));
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
 /// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers
 /// of its own.
-pub fn io_errors(scene: &mut Scene) -> Option<Outcome> {
+pub fn io_errors(scene: &mut Scene) -> Option<()> {
     let call = *[
         "rw/write",
         "rw/pwrite",
@@ -75,12 +76,13 @@ pub fn io_errors(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let failing = wrapped(&["fiu-run", "-f", "", "-x", "-c", &command], &run.command());
     let ended = run.start_as(failing).finish();
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
-/// No file may become longer: of the whole run, or of a process in the middle. A signal says so,
-/// unless it is ignored.
-pub fn file_size_limit(scene: &mut Scene) -> Option<Outcome> {
+/// No file may become longer: of the whole run, or of a process in the middle. A signal reports the
+/// limit, unless the signal is ignored.
+pub fn file_size_limit(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let signal = if scene.one_in(2) {
         "trap '' XFSZ; "
@@ -90,13 +92,14 @@ pub fn file_size_limit(scene: &mut Scene) -> Option<Outcome> {
     let mut shell = vec!["sh", "-c"];
     let start = format!("{signal}exec \"$@\"");
     shell.extend([&start, "sh"]);
-    let most = (scene.drive.undisturbed().bytes as f64).log2();
+    let most = (scene.configuration.undisturbed().bytes as f64).log2();
     let bytes = scene.rng.random_range(12.0..most).exp2() as u64;
     let at_start = format!("--fsize={bytes}:");
     if scene.one_in(3) {
         shell.extend(["prlimit", &at_start]);
         let ended = run.start_as(wrapped(&shell, &run.command())).finish();
-        return Some(scene.survived(&run, &ended));
+        scene.survived(&run, &ended);
+        return Some(());
     }
     let mut running = run.start_as(wrapped(&shell, &run.command()));
     scene.moment(&mut running)?;
@@ -106,11 +109,12 @@ pub fn file_size_limit(scene: &mut Scene) -> Option<Outcome> {
     };
     limit(pid, "fsize", bytes);
     let ended = running.finish();
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
 /// The folder of the results is mounted read-only, or loses its permissions in the middle.
-pub fn read_only(scene: &mut Scene) -> Option<Outcome> {
+pub fn read_only(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     if scene.one_in(3) {
         let mount = Mount::tmpfs(run.out(), PLENTY);
@@ -118,7 +122,8 @@ pub fn read_only(scene: &mut Scene) -> Option<Outcome> {
         let ended = run.finish();
         assert_one_sentence(&ended);
         mount.remount("rw");
-        return Some(scene.resumed(&run).refused());
+        scene.resumed(&run);
+        return Some(());
     }
     give_to_nobody(&run);
     let as_nobody = || wrapped(&AS_NOBODY, &run.command());
@@ -134,7 +139,8 @@ pub fn read_only(scene: &mut Scene) -> Option<Outcome> {
     let ended = running.finish();
     assert_nothing_left_of(&root);
     permit(run.out(), true);
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
 /// Lets the owner write into a folder and all below, or not.
@@ -147,7 +153,7 @@ fn permit(folder: &Path, write: bool) {
 }
 
 /// The folder of the results is moved away, and comes back soon, after the end, or never.
-pub fn vanish(scene: &mut Scene) -> Option<Outcome> {
+pub fn vanish(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(1);
@@ -169,7 +175,8 @@ pub fn vanish(scene: &mut Scene) -> Option<Outcome> {
     }
     let ended = running.finish();
     restore(&away, &run);
-    Some(scene.survived(&run, &ended))
+    scene.survived(&run, &ended);
+    Some(())
 }
 
 /// Moves the results back to where they were, unless they are there.
@@ -177,20 +184,5 @@ fn restore(away: &Path, run: &Run) {
     if away.exists() {
         let _ = fs::remove_dir_all(run.out());
         fs::rename(away, run.out()).unwrap();
-    }
-}
-
-/// Nothing can be written to standard output and standard error: a full disk, where both are files.
-pub fn full_terminal(scene: &mut Scene) -> Option<Outcome> {
-    let run = scene.run();
-    let silent = ["sh", "-c", "exec \"$@\" >/dev/full 2>/dev/full", "sh"];
-    let mut running: Running = run.start_as(wrapped(&silent, &run.command()));
-    scene.moment(&mut running)?;
-    scene.kill_stage(&running);
-    let ended = running.finish();
-    assert!(matches!(ended.code(), Some(0 | 1)), "{ended:?}");
-    match ended.status.success() {
-        true => Some(scene.finished(&run, &ended)),
-        false => Some(scene.resumed(&run)),
     }
 }

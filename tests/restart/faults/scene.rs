@@ -1,5 +1,4 @@
-//! One fault: its random numbers, the moment when it happens, and the judgement of how the run
-//! ended.
+//! A fault: its random numbers, the moments when it happens, and the judgement of the run's end.
 
 use std::{thread, time::Duration};
 
@@ -9,66 +8,37 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;
 
-use super::drive::{Drive, Results};
+use super::configurations::{Configuration, Results};
 use crate::common::{Ended, Pid, Run, Running, send};
 
-/// The end of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// It went on and is complete.
-    Finished,
-    /// It ended, and the same command made it complete.
-    Resumed,
-    /// It was refused, and changed nothing.
-    Refused,
-}
-
-/// The end of a run with a fault that is as it must be.
-#[derive(Debug)]
-pub struct Outcome {
-    /// The end.
-    pub end: End,
-    /// The times from a death to the first pose that the new process worked on.
-    pub recovery_ms: Vec<f64>,
-}
-
-impl From<End> for Outcome {
-    fn from(end: End) -> Self {
-        Self {
-            end,
-            recovery_ms: Vec::new(),
-        }
-    }
-}
-
-impl Outcome {
-    /// The same of a run that was refused.
-    pub fn refused(self) -> Self {
-        Self {
-            end: End::Refused,
-            ..self
-        }
-    }
-}
+const LOOK: Duration = Duration::from_millis(2);
 
 /// A fault on its way.
 pub struct Scene<'a> {
-    /// The drive that is played.
-    pub drive: &'a Drive,
+    /// The configuration of the run.
+    pub configuration: &'a Configuration,
     /// The source of all that is random.
     pub rng: ChaCha8Rng,
 }
 
 impl<'a> Scene<'a> {
     /// The fault of this seed.
-    pub fn new(drive: &'a Drive, seed: u64) -> Self {
+    pub fn new(configuration: &'a Configuration, seed: u64) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        Self { drive, rng }
+        Self { configuration, rng }
     }
 
-    /// A run of the drive.
+    /// A run of the configuration.
     pub fn run(&self) -> Run {
-        self.drive.run()
+        // All rows wait for it here and not in the middle of a run.
+        self.configuration.undisturbed();
+        self.configuration.run()
+    }
+
+    /// The stages and followers of a run.
+    pub fn processes(&self) -> Vec<String> {
+        let undisturbed = self.configuration.undisturbed();
+        undisturbed.processes.iter().cloned().collect()
     }
 
     /// True in one of `of` cases.
@@ -81,6 +51,16 @@ impl<'a> Scene<'a> {
         thread::sleep(Duration::from_millis(self.rng.random_range(0..=limit_ms)));
     }
 
+    /// Numbers of poses for events, in order: early enough to see a restart.
+    pub fn moments(&mut self, count: usize) -> Vec<usize> {
+        let moments = self.configuration.moments();
+        let end = moments.end.min(self.configuration.poses * 3 / 4);
+        let random = |_| self.rng.random_range(moments.start..end);
+        let mut moments: Vec<usize> = (0..count).map(random).collect();
+        moments.sort_unstable();
+        moments
+    }
+
     /// Waits for a random moment: while the processes start, or in the middle. `None` if the run is
     /// over.
     pub fn moment(&mut self, running: &mut Running) -> Option<()> {
@@ -88,10 +68,21 @@ impl<'a> Scene<'a> {
             self.pause(200);
         } else {
             // The followers may have work to do after the last pose.
-            running.await_poses_or_end(self.rng.random_range(1..=self.drive.scans));
+            let moments = self.configuration.moments();
+            running.await_poses_or_end(self.rng.random_range(moments));
             self.pause(20);
         }
         (!running.is_over()).then_some(())
+    }
+
+    /// Waits until all processes live. `None` if the run is over.
+    pub fn await_processes(&mut self, running: &mut Running) -> Option<()> {
+        let names = self.processes();
+        self.until(running, |running| {
+            let living = running.stages();
+            let all = names.iter().all(|name| living.contains_key(name));
+            all.then_some(())
+        })
     }
 
     /// A living stage or follower.
@@ -107,38 +98,62 @@ impl<'a> Scene<'a> {
         Some(())
     }
 
-    /// The run must have gone on to its end.
-    pub fn finished(&self, run: &Run, ended: &Ended) -> Outcome {
-        self.finished_with(&self.drive.undisturbed().results, run, ended)
+    /// Kills a process once it lives. `None` if the run is over.
+    pub fn kill(&mut self, running: &mut Running, name: &str) -> Option<()> {
+        let pid = self.until(running, |running| running.stages().get(name).copied())?;
+        send(pid, Signal::KILL);
+        Some(())
     }
 
-    /// The same where the results are others than those of the drive.
-    pub fn finished_with(&self, expected: &Results, run: &Run, ended: &Ended) -> Outcome {
-        ended.succeeded();
-        assert_complete(run, expected);
-        let recovery = run.summary()["recovery_ms"].as_array().unwrap().clone();
-        Outcome {
-            end: End::Finished,
-            recovery_ms: recovery.iter().map(|ms| ms.as_f64().unwrap()).collect(),
+    fn until<T>(&self, running: &mut Running, look: impl Fn(&Running) -> Option<T>) -> Option<T> {
+        while !running.is_over() {
+            if let Some(seen) = look(running) {
+                return Some(seen);
+            }
+            thread::sleep(LOOK);
         }
+        None
     }
 
-    /// The run may have gone on to its end, or have ended with a sentence.
-    pub fn survived(&self, run: &Run, ended: &Ended) -> Outcome {
+    /// The run must have continued to its end.
+    pub fn finished(&self, run: &Run, ended: &Ended) {
+        self.finished_with(&self.configuration.undisturbed().results, run, ended);
+    }
+
+    /// The same for results that differ from the results of the configuration.
+    pub fn finished_with(&self, expected: &Results, run: &Run, ended: &Ended) {
+        ended.succeeded();
+        self.assert_complete(run, expected);
+    }
+
+    /// Processes that were not killed must not have been restarted. `None` if one of the others was
+    /// not restarted either: it died when its work was done.
+    pub fn restarted(&self, run: &Run, killed: &[String]) -> Option<()> {
+        let restarts = run.summary()["restarts"].clone();
+        let restarts = restarts.as_object().unwrap();
+        for name in restarts.keys() {
+            assert!(killed.contains(name), "{name} was restarted: {restarts:?}");
+        }
+        let all = killed.iter().all(|name| restarts.contains_key(name));
+        all.then_some(())
+    }
+
+    /// The run may have continued to its end, or have ended with a sentence.
+    pub fn survived(&self, run: &Run, ended: &Ended) {
         if ended.status.success() {
             return self.finished(run, ended);
         }
         assert_one_sentence(ended);
-        self.resumed(run)
+        self.resumed(run);
     }
 
     /// The same command must make the run complete, and lose none of the poses that are there.
-    pub fn resumed(&self, run: &Run) -> Outcome {
+    pub fn resumed(&self, run: &Run) {
         let records = journal::records(&journal::path(run.out())).unwrap();
         let records: Result<Vec<_>, _> = records.into_iter().flatten().collect();
         let records = records.unwrap();
         run.finish().succeeded();
-        assert_complete(run, &self.drive.undisturbed().results);
+        self.assert_complete(run, &self.configuration.undisturbed().results);
         let resumed_after = run.summary()["resumed_after"].as_u64().unwrap() as usize;
         let was_complete = records.last().is_some_and(|last| last.item.is(flag::END));
         assert!(
@@ -146,20 +161,16 @@ impl<'a> Scene<'a> {
             "{} poses were there, but it resumed after {resumed_after}",
             records.len()
         );
-        Outcome::from(End::Resumed)
+    }
+
+    fn assert_complete(&self, run: &Run, expected: &Results) {
+        let difference = expected.difference(&self.configuration.results(run));
+        assert_eq!(difference, None, "differs from the undisturbed run");
+        assert_eq!(run.summary()["ending"], "complete");
     }
 }
 
-fn assert_complete(run: &Run, expected: &Results) {
-    let results = Results::of(run);
-    assert!(
-        results == *expected,
-        "the results are not those of the undisturbed run"
-    );
-    assert_eq!(run.summary()["ending"], "complete");
-}
-
-/// Returns its last words are the only sentence of the program; what comes before is the progress
+/// Asserts that the last words are the program's only sentence; all earlier output is the progress
 /// of the run.
 pub fn assert_one_sentence(ended: &Ended) {
     ended.failed_with(&[]);

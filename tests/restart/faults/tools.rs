@@ -29,13 +29,13 @@ pub enum Need {
 }
 
 impl Need {
-    /// Says what is not there; `None` if all is.
-    pub fn lacking(self) -> Option<&'static str> {
+    /// Returns the name of the missing tool; `None` if nothing is.
+    pub fn missing(self) -> Option<&'static str> {
         let works = |command: &[&str]| {
             let output = Command::new(command[0]).args(&command[1..]).output();
             output.is_ok_and(|output| output.status.success())
         };
-        let (there, lacking) = match self {
+        let (there, missing) = match self {
             Self::Mounts => (
                 works(&[
                     "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
@@ -59,7 +59,7 @@ impl Need {
                 "libfaketime is not installed (Debian: faketime)",
             ),
         };
-        (!there).then_some(lacking)
+        (!there).then_some(missing)
     }
 }
 
@@ -137,11 +137,6 @@ impl Mount {
                 "tmpfs".as_ref(),
             ],
         )
-    }
-
-    /// The same folder under another name.
-    pub fn bind(folder: &Path, place: &Path) -> Self {
-        Self::at(place, &["--bind".as_ref(), folder.as_ref()])
     }
 
     fn at(place: &Path, options: &[&OsStr]) -> Self {

@@ -1,4 +1,4 @@
-//! Waiting for the very moment at which a file is written.
+//! Waiting for the very moment of a write to a file.
 
 use std::{mem::MaybeUninit, path::Path, time::Duration};
 
@@ -26,7 +26,7 @@ impl Watch {
     }
 
     /// Waits until `writes` writes pass `counts`, which has the name of the file in a watched
-    /// folder. `None` if there is none for as long as `limit`.
+    /// folder. `None` after `limit` without a match.
     pub fn wait(
         &self,
         mut writes: usize,

@@ -1,4 +1,5 @@
-//! A disk whose power fails: what it can hold of recorded changes, by what was synchronised.
+//! A disk whose power fails: its possible contents after recorded changes, by their
+//! synchronisation.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -12,7 +13,7 @@ use rand::{Rng, rngs::StdRng};
 /// A disk writes whole sectors, and any of them first.
 const SECTOR: usize = 512;
 
-/// A file with what is safe of it, and the changes that are in danger, oldest first.
+/// The safe content of a file, and its unsafe changes, oldest first.
 #[derive(Clone, Default)]
 struct File {
     safe: Vec<u8>,
@@ -73,7 +74,7 @@ impl State {
 }
 
 impl Disk {
-    /// A disk that holds what is in a folder, all of it safe.
+    /// A disk with the content of a folder, all of it safe.
     pub fn of(folder: &Path) -> Self {
         let mut disk = Self::default();
         let mut folders = vec![folder.to_owned()];
@@ -185,7 +186,7 @@ impl Disk {
         self.namings = others;
     }
 
-    /// Returns what the disk holds after a power failure. Names in it are relative to `root`.
+    /// Returns the content of the disk after a power failure. Names in it are relative to `root`.
     pub fn fail(&self, survives: Survives, random: &mut StdRng, root: &Path) -> State {
         let mut kept = |share: f64| match survives {
             Survives::Nothing => false,

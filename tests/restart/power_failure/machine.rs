@@ -1,4 +1,4 @@
-//! The writers of a run in one process: what the stages and `gyre run` write, in their order.
+//! The writers of a run in one process: the files of the stages and of `gyre run`, in their order.
 
 use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
@@ -30,7 +30,7 @@ const INTERVAL_NS: i64 = 250_000_000;
 const POINTS: usize = 200;
 /// The results that must be the same bytes.
 const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
-/// Those of a run with SLAM besides.
+/// Additional results of a run with SLAM.
 const SLAM_RESULTS: [&str; 3] = ["trajectory_slam.tum", "graph.g2o", "map.png"];
 
 /// A machine on which one run is begun, resumed and completed.
@@ -86,7 +86,7 @@ impl Machine {
         paths.iter().map(|path| fs::read(path).unwrap()).collect()
     }
 
-    /// Does what the command does, to the end of the run.
+    /// Acts as the command, to the end of the run.
     pub fn run(&self, folder: &Path) -> Result<(), Failure> {
         let out = Out::lock(folder)?;
         let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
@@ -114,7 +114,7 @@ impl Machine {
     }
 
     /// Returns whether the run in this folder is complete. A new run removes the journal first:
-    /// without it the mark says nothing.
+    /// without the journal the mark is invalid.
     pub fn is_complete(&self, folder: &Path) -> bool {
         folder.join("journal/complete").exists() && journal::path(folder).exists()
     }
@@ -152,8 +152,8 @@ struct Stages {
     journal: Journal,
     keyframes: Option<Keyframes>,
     last: Option<PoseHeader>,
-    /// The journal has its end: a run that goes on waits for its followers alone, which this
-    /// machine does not have.
+    /// The journal has its end: a continued run then waits only for its followers, and this machine
+    /// has no followers.
     ended: bool,
 }
 
@@ -246,7 +246,8 @@ fn item(seq: u64) -> Item {
     }
 }
 
-/// The scan of posts along a road; from scan 26 on of others, to which nothing before matches.
+/// The scan of posts along a road; from scan 26 on the posts are different and match no earlier
+/// scan.
 fn scan(seq: u64) -> Vec<SparsePoint> {
     let world = seq / 26;
     let metres = seq as f64 * STEP_M;

@@ -120,13 +120,13 @@ fn tries() -> u64 {
 }
 
 #[test]
-#[ignore = "nightly: power fails thousands of times"]
+#[ignore = ".ci/nightly: power fails thousands of times"]
 fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
     fails_at_any_change(&Machine::new(SlamKind::None));
 }
 
 #[test]
-#[ignore = "nightly: power fails thousands of times"]
+#[ignore = ".ci/nightly: power fails thousands of times"]
 fn after_a_power_failure_at_any_change_of_a_run_with_slam_its_keyframes_are_the_undisturbed_ones() {
     fails_at_any_change(&Machine::new(SlamKind::Graph));
 }
@@ -152,13 +152,13 @@ fn fails_at_any_change(machine: &Machine) {
 }
 
 #[test]
-#[ignore = "nightly: power fails thousands of times"]
+#[ignore = ".ci/nightly: power fails thousands of times"]
 fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {
     fails_twice(&Machine::new(SlamKind::None), 13);
 }
 
 #[test]
-#[ignore = "nightly: power fails thousands of times"]
+#[ignore = ".ci/nightly: power fails thousands of times"]
 fn a_second_power_failure_while_a_run_with_slam_goes_on_changes_nothing_either() {
     fails_twice(&Machine::new(SlamKind::Graph), 29);
 }
@@ -192,7 +192,7 @@ fn fails_twice(machine: &Machine, every: usize) {
 }
 
 #[test]
-#[ignore = "nightly: power fails thousands of times"]
+#[ignore = ".ci/nightly: power fails thousands of times"]
 fn a_power_failure_while_a_new_run_takes_the_place_of_a_complete_one_mixes_nothing() {
     let (machine, first) = (Machine::new(SlamKind::Graph), folder());
     let root: PathBuf = first.path().canonicalize().unwrap();

@@ -2,7 +2,7 @@
 
 use gyre_changes::{Change, ChangeKind};
 use gyre_geometry::Pose;
-use gyre_simulator::town::ParkedCar;
+use gyre_worlds::town::ParkedCar;
 use nalgebra::{Point2, Vector2};
 
 use crate::Pair;

@@ -7,13 +7,13 @@ use std::{env, fs};
 use gyre_datasets::write_tum;
 use gyre_estimation::{Constraint, G2o};
 use gyre_geometry::pose;
-use gyre_localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
-use gyre_simulator::drive::{DriveConfig, DriveKind};
-use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{SimulatedDrive, SimulationConfig};
+use gyre_slam::localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
+use gyre_worlds::drive::{DriveConfig, DriveKind};
+use gyre_worlds::weather::WeatherConfig;
+use gyre_worlds::{SimulatedDrive, SimulationConfig};
 
 use crate::{Outcome, Pair};
 

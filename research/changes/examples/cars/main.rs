@@ -21,8 +21,8 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use gyre_changes::{Change, Changes, Survey, changes};
-use gyre_simulator::Simulator;
 use gyre_slam::Keyframe;
+use gyre_worlds::Simulator;
 use nalgebra::Point2;
 
 use cars::{Car, centre};

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use gyre_datasets::DatasetOptions;
 use gyre_radar::OwnedScan;
-use gyre_simulator::{SimulationConfig, write_dataset};
+use gyre_worlds::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
 use super::{CorruptArguments, Fault};

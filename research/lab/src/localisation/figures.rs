@@ -1,6 +1,6 @@
 //! The figures of first fixes and of tracking.
 
-use gyre_localisation::Status;
+use gyre_slam::localisation::Status;
 use serde_json::json;
 
 use super::is_on_map;

@@ -1,4 +1,4 @@
-//! The gyro beside the scans of a drive: its log, and what the radar says of it.
+//! The gyro beside the scans of a drive: its log, and the radar's findings about the gyro.
 
 use std::path::{Path, absolute};
 
@@ -10,7 +10,7 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// A log, and what is configured of its gyro.
+/// A log and the configuration of its gyro.
 pub(super) struct Gyro {
     log: GyroLog,
     configured: GyroConfig,
@@ -21,9 +21,6 @@ pub(super) struct Gyro {
 impl Gyro {
     /// Reads the log that is named, or else that which lies beside the scans. One that lies there
     /// and cannot be used is named, and left alone.
-    ///
-    /// # Errors
-    /// A log that is named and cannot be used.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,
@@ -65,10 +62,7 @@ impl Gyro {
     }
 }
 
-/// Calibrates the gyro by the drives that have a log, and prints what they say.
-///
-/// # Errors
-/// Scans that cannot be registered; drives of which another axis points up.
+/// Calibrates the gyro by the drives that have a log, and prints the findings.
 pub(super) fn section(logs: &[(&Gyro, &Drive)]) -> Result<Section, Failure> {
     let Some((first, _)) = logs.first() else {
         return Ok(Section::default());

@@ -1,4 +1,4 @@
-//! The wheels beside the scans of a drive: their log, and what the radar says of it.
+//! The wheels beside the scans of a drive: their log, and the radar's findings about the wheels.
 
 use std::path::{Path, absolute};
 
@@ -10,7 +10,7 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// A log, and what is configured of its wheels.
+/// A log and the configuration of its wheels.
 pub(super) struct Wheels {
     log: WheelLog,
     configured: WheelsConfig,
@@ -21,9 +21,6 @@ pub(super) struct Wheels {
 impl Wheels {
     /// Reads the log that is named, or else that which lies beside the scans. One that lies there
     /// and cannot be used is named, and left alone.
-    ///
-    /// # Errors
-    /// A log that is named and cannot be used.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,
@@ -66,10 +63,7 @@ impl Wheels {
     }
 }
 
-/// Calibrates the wheels by the drives that have a log, and prints what they say.
-///
-/// # Errors
-/// Scans that cannot be registered.
+/// Calibrates the wheels by the drives that have a log, and prints the findings.
 pub(super) fn section(logs: &[(&Wheels, &Drive)]) -> Result<Section, Failure> {
     let Some((first, _)) = logs.first() else {
         return Ok(Section::default());

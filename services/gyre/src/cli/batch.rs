@@ -12,11 +12,11 @@ pub struct BatchArguments {
     /// The drives: a text file with the path of a recording in each line, a CSV file with the
     /// columns drive, name, configuration and set, or a folder whose sub-folders are recordings.
     pub list: PathBuf,
-    /// The folder of the batch. What an earlier call has left there is kept and completed.
+    /// The folder of the batch. The files of an earlier call are kept and completed.
     #[arg(long, default_value = "out/batch")]
     pub out: PathBuf,
-    /// The configuration of the drives that name none. Default: what each recording's format and
-    /// its scans say.
+    /// The configuration of the drives that name none. Default: settings from each recording's
+    /// format and its scans.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Override a key of each configuration, as in slam.kind=graph; may be repeated.
@@ -32,12 +32,13 @@ pub struct BatchArguments {
     /// The number of tasks that share the list.
     #[arg(long, value_name = "N", requires = "task")]
     pub tasks: Option<usize>,
-    /// Compute nothing: write the table of what is there.
+    /// Compute nothing: write the table of the existing results.
     #[arg(long, conflicts_with = "task")]
     pub collect: bool,
 }
 
-/// The arguments of the process of a drive: those of a run, and the process that it ends with.
+/// The arguments of the process of a drive: the arguments of a run, and the parent process, whose
+/// end also ends it.
 #[derive(Debug, Args)]
 pub struct BatchDriveArguments {
     /// The process that has started it.

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, builder::PossibleValuesParser};
-use gyre_inputs::Inputs;
 use gyre_messages::StageId;
+use gyre_terminal::inputs::Inputs;
 
 /// The arguments of `gyre conformance`.
 #[derive(Debug, Args)]
@@ -25,7 +25,7 @@ pub struct ConformanceArguments {
     /// Scans to test with, 8 or more.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u16).range(8..=1000))]
     pub scans: u16,
-    /// The results must be those of Gyre's own stage, to the bit.
+    /// The results must equal the results of Gyre's own stage, to the bit.
     #[arg(long)]
     pub same_as_own: bool,
     /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred

@@ -17,7 +17,7 @@ pub struct LinkArguments {
 pub enum LinkEnd {
     /// Let other machines look on at a running run. It changes neither a result nor a latency.
     Send(SendArguments),
-    /// Look on at a run of another machine: what comes is a run here, for `gyre watch`, `echo` and
+    /// Observe a run of another machine: its messages form a run here, for `gyre watch`, `echo` and
     /// `record`.
     Receive(ReceiveArguments),
 }
@@ -28,7 +28,7 @@ pub struct SendArguments {
     /// The folder of the run's results, its --out.
     pub out: PathBuf,
     /// The topics that are sent: scan, masked, rotation, motion, refined, pose, loop, correction,
-    /// fix. Default: what the run has of these but scan, masked and rotation.
+    /// fix. Default: all of these in the run except scan, masked and rotation.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
@@ -61,10 +61,10 @@ pub struct NetworkArguments {
     /// Connect to the other end, or to a router, as in tls/robot.example:7447.
     #[arg(long, value_name = "ENDPOINT")]
     pub connect: Vec<String>,
-    /// The name of the link, the same at both ends, and another one for each robot.
+    /// The name of the link, equal at both ends, and different for each robot.
     #[arg(long, default_value = "gyre")]
     pub name: String,
-    /// Certificate of the authority that has signed those of both ends, PEM.
+    /// Certificate of the authority that has signed the certificates of both ends, PEM.
     #[arg(long, value_name = "FILE")]
     pub ca: Option<PathBuf>,
     /// Certificate of this end, PEM.

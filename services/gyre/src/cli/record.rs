@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gyre_operate::RunChoice;
+use gyre_tools::operate::RunChoice;
 
 /// The arguments of `gyre record`.
 #[derive(Debug, Args)]
@@ -15,13 +15,13 @@ pub struct RecordArguments {
     #[arg(long, value_name = "FILE", value_parser = recording)]
     pub to: PathBuf,
     /// The topics that are recorded: scan, masked, rotation, motion, refined, pose, loop,
-    /// correction, fix, log, health. Default: what the run has of these but masked and rotation.
+    /// correction, fix, log, health. Default: all of these in the run except masked and rotation.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// When a file is ended.
     #[command(flatten)]
     pub split: SplitArguments,
-    /// Go on in the next part of the recording if there is one (what `gyre run` starts).
+    /// Continue with the next part of the recording if there is one (as `gyre run` starts it).
     #[arg(long, hide = true)]
     pub continues: bool,
 }
@@ -29,15 +29,15 @@ pub struct RecordArguments {
 /// When a file of a recording is ended and the next one begun.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct SplitArguments {
-    /// Size from which on the recording goes on in the next file, MB; 0: any.
+    /// Size of a file before the recording continues in the next file, MB; 0: any.
     #[arg(long, default_value_t = 0, value_name = "MB")]
     pub split_mb: u64,
-    /// Time of the sensor after which the recording goes on in the next file, s; 0: any.
+    /// Time of the sensor before the recording continues in the next file, s; 0: any.
     #[arg(long, default_value_t = 0.0, value_name = "S")]
     pub split_s: f64,
 }
 
-/// Parses the name of a recording, which readers tell by its ending.
+/// Parses the name of a recording. Readers recognise the format by the ending.
 pub fn recording(text: &str) -> Result<PathBuf, String> {
     match text.strip_suffix(".mcap") {
         Some(name) if !name.is_empty() && !name.ends_with('/') => Ok(text.into()),

@@ -1,8 +1,8 @@
 //! The arguments of `gyre ros2`.
 
 use clap::Args;
-use gyre_export::FrameArguments;
-use gyre_operate::RunChoice;
+use gyre_tools::export::FrameArguments;
+use gyre_tools::operate::RunChoice;
 
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
@@ -14,8 +14,7 @@ pub struct Ros2Arguments {
     #[arg(long, value_name = "NUMBER")]
     pub domain: Option<u16>,
     /// Use only the network on which this machine has this address: 127.0.0.1 for this computer
-    /// alone. Default: all networks, or as ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE
-    /// say.
+    /// alone. Default: all networks, or as in ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE.
     #[arg(long, value_name = "ADDRESS")]
     pub interface: Option<String>,
     /// The namespace of the topics odom, map, objects and object_markers.
@@ -25,7 +24,7 @@ pub struct Ros2Arguments {
     #[command(flatten)]
     pub frames: FrameArguments,
     /// Publish no transforms of odometry and map, where another program does, such as
-    /// robot_localization. That of the radar stays.
+    /// robot_localization. The radar's transform stays.
     #[arg(long)]
     pub no_tf: bool,
     /// Publish no map, which takes a tenth of a processor at most.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gyre_operate::RunChoice;
+use gyre_tools::operate::RunChoice;
 
 /// The arguments of `gyre shadow`.
 #[derive(Debug, Args)]
@@ -26,7 +26,7 @@ pub struct ShadowArguments {
     /// Time after which it ends, s.
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
-    /// Write shadow.json, shadow.csv with a row for each item, and what the program prints,
+    /// Write shadow.json, shadow.csv with a row for each item, and the program's output,
     /// shadow.txt, to this folder.
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,

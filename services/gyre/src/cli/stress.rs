@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_run::Scenario;
+use gyre_terminal::inputs::Inputs;
 
 /// The arguments of `gyre stress`.
 #[derive(Debug, Args)]

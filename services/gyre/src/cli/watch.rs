@@ -3,7 +3,7 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::Args;
-use gyre_operate::RunChoice;
+use gyre_tools::operate::RunChoice;
 
 /// The arguments of `gyre watch`.
 #[derive(Debug, Args)]

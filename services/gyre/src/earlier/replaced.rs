@@ -1,6 +1,6 @@
-//! A complete run whose place another one takes. Its results stay until those of the new run are
-//! in place, and its journal lies aside until then: a new run that fails before it has a motion
-//! gives all of it back.
+//! A complete run that another run replaces. Its results stay until the results of the new run are
+//! in place, and its journal lies aside until then. If the new run fails before its first motion,
+//! all files are restored.
 
 use std::{ffi::OsStr, fs, path::Path};
 
@@ -16,10 +16,10 @@ use super::{CONFIGURATION, is_complete, state};
 const JOURNAL: &str = "journal";
 /// Files that the new run overwrites before it has results.
 const BESIDE: [&str; 2] = [CONFIGURATION, SIMULATED_TRUTH];
-/// Poses with which a run has a motion, and so results of its own.
+/// The least number of poses for a motion, and so for results.
 pub(super) const WITH_MOTION: usize = 2;
 
-/// Returns whether the results in the folder are those of a complete run that is being replaced.
+/// Returns whether the results in the folder belong to a complete run that is being replaced.
 pub(super) fn is_kept(out: &Out) -> bool {
     out.join(ASIDE).exists()
 }
@@ -38,11 +38,8 @@ pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
     storage::sync_folder(out.path())
 }
 
-/// Finishes what a kill has interrupted: the complete run is removed if the new one has its
-/// results, and given back if that has computed nothing.
-///
-/// # Errors
-/// A journal that cannot be read, or a file that cannot be renamed or removed.
+/// Finishes an interrupted replacement: the complete run is removed if the new run has its results,
+/// and restored if the new run has computed nothing.
 pub fn settle(out: &Out) -> Result<(), Failure> {
     match (is_whole(out), is_untouched(out)?) {
         (false, _) => Ok(remove(out)?),
@@ -51,16 +48,13 @@ pub fn settle(out: &Out) -> Result<(), Failure> {
     }
 }
 
-/// Returns whether the folder has all of a complete run, which another one was to replace.
+/// Returns whether the folder has all files of a complete run that was about to be replaced.
 fn is_whole(out: &Out) -> bool {
     !is_complete(out.path()) && out.join(ASIDE).join(mark()).exists()
 }
 
 /// Returns whether the run that is to replace a complete one has computed nothing: that is given
 /// back.
-///
-/// # Errors
-/// A journal that cannot be read.
 pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
@@ -86,7 +80,7 @@ pub(super) fn invalidate(out: &Out) -> Result<(), StorageError> {
     }
 }
 
-/// Removes a complete run, of which no results are left.
+/// Removes a complete run that has no results left.
 pub(super) fn remove(out: &Out) -> Result<(), StorageError> {
     match is_kept(out) {
         true => empty(&out.join(ASIDE), &out.join(JOURNAL)),
@@ -113,7 +107,7 @@ pub(super) fn give_back(out: &Out) -> Result<(), StorageError> {
     Ok(())
 }
 
-/// The file without which a journal is not that of a complete run.
+/// The file that marks a journal as belonging to a complete run.
 fn mark() -> &'static OsStr {
     Path::new(COMPLETE).file_name().unwrap_or_default()
 }
@@ -171,7 +165,7 @@ mod tests {
         }
     }
 
-    /// The folder of a complete run, the journal of which is put aside.
+    /// The folder of a complete run whose journal is put aside.
     fn being_replaced() -> (TempDir, Out) {
         let folder = tempfile::tempdir().unwrap();
         let out = Out::lock(folder.path()).unwrap();

@@ -17,7 +17,6 @@ pub struct Silence {
     reported: Option<i64>,
 }
 
-/// A report.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Report {
     pub sentence: String,
@@ -87,7 +86,7 @@ mod tests {
         }
     }
 
-    /// The reports of a second each, from 1 s on, of what was received by then.
+    /// The reports of one second each, starting at 1 s, for the azimuths received by then.
     fn reports(received: impl Fn(i64) -> Received, until_s: i64) -> Vec<(i64, Report)> {
         let mut silence = Silence::new("the radar".to_owned(), 0);
         (1..=until_s)

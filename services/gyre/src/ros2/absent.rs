@@ -3,27 +3,21 @@
 use std::process::ExitCode;
 
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::Sizes;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError};
+use gyre_stages::live_radar::Sizes;
 use gyre_terminal::Failure;
 
 use crate::{cli::Ros2Arguments, features::Absent};
 
 const ABSENT: Absent = Absent("ROS 2");
 
-/// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
+/// Refuses, since this build lacks ROS 2.
 pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
     Err(ABSENT.into())
 }
 
-/// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
+/// Refuses, since this build lacks ROS 2.
 pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
     Err(ABSENT.into())
 }
@@ -33,10 +27,7 @@ pub fn may_come(_: &Failure) -> bool {
     false
 }
 
-/// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
+/// Refuses, since this build lacks ROS 2.
 pub fn receive(
     _: &Launch,
     _: &SourceConfig,

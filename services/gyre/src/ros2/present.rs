@@ -4,7 +4,6 @@ use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::Sizes;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{
     Bridge, MapSettings, Settings,
@@ -13,16 +12,14 @@ use gyre_ros2_bridge::{
 use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+use gyre_stages::live_radar::Sizes;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::Ros2Arguments;
 
 /// Publishes the runs of a folder until a signal arrives.
-///
-/// # Errors
-/// There is no such run, or the domain cannot be joined.
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
-    // One who names the wrong folder is told at once.
+    // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
         ObservedRun::writing_to(&run)?;
@@ -66,9 +63,6 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
 }
 
 /// Asks the driver of a source for the sizes of its radar's scans.
-///
-/// # Errors
-/// No driver, or a radar that cannot be used.
 pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
     let settings = source::Settings::of(source, options)?;
     source::ask(&settings).map_err(|error: AskError| error.into())
@@ -81,9 +75,6 @@ pub fn may_come(error: &Failure) -> bool {
 }
 
 /// Receives the scans of a source.
-///
-/// # Errors
-/// The domain cannot be joined, or input that cannot be used.
 pub fn receive(
     launch: &Launch,
     source: &SourceConfig,

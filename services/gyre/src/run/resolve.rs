@@ -3,18 +3,15 @@
 use std::path::PathBuf;
 
 use gyre_configuration::{Configuration, calibration, strict::path_value};
-use gyre_inputs::Given;
 use gyre_results::absolute;
 use gyre_run::PlayedFrom;
+use gyre_terminal::inputs::Given;
 use gyre_terminal::{Failure, print};
 
 use super::results_folder;
 use crate::cli::RunArguments;
 
-/// Reads the configuration and resolves what it leaves open.
-///
-/// # Errors
-/// An invalid configuration, or a model that cannot be read.
+/// Reads the configuration and resolves its open settings.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
     if arguments.from.is_some() && given.data.is_none() {
@@ -25,7 +22,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     }
     let overrides = overrides(arguments, &given)?;
     let mut configuration = match (&given.configuration, &given.data) {
-        (Some(named), _) => gyre_inputs::configuration(named, &overrides)?,
+        (Some(named), _) => gyre_terminal::inputs::configuration(named, &overrides)?,
         (None, Some(data)) => {
             let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
             print::note(sentence);
@@ -59,15 +56,12 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let idle = configuration.without_effect(&arguments.inputs.set)?;
     idle.iter()
         .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
-    // The run's processes are told where it is.
+    // The run's processes receive the path of the run.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)
 }
 
 /// The overrides: the calibration, `--set`, the options; of two for one key the later one holds.
-///
-/// # Errors
-/// A calibration that cannot be read.
 fn overrides(arguments: &RunArguments, given: &Given) -> Result<Vec<String>, Failure> {
     let options = &arguments.options;
     let calibration = arguments.calibration.as_deref().map(calibration::overrides);

@@ -33,15 +33,12 @@ use crate::{
     waker::Waker,
 };
 
-/// Time after which it is said that the robot is waited for at the end.
+/// Time after which a message reports that the base is waiting for the robot at the end.
 const QUIET: Duration = Duration::from_secs(1);
 /// Time between two checks whether the robot has confirmed the end.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
-///
-/// # Errors
-/// A robot of another run, or a failure of the transport.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

@@ -12,35 +12,21 @@ use crate::NetworkError;
 /// A failure of a link, by whether a restart of its process may help.
 #[derive(Debug, Error)]
 pub enum LinkError {
-    /// The endpoints or the certificates cannot be used.
     #[error("link: {0}")]
     Network(#[from] NetworkError),
-    /// The network layer fails.
     #[error("cannot {action}: {reason}")]
-    Zenoh {
-        /// The operation.
-        action: String,
-        /// The reason.
-        reason: String,
-    },
-    /// The other side is of another run.
+    Zenoh { action: String, reason: String },
     #[error("{0}")]
     Refused(String),
-    /// The run cannot be observed, or the transport fails.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A run of its own cannot be made.
     #[error(transparent)]
     Supervise(#[from] SuperviseError),
-    /// The journal cannot be read or written.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A file cannot be read or written.
     #[error("{path}: {source}")]
     File {
-        /// The file.
         path: PathBuf,
-        /// The system error.
         source: std::io::Error,
     },
 }

@@ -42,7 +42,7 @@ pub(crate) struct Fetcher {
 
 struct State {
     stop: AtomicBool,
-    /// True if the thread tells the sender, at the stop, that nothing more is wanted.
+    /// True if the thread informs the sender, at the stop, that it needs no more messages.
     leaves: AtomicBool,
     /// True if the thread requests again, from `confirmed` on.
     again: AtomicBool,
@@ -60,9 +60,8 @@ struct State {
 pub(crate) struct Request {
     /// The key of the topic.
     pub key: String,
-    /// The first message.
     pub from: u64,
-    /// The generation of the messages before, 0 without any; `None` where no number is given anew.
+    /// The generation of the messages before, 0 without any; `None` if no number is given twice.
     pub generation: Option<u32>,
     /// The identity of this receiver, the same after its restart.
     pub receiver: String,
@@ -155,13 +154,13 @@ impl Fetcher {
         self.state.answered.load(Ordering::Relaxed) >= next
     }
 
-    /// Begins to tell the other side that nothing more is wanted, if it can be reached.
+    /// Begins to inform the other side, if it is reachable, that no more messages are needed.
     pub fn begin_to_leave(&self) {
         self.state.leaves.store(true, Ordering::Relaxed);
         self.state.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Tells the other side that nothing more is wanted, and waits while it can be reached.
+    /// Informs the other side that no more messages are needed, and waits while it is reachable.
     pub fn leave(mut self) {
         self.begin_to_leave();
         if let Some(thread) = self.thread.take() {
@@ -218,7 +217,8 @@ impl RequestLoop {
         }
     }
 
-    /// Tells the sender that nothing more is wanted, so that it need not wait for this receiver.
+    /// Informs the sender that no more messages are needed, so that it need not wait for this
+    /// receiver.
     fn send_done(&self) {
         let Request { key, receiver, .. } = &self.request;
         for _ in 0..DONE_ATTEMPTS {
@@ -233,7 +233,7 @@ impl RequestLoop {
 
     /// Sends one request, and takes the answers until they end; returns whether there were any.
     fn request(&mut self) -> bool {
-        // Before the number is read: what is confirmed after that is requested again.
+        // Before the number is read: messages confirmed after that are requested again.
         self.state.again.store(false, Ordering::Relaxed);
         let confirmed = self.state.confirmed.load(Ordering::Relaxed);
         self.request.from = self.request.from.max(confirmed);
@@ -310,7 +310,7 @@ impl RequestLoop {
         true
     }
 
-    /// Goes back to where a later generation than that of the messages before gives numbers anew.
+    /// Goes back to the first item that a later generation numbers again.
     fn go_back_to(&mut self, item: &Item) {
         let Request {
             from, generation, ..
@@ -324,7 +324,7 @@ impl RequestLoop {
         }
     }
 
-    /// Returns whether a message is new: what was requested twice may arrive twice.
+    /// Returns whether a message is new: a message that was requested twice may arrive twice.
     fn is_new(&self, item: &Item) -> bool {
         item.seq >= self.request.from && !(self.has_end && item.is(flag::END))
     }
@@ -345,7 +345,8 @@ impl RequestLoop {
     }
 }
 
-/// Returns whether an error says that no message follows; others are of the network layer.
+/// Returns whether an error means that no message follows; other errors come from the network
+/// layer.
 fn is_end(error: &ReplyError) -> bool {
     *error.payload().to_bytes() == *ENDED.as_bytes()
 }

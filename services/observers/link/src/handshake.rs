@@ -1,5 +1,5 @@
-//! The agreement of both sides of a split run on the item at which they continue, each time when
-//! the robot's side starts.
+//! The agreement of both sides of a split run on the item where they continue, at each start of the
+//! robot's side.
 
 use std::{fs, path::Path, thread, time::Duration};
 
@@ -11,7 +11,7 @@ use zenoh::{Session, Wait};
 
 use crate::{LinkError, Network, request::Question};
 
-/// Time between two questions before there is a run that waits by itself.
+/// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_SCANS: Question = Question {
@@ -32,12 +32,12 @@ pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     format!("gyre/split/{}/{side}", config.name)
 }
 
-/// Returns the key at which a base says where to continue.
+/// Returns the key where a base reports the item to continue from.
 pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
 
-/// Returns the key at which a robot says how large its scans are.
+/// Returns the key where a robot reports the size of its scans.
 pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
     format!("{}/scans", prefix(config, Side::Robot))
 }
@@ -50,9 +50,6 @@ pub struct ScanSize {
 }
 
 /// Waits for the robot and asks for the size of its scans, which a base needs that receives them.
-///
-/// # Errors
-/// A link that cannot be opened.
 pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
     let pause = || {
         thread::sleep(PAUSE);
@@ -89,7 +86,7 @@ pub(crate) struct Agreement {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StartAnswer {
-    /// Items up to this one will have poses; `None`: there are none yet.
+    /// Items up to this one will have poses; `None`: there are no poses yet.
     Go(Option<u64>),
     /// The robot has to ask again, for this reason.
     Wait(String),
@@ -98,7 +95,7 @@ pub(crate) enum StartAnswer {
 }
 
 impl Agreement {
-    /// Returns that of this side.
+    /// Returns the description of this side.
     pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
         let versioned = |name: &&'static str| {
             let version = topic(name).map_or("", |topic| topic.header.name);
@@ -145,7 +142,8 @@ impl Agreement {
         found.map_or("none", |(_, version)| version).to_owned()
     }
 
-    /// Returns a sentence that says why the robot's side is of another run; `None` if it is not.
+    /// Returns a sentence that explains why the robot's side belongs to a different run; `None` if
+    /// it is not.
     pub fn difference(&self, robot: &Self) -> Option<String> {
         let properties = robot.properties().into_iter().zip(self.properties());
         let properties = properties.map(|((key, robot), (_, base))| (key.to_owned(), robot, base));

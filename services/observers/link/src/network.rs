@@ -5,9 +5,9 @@ use std::{net::IpAddr, path::PathBuf};
 use gyre_run::LinkConfig;
 use thiserror::Error;
 
-/// The environment variable, and its value, with which zenoh does all its work in one thread.
+/// The environment variable, and its value, that make zenoh do all its work in one thread.
 ///
-/// By itself zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
+/// By default zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
 /// the connection does not allow (eclipse-zenoh/zenoh#2557): under load it breaks within seconds.
 /// Set it before the program starts; TLS is refused without.
 pub const ONE_THREAD: (&str, &str) = (
@@ -20,7 +20,7 @@ pub const ONE_THREAD: (&str, &str) = (
 pub struct Network {
     /// The name of the link, the same on both sides.
     pub name: String,
-    /// Endpoints at which this side waits, as in `tls/0.0.0.0:7447`.
+    /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,
     /// Endpoints that it connects to.
     pub connect: Vec<String>,
@@ -48,35 +48,27 @@ impl From<&LinkConfig> for Network {
 /// A network that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum NetworkError {
-    /// No endpoint is given.
     #[error(
         "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447"
     )]
     NoEndpoint,
-    /// The text is no endpoint.
     #[error("`{0}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT")]
     Malformed(String),
-    /// The endpoint is plain text on a network.
     #[error(
         "{0} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
     )]
     Plain(String),
-    /// The endpoint needs a certificate.
     #[error(
         "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
     )]
     NoCertificate {
-        /// The endpoint.
         endpoint: String,
-        /// The missing file.
         what: &'static str,
     },
-    /// A file cannot be read.
     #[error("{what} {path} cannot be read: {reason}")]
     File {
         /// The kind of the file.
         what: &'static str,
-        /// The file.
         path: PathBuf,
         /// The system's reason.
         reason: String,
@@ -86,12 +78,12 @@ pub enum NetworkError {
         "{0} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
     )]
     Public(String),
-    /// The name of the link cannot be part of a key.
     #[error("`{0}` is no name of a link: it has letters, digits, `-` and `_`")]
     Name(String),
 }
 
-/// The suffixes of names that no public authority certifies: private zones, and those of documents.
+/// The suffixes of names that no public authority certifies: private zones, and names reserved for
+/// documents.
 const PRIVATE_ZONES: [&str; 7] = [
     ".internal",
     ".lan",
@@ -111,9 +103,6 @@ enum Protocol {
 
 impl Network {
     /// Checks the endpoints, and that the files of TLS can be read.
-    ///
-    /// # Errors
-    /// One sentence that says what is missing.
     pub fn check(&self) -> Result<(), NetworkError> {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if self.name.is_empty() || !self.name.chars().all(is_word) {

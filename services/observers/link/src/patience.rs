@@ -11,7 +11,7 @@ const LONGEST: Duration = Duration::from_secs(15 * 60);
 const FIRST_ANSWER_SHARE: u32 = 4;
 /// The longest time for it.
 const LONGEST_FIRST: Duration = Duration::from_secs(30);
-/// The time that a message may take, in those of the one before.
+/// The time that a message may take, as a multiple of the time of the previous message.
 const MARGIN: u32 = 2;
 
 /// The time that a receiver waits for the next answer.
@@ -38,7 +38,7 @@ impl Patience {
         self.0 = (after * MARGIN).clamp(SHORTEST, LONGEST);
     }
 
-    /// Notes that none has come in time: the next one has twice of it.
+    /// Notes that no message has come in time: the next message has twice the time.
     pub fn lost(&mut self) {
         self.0 = (self.0 * 2).min(LONGEST);
     }

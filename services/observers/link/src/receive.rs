@@ -57,9 +57,6 @@ pub struct RemoteRun {
 }
 
 /// Waits for the sender. `None` on a request to stop.
-///
-/// # Errors
-/// The network cannot be used, or the sender is another version.
 pub fn ask(network: &Network, signals: &Signals) -> Result<Option<RemoteRun>, LinkError> {
     network.check()?;
     let Some(session) = network.open(|| Ok(signals.sleep(PAUSE)?))? else {
@@ -112,9 +109,6 @@ impl RemoteRun {
 }
 
 /// Receives until the run ends, or a signal requests a stop.
-///
-/// # Errors
-/// The folder has poses of another drive, or shared memory or the transport fails.
 pub fn receive(
     options: &ReceiveOptions,
     remote: RemoteRun,

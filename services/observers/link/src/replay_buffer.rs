@@ -8,14 +8,13 @@ use std::{
 };
 
 use bytemuck::Pod;
-use gyre_journal as journal;
-use gyre_loop_closure::LoggedLoops;
+use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{Hop, LoopHeader, MotionHeader, PoseHeader, StageId, flag};
-use gyre_stage::source::RecordedMessage;
+use gyre_stage::{StageError, source::RecordedMessage};
 
 use crate::LinkError;
 
-/// A message on its way: the bytes of its header, then those of its payload.
+/// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     /// The number of the message in its topic.
@@ -44,12 +43,11 @@ pub(crate) struct Place {
     /// The number of the next message.
     pub seq: u64,
     /// The generation of the newest one: messages of a later generation are wanted whatever their
-    /// numbers. `None`: no number is given anew.
+    /// numbers. `None`: no number is given twice.
     pub generation: Option<u32>,
 }
 
 impl Place {
-    /// Goes behind a message.
     pub fn pass(&mut self, message: &Message) {
         self.seq = message.seq.saturating_add(1);
         self.generation = self.generation.map(|_| message.generation);
@@ -64,9 +62,8 @@ impl Place {
 /// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// A message.
     Message(Message),
-    /// There is none yet.
+    /// There is no message yet.
     Nothing,
     /// There will be none.
     Ended,
@@ -131,7 +128,7 @@ impl ReplayBuffer for MemoryBuffer {
         let item = message.item().unwrap_or_default();
         let message = Message::of(message);
         let held = &mut *lock(&self.held);
-        // Masking was started again, and gives numbers anew: perhaps some that did not come.
+        // Masking was restarted and numbers again, perhaps including numbers that did not arrive.
         let is_void = |last: &mut Message| {
             let is_earlier = last.generation < message.generation;
             last.seq >= message.seq || is_earlier && last.seq >= item.numbered_from
@@ -209,7 +206,7 @@ impl Log for LoggedLoops {
     type Header = LoopHeader;
 
     fn read(&mut self, seq: u64) -> Result<Option<LoopHeader>, LinkError> {
-        let loops = self.refresh()?;
+        let loops = self.refresh().map_err(StageError::from)?;
         Ok(loops.get(seq as usize).copied())
     }
 }
@@ -253,7 +250,7 @@ impl<L: Log> LogBuffer<L> {
         let message = |logged| {
             Next::Message(Message {
                 seq,
-                // What a log has is never void.
+                // A message in a log is never void.
                 generation: 0,
                 bytes: bytemuck::bytes_of(&header(logged)).into(),
             })

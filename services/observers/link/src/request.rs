@@ -25,7 +25,6 @@ pub(crate) struct Question {
 pub(crate) type Answers = FifoChannelHandler<Reply>;
 
 impl Question {
-    /// Sends the question.
     pub fn send(
         self,
         session: &Session,
@@ -36,7 +35,7 @@ impl Question {
         asked.wait().map_err(|e| LinkError::zenoh(self.action, &e))
     }
 
-    /// Sends the question and waits for the answer; `None` if there is none.
+    /// Sends the question and waits for the answer; returns `None` without an answer.
     pub fn ask<A: DeserializeOwned>(
         self,
         session: &Session,

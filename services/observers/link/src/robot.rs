@@ -1,8 +1,8 @@
 //! The robot's side of a split run, in the place of the last stages.
 //!
 //! It journals the poses that come back as pose-integration does, so this side has all results too,
-//! and continues after a restart. It begins when the base has said which items will have poses:
-//! only then does it publish the newest pose, at which the source continues.
+//! and continues after a restart. It begins when the base has named the items that will have poses:
+//! only then does it publish the newest pose, where the source continues.
 
 use std::{collections::VecDeque, sync::Arc, thread};
 
@@ -27,9 +27,6 @@ use crate::{
 };
 
 /// Runs the robot's side until SIGTERM.
-///
-/// # Errors
-/// A base of another run, a journal that cannot be used, or a failure of the transport.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -279,7 +276,7 @@ impl Robot<'_> {
     }
 
     /// Returns the item of a pose with the times on this machine's clock: the work of the base
-    /// counts as that of the last stage here.
+    /// counts as part of the last stage here.
     fn timed(&self, item: Item) -> Item {
         let now_ns = clock::now_ns();
         let sent = self.sent.iter().find(|sent| sent.seq == item.seq);

@@ -14,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_loop_closure::LoggedLoops;
+use gyre_journal::loops::LoggedLoops;
 use gyre_messages::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
@@ -39,7 +39,7 @@ const NAME: &str = "link";
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
 const MAX_BYTES: usize = 64 << 20;
-/// Time in which a receiver reconnects whose sender was restarted just before the end.
+/// Time for a receiver to reconnect if its sender was restarted just before the end.
 const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
@@ -60,7 +60,6 @@ pub struct SendOptions {
 /// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// The counts by topic.
     pub topics: BTreeMap<String, (u64, u64)>,
     /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,
@@ -115,15 +114,12 @@ pub(crate) fn prefix(name: &str, sender: &str) -> String {
     format!("gyre/view/{name}/from/{sender}")
 }
 
-/// Returns the key at which any sender of a link describes its run.
+/// Returns the key where any sender of a link describes its run.
 pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
 
 /// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
-///
-/// # Errors
-/// There is no such run or topic, or the network cannot be used.
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
     options.network.check()?;
     let run = ObservedRun::writing_to(&options.out)?;
@@ -250,7 +246,7 @@ impl SentTopic<'_> {
             match self.observer.take() {
                 Ok(Some(message)) => self.buffer.add(&message),
                 Ok(None) => return Ok(()),
-                // The run judges what its stages send. The message counts as missed.
+                // The run judges the messages of its stages. The message counts as missed.
                 Err(StageError::Malformed { .. }) => {}
                 Err(error) => return Err(error),
             }
@@ -270,7 +266,7 @@ impl Logs {
         let loops = manifest
             .window
             .slam
-            .then(|| LoggedLoops::open(&manifest.out));
+            .then(|| LoggedLoops::open(&manifest.out).map_err(StageError::from));
         Ok(Self {
             poses: Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out))),
             loops: loops

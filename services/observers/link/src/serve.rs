@@ -23,7 +23,8 @@ use crate::{
 
 /// Time after which the receiver asks again, so that a sender forgets one that has gone.
 pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
-/// Time without a message after which an empty one tells the receiver that this end is still there.
+/// Time without a message after which an empty message shows the receiver that this end is still
+/// there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 /// Time to send the last answers.
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
@@ -32,12 +33,12 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The most requests of a topic that are answered at once. A receiver has one of each topic.
 const MAX_REQUESTS: usize = 64;
 
-/// The answer that says that no message follows.
+/// The answer that means that no message follows.
 pub(crate) const ENDED: &str = "ended";
 /// The parameter with the first message that is wanted.
 pub(crate) const FROM: &str = "from";
-/// The parameter with the generation of the newest message that the receiver has, where numbers may
-/// be given anew.
+/// The parameter with the generation of the newest message at the receiver, if numbers may be given
+/// again.
 pub(crate) const GENERATION: &str = "generation";
 /// The parameter with the identity of a receiver.
 pub(crate) const RECEIVER: &str = "receiver";
@@ -59,7 +60,7 @@ pub(crate) struct Offer {
     key: String,
     /// The highest number that was requested: all before it has arrived.
     asked: AtomicU64,
-    /// The same of the requests to which an answer has been sent.
+    /// As above, for the requests that have been answered.
     answered: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
@@ -75,7 +76,7 @@ pub(crate) struct Offer {
 struct ReceiverState {
     /// The number of its newest request.
     request: u64,
-    /// True once it has said that it wants no more.
+    /// True once the receiver has declined more messages.
     is_done: bool,
 }
 
@@ -91,7 +92,6 @@ impl Server {
         }
     }
 
-    /// Offers a topic.
     pub fn offer(
         &mut self,
         topic: &str,
@@ -149,7 +149,7 @@ impl Offer {
         !self.receivers().is_empty()
     }
 
-    /// Returns whether all receivers have confirmed the end: what was sent need not have arrived.
+    /// Returns whether all receivers have confirmed the end: arrival is not guaranteed.
     pub fn is_done(&self) -> bool {
         self.receivers().values().all(|receiver| receiver.is_done)
     }

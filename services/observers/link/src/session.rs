@@ -21,9 +21,6 @@ impl Network {
     /// Opens the session. A side that connects tries again until the other is there, with pauses
     /// that grow to 4 s; meanwhile `pause` is called, which returns true on a request to stop.
     /// `None` after one.
-    ///
-    /// # Errors
-    /// An endpoint or a certificate that cannot be used, or an error of `pause`.
     pub(crate) fn open(
         &self,
         mut pause: impl FnMut() -> Result<bool, LinkError>,

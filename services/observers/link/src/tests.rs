@@ -239,7 +239,7 @@ fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
     }
     add(3, 6, 10, flag::END);
     assert_eq!(take_of_generations(&ends.fetcher, 1), [(3, 10)]);
-    // Another session of the same receiver goes on behind what it has.
+    // Another session of the same receiver continues after the messages that it has.
     let request = |from, generation| Request {
         key: "gyre/test/topic".to_owned(),
         from,

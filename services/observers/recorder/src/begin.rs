@@ -11,7 +11,7 @@ use crate::{
     options::{HEALTH, LOG, Options},
 };
 
-/// A recording that is begun, or goes on in its next part.
+/// A recording that is begun, or continued in its next part.
 pub(crate) struct Begun {
     /// The head of the part to write.
     pub head: Head,
@@ -63,10 +63,7 @@ pub(crate) fn begin(
     })
 }
 
-/// Checks that a run that goes on can go on with its recording.
-///
-/// # Errors
-/// There is another recording of that name.
+/// Checks that a resumed run can continue its recording.
 pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
     match Ledger::of(out).read(file)? {
         Some(_) => Ok(()),
@@ -74,11 +71,8 @@ pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
     }
 }
 
-/// Checks that a recording that begins writes over none, and goes on in none, also where only later
-/// parts of one are left.
-///
-/// # Errors
-/// There is one.
+/// Checks that a new recording neither overwrites nor continues an existing one, even if only later
+/// parts are left.
 pub fn require_new(file: &Path) -> Result<(), RecorderError> {
     let first = parts(file).into_iter().next();
     // Also something else of that name, a folder for instance.

@@ -6,24 +6,20 @@ use gyre_recording::RecordingError;
 use gyre_stage::StageError;
 use thiserror::Error;
 
-/// An error because of which there is no recording, or no complete one.
+/// An error that leaves no recording, or an incomplete recording.
 #[derive(Debug, Error)]
 pub enum RecorderError {
-    /// The run cannot be observed.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// The file cannot be written, or one that is there not be read.
     #[error("cannot record: {0}; the run goes on without")]
     Recording(#[from] RecordingError),
-    /// A file is there.
     #[error("{0} exists, and a recording is never overwritten: name another file, or remove it")]
     Exists(PathBuf),
-    /// No such topic.
     #[error(
         "there is no topic `{0}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
     )]
     NoTopic(String),
-    /// The thread that writes has ended without a reason.
     #[error("the thread that writes the recording has ended")]
     Thread,
 }

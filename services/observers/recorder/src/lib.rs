@@ -1,17 +1,16 @@
 //! The recorder: an observer that writes the messages of a running run to an MCAP file.
 //!
-//! One thread takes messages from the observers' queues and copies them, another one compresses and
-//! writes. Between them is a queue with a limit in bytes. So a slow disk costs memory first, and
-//! then messages, which are counted. Nothing that the recorder does reaches the run: see
-//! [`gyre_stage::observer`].
+//! One thread takes messages from the observers' queues and copies them, and a second thread
+//! compresses and writes. Between them is a queue with a limit in bytes. So a slow disk costs
+//! memory first, and then messages, which are counted. Nothing that the recorder does reaches the
+//! run: see [`gyre_stage::observer`].
 //!
 //! Reading order: `options`, `recorder` (the loop), `begin`, `tap` (the observers), `queue`,
-//! `writing` (the other thread), `log_tail`, `health`.
+//! `writing` (the other thread), `health`.
 
 mod begin;
 mod error;
 mod health;
-mod log_tail;
 mod options;
 mod queue;
 mod recorder;
@@ -21,6 +20,5 @@ mod writing;
 pub use begin::{require_new, require_own};
 pub use error::RecorderError;
 pub use gyre_recording::{Ledger, Split};
-pub use log_tail::LogTail;
 pub use options::Options;
 pub use recorder::{Recorded, record};

@@ -6,7 +6,7 @@ use gyre_recording::Split;
 
 /// The topic of log lines, which is no topic of the transport.
 pub(crate) const LOG: &str = "log";
-/// That of the run's health, no more.
+/// The topic of the run's health.
 pub(crate) const HEALTH: &str = "health";
 
 /// The options of a recording.
@@ -14,13 +14,12 @@ pub(crate) const HEALTH: &str = "health";
 pub struct Options {
     /// The folder of the run's results.
     pub out: PathBuf,
-    /// The file.
     pub to: PathBuf,
     /// The topics, `log` and `health` among them; empty: the default ones that the run has.
     pub topics: Vec<String>,
     /// When a file is ended and the next part begun.
     pub split: Split,
-    /// True if an existing recording is one of this run, which another recorder has begun: it
-    /// goes on in its next part.
+    /// True if an existing recording belongs to this run, begun by another recorder: it continues
+    /// in its next part.
     pub continues: bool,
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_messages::{Message, Pose, Refined, Sender as PublishedBy, topic};
-use gyre_recording::SplitWriter;
+use gyre_recording::{LogTail, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, clock, launch,
     observer::{ObservedRun, wait_for_any},
@@ -21,7 +21,6 @@ use crate::{
     RecorderError,
     begin::{Begun, begin},
     health::health,
-    log_tail::LogTail,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
     tap::{Counts, Tap},
@@ -47,7 +46,6 @@ const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 /// A recording that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
-    /// The file.
     pub path: PathBuf,
     /// The messages of each topic.
     pub counts: Vec<Counts>,
@@ -90,9 +88,6 @@ impl fmt::Display for Recorded {
 }
 
 /// Records a run until it ends, or a signal requests a stop.
-///
-/// # Errors
-/// There is no such run or topic, or the file cannot be written.
 pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
@@ -183,7 +178,7 @@ struct Recorder<'run> {
     is_of_run: bool,
     /// Missed messages that the log has reported.
     reported: u64,
-    /// The time at which the next sentence about them is due.
+    /// The time of the next message about missed messages.
     due: Instant,
 }
 
@@ -194,8 +189,8 @@ impl Recorder<'_> {
             // Before the queues are emptied: the messages before the end are still there.
             let has_ended = self.run.has_ended();
             self.take_all()?;
-            // As long as poses are to come masking may be killed, and number anew what it has sent,
-            // the end of the stream too.
+            // As long as poses are to come, masking may be killed and may number its messages
+            // again, even the end of the stream.
             let is_last = |tap: &Tap<'_>| tap.counts().topic == Pose::TOPIC;
             let have_ended = self.taps.iter().any(is_last) && self.taps.iter().all(Tap::has_ended);
             if has_ended || have_ended || writing.is_finished() {

@@ -13,7 +13,6 @@ use crate::queue::{Entry, Sender};
 /// The numbers of messages of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts {
-    /// The topic.
     pub topic: &'static str,
     /// Messages that were put into the queue.
     pub recorded: u64,

@@ -9,10 +9,7 @@ use crate::queue::{Entry, Receiver, Taken};
 /// Time between two checks for a due chunk while nothing is received.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 
-/// Writes what comes until the queue ends; returns the number of messages missed by topic.
-///
-/// # Errors
-/// The file cannot be written.
+/// Writes messages until the queue ends; returns the number of messages missed by topic.
 pub(crate) fn write(
     mut recording: SplitWriter,
     queue: &Receiver,

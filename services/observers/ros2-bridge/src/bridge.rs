@@ -40,9 +40,6 @@ pub struct Bridge {
 
 impl Bridge {
     /// Joins the domain and opens all topics.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or a name is none of ROS 2.
     pub fn open(settings: Settings) -> Result<Self, NodeError> {
         let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
         Ok(Self {
@@ -66,10 +63,7 @@ impl Bridge {
         })
     }
 
-    /// Publishes until a signal arrives. `say` takes sentences for the person at the terminal.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
+    /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
     pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
         self.mounting.send(mounted(&self.shared));
         let shared = &self.shared;

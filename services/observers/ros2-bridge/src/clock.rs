@@ -7,9 +7,9 @@ use gyre_stage::clock;
 /// 2001-01-01, and the last second that ROS 2 can write, ns since 1970.
 const YEARS_NS: Range<i64> = 978_307_200_000_000_000..(i32::MAX as i64) * 1_000_000_000;
 
-/// Converts the stamps of a run to those of ROS, which are times since 1970. The stamps of a radar
-/// or a recording that has the time are left as they are. To all others the same offset is added,
-/// so that the first one is now: intervals stay those of the sensor.
+/// Converts the stamps of a run to times of ROS, which count from 1970. The stamps of a
+/// radar or a recording that has the time are left unchanged. All other stamps get the same offset,
+/// so that the first stamp is the present time: intervals stay as the sensor measured them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
     offset_ns: i64,

@@ -124,7 +124,8 @@ fn follow_run(
     Ok(())
 }
 
-/// Publishes a pose as odometry and as transforms; that of the map comes from the loops of SLAM.
+/// Publishes a pose as odometry and as transforms; the map's transform comes from the loops of
+/// SLAM.
 fn publish(
     shared: &Shared,
     state: &SharedRunState,
@@ -162,7 +163,7 @@ fn publish(
     topics.odometry.send(odometry);
 }
 
-/// Returns a time of the run as a time of ROS, and says of the first one if they differ.
+/// Returns a time of the run as a time of ROS, and reports the first difference between the two.
 fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
     let (stamp_ns, is_first) = state.stamp_ns(time_ns);
     if is_first && stamp_ns != time_ns {
@@ -222,7 +223,7 @@ pub fn follow_objects(shared: &Shared, mut topics: ObjectTopics, say: fn(&str)) 
 }
 
 impl ObjectTopics {
-    /// Publishes the objects of a scan, also where there are none.
+    /// Publishes the objects of a scan, even an empty list.
     fn publish(
         &mut self,
         shared: &Shared,

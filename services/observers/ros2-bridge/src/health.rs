@@ -17,7 +17,6 @@ use crate::{
     run_state::{RunPhase, RunState, Shared},
 };
 
-/// Time between two reports.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// The counts of the last report.
@@ -126,7 +125,6 @@ fn figures(status: &Status) -> Vec<KeyValue> {
     figures
 }
 
-/// Returns the diagnostics of one process.
 fn process(process: &ProcessStatus) -> DiagnosticStatus {
     let level = match process.activity {
         Activity::Waiting | Activity::Working | Activity::Running => OK,
@@ -214,8 +212,8 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         assert_eq!(levels(&state, None), [STALE]);
-        // What was dropped before the bridge began, or while the supervisor did not answer, is not
-        // dropped now.
+        // Drops from before the bridge began, or while the supervisor did not answer, do not count
+        // as present drops.
         state.phase = RunPhase::Working;
         assert_eq!(levels(&state, Some(status(9))), [OK, OK, ERROR]);
         assert_eq!(levels(&state, None), [OK]);

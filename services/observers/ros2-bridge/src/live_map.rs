@@ -22,7 +22,7 @@ use crate::{
 
 /// The shortest time between two maps.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// The factor by which the pause before the next map is longer than the drawing of the last one.
+/// The pause before the next map, as a multiple of the time for drawing the last map.
 const PAUSE_FACTOR: u32 = 9;
 
 /// A map that cannot be drawn.

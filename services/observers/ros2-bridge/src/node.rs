@@ -18,35 +18,16 @@ const MAX_WAIT: Duration = Duration::from_millis(100);
 /// A node that cannot be made, or a topic.
 #[derive(Debug, Error)]
 pub enum NodeError {
-    /// The domain cannot be joined.
     #[error("cannot join domain {domain} of ROS 2: {reason}")]
-    Domain {
-        /// The domain.
-        domain: u16,
-        /// The reason.
-        reason: String,
-    },
-    /// The name is invalid in ROS 2.
+    Domain { domain: u16, reason: String },
     #[error(
         "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
     )]
-    Name {
-        /// The name.
-        name: String,
-        /// The reason.
-        reason: String,
-    },
-    /// A topic cannot be opened.
+    Name { name: String, reason: String },
     #[error("cannot open the topic {topic} of ROS 2: {reason}")]
-    Topic {
-        /// The topic.
-        topic: String,
-        /// The reason.
-        reason: String,
-    },
+    Topic { topic: String, reason: String },
 }
 
-/// A node.
 pub struct Node {
     node: ros2_client::Node,
     context: Context,
@@ -89,9 +70,6 @@ fn join(domain: &Domain) -> Result<DomainParticipant, String> {
 
 impl Node {
     /// Joins a domain as a node of this name in this namespace, such as `/` or `/robot`.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or a name is none.
     pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, NodeError> {
         let failed = |reason: String| NodeError::Domain {
             domain: domain.id(),
@@ -114,9 +92,6 @@ impl Node {
     }
 
     /// Returns the name on DDS of a topic, absolute or relative to the namespace.
-    ///
-    /// # Errors
-    /// The name is none.
     pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
@@ -133,10 +108,6 @@ impl Node {
         }
     }
 
-    /// Publishes on a topic.
-    ///
-    /// # Errors
-    /// The name is none, or the topic cannot be opened.
     pub fn publish<M: Ros2Message>(
         &mut self,
         topic: &str,
@@ -150,9 +121,6 @@ impl Node {
     }
 
     /// Subscribes to a topic reliably, with room for so many messages that are not yet taken.
-    ///
-    /// # Errors
-    /// The name is none, or the topic cannot be opened.
     pub fn subscribe<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,
@@ -163,11 +131,8 @@ impl Node {
         subscription.map_err(|error| topic_error(topic, &error))
     }
 
-    /// Subscribes to a topic of which messages may be lost, as drivers publish what a sensor
-    /// measures, with room for so many messages that are not yet taken.
-    ///
-    /// # Errors
-    /// The name of the topic is none.
+    /// Subscribes to a lossy topic, as drivers use for sensor data, with room for `depth` messages
+    /// that are not yet taken.
     pub fn subscribe_to_sensor<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,

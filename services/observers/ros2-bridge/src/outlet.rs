@@ -11,7 +11,6 @@ pub struct Outlet<M: Serialize> {
 }
 
 impl<M: Serialize> Outlet<M> {
-    /// Wraps a publisher.
     pub fn new(publisher: Publisher<M>) -> Self {
         Self {
             publisher,

@@ -19,7 +19,6 @@ use crate::{Mounting, clock::Clock};
 pub struct Shared {
     /// The folder of the results of the run.
     pub out: PathBuf,
-    /// Names of the frames.
     pub frames: Frames,
     /// The radar on the vehicle.
     pub mounting: Mounting,
@@ -48,22 +47,18 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The state of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunState {
-    /// The phase.
     pub phase: RunPhase,
     /// The clock of its stamps, from its first pose on.
     pub clock: Option<Clock>,
     /// The odometry frame in the map frame, both of the radar, in a run with SLAM.
     pub map_from_odometry: Option<Pose>,
-    /// The poses.
     pub poses: Counts,
     /// The scans whose objects are published, in a run that tracks them.
     pub objects: Counts,
     /// Messages for which readers left no room.
     pub unsent: u64,
-    /// Maps that were published.
     pub maps: u64,
     /// The reason why something is not published.
     pub notice: Option<String>,
@@ -76,14 +71,14 @@ pub struct Counts {
     pub first: Option<u64>,
     /// The number of the newest one.
     pub newest: Option<u64>,
-    /// Those that were published.
     pub published: u64,
     /// Those that came too fast for the bridge.
     pub missed: u64,
 }
 
 impl Counts {
-    /// Counts a message, and what is missing before it. False for one that was published before.
+    /// Counts a message, and the messages missing before it. False for one that was published
+    /// before.
     pub fn count(&mut self, seq: u64) -> bool {
         let next = self.newest.map_or(seq, |newest| newest + 1);
         if seq < next {
@@ -112,17 +107,14 @@ impl RunState {
     }
 }
 
-/// The phase of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPhase {
-    /// There is none yet.
+    /// There is no pose yet.
     #[default]
     Waiting,
-    /// It works.
     Working,
     /// The last scan has its pose; results are being written.
     Finishing,
-    /// It has ended.
     Ended,
 }
 
@@ -168,7 +160,6 @@ impl Shared {
         *locked(&self.shown) = state.clone();
     }
 
-    /// Returns the run that is shown.
     pub fn shown(&self) -> SharedRunState {
         locked(&self.shown).clone()
     }

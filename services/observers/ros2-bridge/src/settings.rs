@@ -17,7 +17,6 @@ pub struct Settings {
     pub domain: Domain,
     /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
     pub namespace: String,
-    /// Names of the frames.
     pub frames: Frames,
     /// The radar on the vehicle.
     pub mounting: Mounting,
@@ -30,7 +29,6 @@ pub struct Settings {
 /// Returns the settings of the map of the run in a folder, or why it has none.
 pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 
-/// The settings of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
     /// Cells and ranges.

@@ -12,15 +12,15 @@ use std::time::Duration;
 
 use gyre_colossus::Constants;
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::{encoder_counts, silence};
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
 use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
+use gyre_stages::live_radar::{encoder_counts, silence};
 
 pub use ask::{AskError, ask};
 pub use fixes::FixSettings;
-pub use gyre_live_radar::Sizes;
+pub use gyre_stages::live_radar::Sizes;
 
 /// The topic of an inertial sensor by REP-145.
 const IMU: &str = "/imu/data";
@@ -55,9 +55,6 @@ pub struct Settings {
 impl Settings {
     /// Returns the settings of the section `[source]`, with the constants of the section
     /// `[dataset]`.
-    ///
-    /// # Errors
-    /// No such domain or interface.
     pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, DomainError> {
         let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
         Ok(Self {
@@ -73,7 +70,7 @@ impl Settings {
         })
     }
 
-    /// The topic of the configuration, beside that of the azimuths.
+    /// The topic of the configuration, beside the topic of the azimuths.
     fn configuration_topic(&self) -> String {
         match self.topic.rsplit_once('/') {
             Some((place, _)) => format!("{place}/configuration_data"),
@@ -83,10 +80,6 @@ impl Settings {
 }
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
-///
-/// # Errors
-/// A domain that cannot be joined, a radar whose scans are larger than at the start of the run, or
-/// a failure of the transport.
 pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, StageError> {
     let gyro: GyroConfig = launch.section("gyro")?;
     let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());

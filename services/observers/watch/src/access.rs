@@ -13,7 +13,7 @@ use subtle::ConstantTimeEq;
 
 /// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
-/// The shortest token that is taken from a file.
+/// The minimum length of a token in a file.
 const MIN_TOKEN: usize = 16;
 
 /// The origins of viewers' pages: Foxglove's site, and the files of an application, which no site
@@ -26,7 +26,7 @@ pub struct Token(String);
 
 /// The conditions for an answer to a request.
 pub struct Access {
-    /// The token; none is needed from this machine.
+    /// The token; `None`: only this machine has access.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
@@ -52,9 +52,6 @@ pub enum Verdict {
 
 impl Token {
     /// Creates a random one.
-    ///
-    /// # Errors
-    /// The system has no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; TOKEN_BYTES];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
@@ -64,9 +61,6 @@ impl Token {
     }
 
     /// Reads the token of a file, or writes a random one there if there is no such file.
-    ///
-    /// # Errors
-    /// The file cannot be read or written, or holds no token.
     pub fn of_file(path: &Path) -> io::Result<Self> {
         match fs::read_to_string(path) {
             Ok(text) => Self::parse(text.trim()),

@@ -1,23 +1,13 @@
-//! Connections: a bounded number of them, none of which keeps its permit by silence, or by not
-//! reading its answer. If there is no permit for another one, a connection gives way that has not
-//! shown that it may read.
+//! Connections: a bounded number of them. A connection loses its permit by silence, and by not
+//! reading its answer.
 
-mod permits;
 mod stream;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    net::IpAddr,
-    pin::pin,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Duration,
-};
+use std::{pin::pin, sync::Arc, time::Duration};
 
-use axum::{Extension, Router};
+use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
@@ -25,18 +15,17 @@ use hyper_util::{
 };
 use tokio::{
     net::{TcpListener, TcpStream},
-    sync::watch,
+    sync::{Semaphore, watch},
     time,
 };
 
-use permits::Permits;
 use stream::Timed;
 
 /// The limits of connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// The most connections with requests at once. Streams have permits of their own.
-    pub connections: usize,
+    pub connections: u32,
     /// Time for the head of a request, from the connection or from the answer before.
     pub request: Duration,
     /// Time for the client to take an answer.
@@ -53,52 +42,34 @@ impl Default for Limits {
     }
 }
 
-/// A connection, as the requests on it know it.
-#[derive(Clone, Debug, Default)]
-pub struct Peer(Arc<AtomicBool>);
-
-impl Peer {
-    /// It has shown that it may read: it keeps its permit when others come.
-    pub fn keep_place(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    fn keeps_place(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
 /// Time until the next try where the system refuses a connection, as for want of descriptors.
 const RETRY: Duration = Duration::from_millis(100);
 
-/// Serves until `stop` holds; requests that are being answered then have their answers. Each
-/// request has its [`Peer`] as an extension.
+/// Serves until `stop` holds; requests that are being answered then have their answers.
 pub async fn serve(
     listener: TcpListener,
     router: Router,
     limits: Limits,
     mut stop: watch::Receiver<bool>,
 ) {
-    let permits = Arc::new(Permits::new(limits.connections));
+    let permits = Arc::new(Semaphore::new(limits.connections as usize));
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new())
         .header_read_timeout(limits.request);
     loop {
         let next = async {
-            permits.wait_for_room().await;
-            accept(&listener).await
+            let permit = Arc::clone(&permits).acquire_owned().await;
+            (accept(&listener).await, permit)
         };
-        let (stream, address) = tokio::select! {
+        let (stream, permit) = tokio::select! {
             next = next => next,
             () = stopped(&mut stop) => break,
         };
-        let (permit, peer) = permits.take(address);
-        let number = permit.number();
-        let service = TowerToHyperService::new(router.clone().layer(Extension(peer)));
+        let service = TowerToHyperService::new(router.clone());
         let io = TokioIo::new(Timed::new(stream, limits.answer));
         let connection = http.serve_connection(io, service).with_upgrades();
         let mut stop = stop.clone();
-        let task = tokio::spawn(async move {
+        tokio::spawn(async move {
             let mut connection = pin!(connection);
             // A reader may disconnect at any time.
             tokio::select! {
@@ -110,19 +81,19 @@ pub async fn serve(
             }
             drop(permit);
         });
-        permits.let_end(number, task.abort_handle());
     }
-    permits.wait_for_end().await;
+    // All connections have ended.
+    let _ = permits.acquire_many(limits.connections).await;
 }
 
 async fn stopped(stop: &mut watch::Receiver<bool>) {
     let _ = stop.wait_for(|stop| *stop).await;
 }
 
-async fn accept(listener: &TcpListener) -> (TcpStream, IpAddr) {
+async fn accept(listener: &TcpListener) -> TcpStream {
     loop {
         match listener.accept().await {
-            Ok((stream, address)) => return (stream, address.ip()),
+            Ok((stream, _)) => return stream,
             Err(_) => time::sleep(RETRY).await,
         }
     }

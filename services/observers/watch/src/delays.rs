@@ -48,7 +48,6 @@ pub struct StageDelays {
     stage: &'static str,
     /// From the publication by the stage before to the start of the work.
     hand_over: Percentiles,
-    /// Of the work.
     work: Percentiles,
 }
 

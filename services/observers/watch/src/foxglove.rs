@@ -1,8 +1,8 @@
 //! The topics of a run for Foxglove and Lichtblick, by their WebSocket protocol (`foxglove.sdk.v1`,
 //! once `foxglove.websocket.v1`).
 //!
-//! A channel is what a viewer can subscribe to. A topic of the run is observed only while a viewer
-//! wants one of its channels. Messages are encoded once, by the encoders of recordings
+//! A viewer subscribes to channels. A topic of the run is observed only while a viewer wants one of
+//! its channels. Messages are encoded once, by the encoders of recordings
 //! ([`gyre_recording::view`]), and wait for each viewer in a `viewer_queue` of bounded size: a slow
 //! viewer loses messages, and nothing waits for it.
 //!

@@ -8,9 +8,6 @@ use serde::Serialize;
 
 /// A message to the page: the length of the header (u32, little-endian), the header in JSON, and
 /// the payload, deflated (RFC 1951).
-///
-/// # Errors
-/// The header is no JSON; memory has no room.
 pub fn encode(header: &impl Serialize, payload: &[u8]) -> std::io::Result<Bytes> {
     let header = serde_json::to_vec(header)?;
     let mut message = (header.len() as u32).to_le_bytes().to_vec();

@@ -58,7 +58,7 @@ impl JournalTrack {
         while self.next <= self.newest && self.next - before < SLICE as u64 {
             match records.next() {
                 Some(Ok(pose)) if !pose.item.is(flag::END) => add(&pose),
-                // What the journal lacks is not drawn.
+                // Poses that the journal lacks are not drawn.
                 _ => self.next = self.newest,
             }
             self.next += 1;

@@ -37,7 +37,7 @@ pub struct Missed {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
-    /// There is none yet.
+    /// The run has not started yet.
     #[default]
     Waiting,
     /// It works.
@@ -61,11 +61,10 @@ impl RunState {
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(tag = "kind", rename = "run")]
 pub struct RunInfo {
-    /// Another one at each start of a run.
+    /// Each start of a run has a new id.
     pub id: String,
     /// The folder of its results.
     pub out: String,
-    /// The state.
     pub state: RunState,
     /// True if it drops scans rather than wait.
     pub live: bool,
@@ -83,7 +82,6 @@ pub struct RunInfo {
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename = "health")]
 pub struct HealthReport {
-    /// Counts of the run.
     #[serde(flatten)]
     pub counts: RunCounts,
     /// Poses a second since the last report.
@@ -98,7 +96,6 @@ pub struct HealthReport {
     pub processes: Vec<Process>,
 }
 
-/// Counts of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RunCounts {
     /// Scans that the source has published.
@@ -140,7 +137,6 @@ pub struct ObjectsReport {
     pub objects: Vec<ObjectReport>,
 }
 
-/// An object.
 #[derive(Debug, Serialize)]
 pub struct ObjectReport {
     pub id: u64,

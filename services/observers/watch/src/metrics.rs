@@ -1,6 +1,6 @@
-//! The metrics of the run, in the text formats of Prometheus.
+//! The metrics of the run, in the text format OpenMetrics.
 
-use std::{collections::BTreeMap, fmt};
+use std::fmt;
 
 use prometheus_client::{
     collector::Collector,
@@ -13,9 +13,8 @@ use gyre_messages::Basis;
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
-/// The type of the newer format, which Prometheus accepts in its requests.
-const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-const TEXT: &str = "text/plain; version=0.0.4; charset=utf-8";
+/// The type of the answer.
+pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// Counts and states at the time of a scrape.
 #[derive(Debug)]
@@ -25,18 +24,8 @@ struct Snapshot {
     processes: Vec<Process>,
 }
 
-/// Returns the type of the answer and its text: OpenMetrics if accepted, else the older format.
-pub fn scrape(view: &RunView, accepted: &[u8]) -> (&'static str, String) {
-    let text = open_metrics(view);
-    let takes_open_metrics =
-        String::from_utf8_lossy(accepted).contains("application/openmetrics-text");
-    match takes_open_metrics {
-        true => (OPEN_METRICS, text),
-        false => (TEXT, older(&text)),
-    }
-}
-
-fn open_metrics(view: &RunView) -> String {
+/// Returns the text of the answer.
+pub fn scrape(view: &RunView) -> String {
     let mut registry = Registry::with_prefix("gyre");
     let run = view.run();
     let labels = vec![
@@ -65,39 +54,6 @@ fn open_metrics(view: &RunView) -> String {
     // Writing to a string does not fail.
     let _ = encode(&mut text, &registry);
     text
-}
-
-/// Returns the older format: `_total` in all names of a counter, and an info is a gauge.
-fn older(text: &str) -> String {
-    let kind = |line: &'_ str| -> Option<(String, &'static str)> {
-        let (name, kind) = line.strip_prefix("# TYPE ")?.split_once(' ')?;
-        let suffix = match kind {
-            "counter" => "_total",
-            "info" => "_info",
-            _ => return None,
-        };
-        Some((name.to_owned(), suffix))
-    };
-    let renamed: BTreeMap<String, &str> = text.lines().filter_map(kind).collect();
-    let mut older = String::with_capacity(text.len());
-    for line in text.lines() {
-        let mut words = line.splitn(4, ' ');
-        let words = [(); 4].map(|()| words.next().unwrap_or_default());
-        match words {
-            ["#", "EOF" | "UNIT", ..] => continue,
-            ["#", what @ ("HELP" | "TYPE"), name, rest] if renamed.contains_key(name) => {
-                let rest = if (what, rest) == ("TYPE", "info") {
-                    "gauge"
-                } else {
-                    rest
-                };
-                older.push_str(&format!("# {what} {name}{} {rest}", renamed[name]));
-            }
-            _ => older.push_str(line),
-        }
-        older.push('\n');
-    }
-    older
 }
 
 impl Collector for Snapshot {
@@ -139,7 +95,7 @@ impl Snapshot {
         gauge(encoder, "scans_in_flight", help, counts.in_flight)
     }
 
-    /// Encodes what the motions rest on, and the part of gyro, wheels and Doppler.
+    /// Encodes the basis of the motions, and the share of gyro, wheels and Doppler.
     fn encode_witnesses(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         let counts = &self.counts.witnesses;
         let by_basis = Basis::ALL.iter().zip(counts.by_basis);
@@ -329,35 +285,30 @@ mod tests {
         view
     }
 
-    /// The families that a text describes, and the names of its samples.
-    fn families(text: &str) -> BTreeMap<&str, &str> {
-        let types = text.lines().filter_map(|line| line.strip_prefix("# TYPE "));
-        types.filter_map(|line| line.split_once(' ')).collect()
-    }
-
     #[test]
-    fn each_sample_of_the_older_format_is_of_a_family_with_a_type_and_a_help() {
-        let (kind, text) = scrape(&view(), b"text/plain");
-        assert_eq!(kind, TEXT);
-        let families = families(&text);
+    fn each_sample_is_of_a_family_with_a_type_and_a_help() {
+        let text = scrape(&view());
+        let types = text.lines().filter_map(|line| line.strip_prefix("# TYPE "));
+        let families: Vec<_> = types.filter_map(|line| line.split_once(' ')).collect();
         for line in text.lines().filter(|line| !line.starts_with('#')) {
             let name = line.split(['{', ' ']).next().unwrap_or_default();
-            let of_histogram = ["_bucket", "_sum", "_count"]
+            let suffixes = ["_bucket", "_sum", "_count", "_total", "_info"];
+            let mut stems = suffixes
                 .iter()
-                .find_map(|suffix| name.strip_suffix(suffix));
-            let family = of_histogram.unwrap_or(name);
-            assert!(families.contains_key(family), "{line}");
+                .filter_map(|suffix| name.strip_suffix(suffix));
+            let family = stems.next().unwrap_or(name);
+            assert!(families.iter().any(|(name, _)| *name == family), "{line}");
             assert!(text.contains(&format!("# HELP {family} ")), "{line}");
             let value = line.rsplit(' ').next().map(str::parse::<f64>);
             assert!(matches!(value, Some(Ok(_))), "{line}");
         }
-        for (name, kind) in families {
-            assert_eq!(name.ends_with("_total"), kind == "counter", "{name}");
+        for (name, _) in families {
             assert!(
                 name.starts_with("gyre_") && !name.starts_with("gyre_gyre"),
                 "{name}"
             );
         }
+        assert!(text.ends_with("# EOF\n"), "{text}");
         let delays = "gyre_hop_seconds_sum{stage=\"masking\",part=\"work\"} 0.003";
         assert!(text.contains(delays), "{text}");
     }
@@ -366,10 +317,12 @@ mod tests {
     fn alarms_are_of_metrics_that_exist_and_one_is_of_a_run_that_has_ended() {
         let rules = include_str!("../../../../configs/prometheus/gyre.rules.yml");
         assert!(rules.contains("expr: gyre_up == 0\n"));
-        let (_, text) = scrape(&view(), b"text/plain");
+        let text = scrape(&view());
         let words = rules.split(|c: char| !c.is_alphanumeric() && c != '_');
         for name in words.filter(|word| word.starts_with("gyre_")) {
-            assert!(text.contains(name), "{name}");
+            // A counter without a sample is named without its ending.
+            let family = name.trim_end_matches("_total").trim_end_matches("_bucket");
+            assert!(text.contains(&format!("# TYPE {family} ")), "{name}");
         }
     }
 
@@ -423,10 +376,10 @@ mod tests {
         (record.outcome, record.gyro, record.wheels) =
             (outcome::PREDICTED, gyro::REFUSED, wheels::USED);
         view.add_to_track(&pose);
-        // The first pose of a chain is that of no motion.
+        // The first pose of a chain has no motion.
         pose.item.flags = flag::BREAK;
         view.add_to_track(&pose);
-        let (_, text) = scrape(&view, b"text/plain");
+        let text = scrape(&view);
         for line in [
             "gyre_motions_total{basis=\"dead reckoning\"} 1",
             "gyre_motions_total{basis=\"radar only\"} 0",
@@ -469,19 +422,7 @@ mod tests {
         ] {
             assert!(text.lines().any(|it| it == line), "{line}: {text}");
         }
-        let (_, without) = scrape(&view(), b"text/plain");
+        let without = scrape(&view());
         assert!(!without.contains("gyre_sample"), "{without}");
-    }
-
-    #[test]
-    fn who_accepts_the_newer_format_receives_it() {
-        let (kind, text) = scrape(
-            &view(),
-            b"application/openmetrics-text;version=1.0.0,*/*;q=0.1",
-        );
-        assert_eq!(kind, OPEN_METRICS);
-        assert!(text.ends_with("# EOF\n"));
-        assert_eq!(families(&text).get("gyre_poses"), Some(&"counter"));
-        assert!(text.contains("\ngyre_poses_total 0\n"), "{text}");
     }
 }

@@ -41,9 +41,6 @@ pub struct Followed {
 }
 
 /// Starts the threads. They end when the view is stopped.
-///
-/// # Errors
-/// The system refuses a thread.
 pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
     let start = |name: &str, follow: fn(&Followed)| {
         let followed = Arc::clone(followed);
@@ -111,7 +108,8 @@ fn await_end(view: &RunView, run: &ObservedRun) {
     }
 }
 
-/// Follows the poses to their end. The track is that of the journal, and goes on with them.
+/// Follows the poses to their end. The track begins with the poses of the journal, and continues
+/// with the published ones.
 fn follow_poses(
     followed: &Followed,
     run: &ObservedRun,
@@ -150,7 +148,7 @@ fn follow_poses(
     Ok(())
 }
 
-/// Draws what the track still lacks of the journal when no more poses come.
+/// Draws the remaining poses of the journal when no more poses come.
 fn draw_the_rest(view: &RunView, track: &mut JournalTrack) {
     while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
 }

@@ -61,7 +61,6 @@ pub fn protect(headers: &mut HeaderMap) {
     }
 }
 
-/// Returns a file.
 pub fn file(kind: &'static str, content: &'static str) -> Response {
     ([(header::CONTENT_TYPE, kind)], content).into_response()
 }

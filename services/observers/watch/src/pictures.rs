@@ -41,9 +41,6 @@ struct ScanPicture {
 }
 
 /// Makes a picture of a scan: the strongest return in each cell.
-///
-/// # Errors
-/// Memory has no room.
 pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Bytes> {
     let geometry = &scan.geometry;
     let azimuths = geometry.azimuths.min(MAX_AZIMUTHS);
@@ -117,9 +114,6 @@ struct RasterPicture {
 }
 
 /// Makes a picture of a masked raster: the strongest value of each cell, relative to the maximum.
-///
-/// # Errors
-/// Memory has no room.
 pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Result<Bytes> {
     let n = raster.nrows();
     let cells_of_one = n.div_ceil(MAX_SIDE).max(1);
@@ -170,9 +164,6 @@ pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> PackedPoints {
 
 impl PackedPoints {
     /// Makes a message of the points and the pose of their scan.
-    ///
-    /// # Errors
-    /// Memory has no room.
     pub fn at(&self, pose: [f64; 3], seq: u64) -> std::io::Result<Bytes> {
         let picture = PointsPicture {
             seq,

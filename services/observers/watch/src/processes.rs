@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, path::Path, time::Instant};
 use gyre_stage::{
     control::{Activity, Control, Status},
     source::Received,
-    usage::Usage,
 };
+use gyre_supervise::Usage;
 use serde::Serialize;
 
 /// The name of the supervisor among the processes.

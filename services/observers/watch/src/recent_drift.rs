@@ -1,5 +1,5 @@
-//! The drift of the last stretch of the path: what the odometry does not know of its newest pose
-//! against the one a stretch before.
+//! The drift of the last stretch of the path: the uncertainty of the newest pose relative to the
+//! pose at the start of the stretch.
 
 use std::collections::VecDeque;
 
@@ -26,7 +26,6 @@ pub struct Drift {
     pub over_m: f64,
     /// Of the position along its worst direction, m.
     pub position_m: f64,
-    /// Of the yaw, rad.
     pub yaw_rad: f64,
 }
 

@@ -29,9 +29,10 @@ use crate::{
     track::{Cursor, Track, Vertex},
 };
 
-/// Motions whose part of gyro, wheels and Doppler the page says: those of ten seconds at 4 Hz.
+/// The number of motions for which the page shows the share of gyro, wheels and Doppler: ten
+/// seconds at 4 Hz.
 const LAST_MOTIONS: usize = 40;
-/// Poses that are kept to find that of a scan whose points come later.
+/// The number of poses that are kept for scans whose points come later.
 const RECENT: usize = 256;
 
 /// The view of the run.
@@ -47,7 +48,6 @@ pub struct RunView {
 
 /// The newest of each kind of message to a browser.
 pub struct Updates {
-    /// The run.
     pub run: watch::Sender<Utf8Bytes>,
     /// Counts and delays.
     pub health: watch::Sender<Utf8Bytes>,
@@ -108,7 +108,6 @@ impl RunView {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the run.
     pub fn run(&self) -> RunInfo {
         self.state().run.clone()
     }
@@ -250,7 +249,7 @@ impl RunView {
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
         let mut state = self.state();
         let with_pose = status.poses + status.dropped;
-        // A replaced source need not say what it has published.
+        // A replaced source need not report its number of published scans.
         let published = status.published.unwrap_or_default().max(with_pose);
         // Poses that came since are counted already: a counter never decreases.
         state.counts.published = state.counts.published.max(published);
@@ -258,7 +257,6 @@ impl RunView {
         state.processes = processes;
     }
 
-    /// Returns the processes.
     pub fn processes(&self) -> Vec<Process> {
         self.state().processes.clone()
     }
@@ -273,7 +271,6 @@ impl RunView {
         self.state().notice = notice;
     }
 
-    /// Returns the counts.
     pub fn counts(&self) -> RunCounts {
         self.state().counts
     }
@@ -301,7 +298,7 @@ impl RunView {
     }
 
     /// Returns the message of new poses for a browser that has received those up to `last`; `None`
-    /// if there is none.
+    /// if there are no new poses.
     pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Utf8Bytes> {
         let state = self.state();
         let seq = state.latest.map(|latest| latest.seq);

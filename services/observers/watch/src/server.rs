@@ -15,7 +15,7 @@ use std::{
 use axum::{
     Router,
     extract::{Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    http::{StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Redirect, Response},
     routing::get,
@@ -26,7 +26,7 @@ use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
-    connections::{self, Limits, Peer},
+    connections::{self, Limits},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
@@ -52,7 +52,6 @@ pub enum WatchError {
     /// The address cannot be listened at.
     #[error("cannot serve at {address}: {source}; choose another address")]
     Listen {
-        /// The address.
         address: SocketAddr,
         /// The reason.
         source: io::Error,
@@ -87,14 +86,8 @@ struct Shared {
 }
 
 impl Shared {
-    /// Judges a request. The connection of one that may read keeps its place.
     fn judge(&self, request: &Request) -> Verdict {
-        let verdict = self.access.judge(request.uri(), request.headers());
-        let may_read = matches!(verdict, Verdict::Granted | Verdict::GrantedByAddress);
-        if let Some(peer) = request.extensions().get::<Peer>().filter(|_| may_read) {
-            peer.keep_place();
-        }
-        verdict
+        self.access.judge(request.uri(), request.headers())
     }
 }
 
@@ -103,9 +96,6 @@ struct ReaderSlot(Arc<AtomicUsize>);
 
 impl Endpoint {
     /// Listens at an address. Without a token only this machine is answered.
-    ///
-    /// # Errors
-    /// The address cannot be listened at.
     pub fn listen(address: SocketAddr, token: Option<Token>) -> Result<Self, WatchError> {
         let failed = |source| WatchError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(failed)?;
@@ -158,9 +148,6 @@ impl Server {
     /// Shows the runs that write to `out`, one after the other, until a signal arrives.
     /// `is_complete` returns whether a run that has ended there has reached the end of its
     /// recording.
-    ///
-    /// # Errors
-    /// The system refuses a thread or the listener.
     pub fn show(
         self,
         out: PathBuf,
@@ -334,10 +321,9 @@ fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
     upgrade.max_message_size(bytes).max_frame_size(bytes)
 }
 
-async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
-    let accepted = headers.get(header::ACCEPT).map(HeaderValue::as_bytes);
-    let (kind, text) = metrics::scrape(&shared.view, accepted.unwrap_or_default());
-    ([(header::CONTENT_TYPE, kind)], text).into_response()
+async fn scrape(State(shared): State<Shared>) -> Response {
+    let text = metrics::scrape(&shared.view);
+    ([(header::CONTENT_TYPE, metrics::OPEN_METRICS)], text).into_response()
 }
 
 impl ReaderSlot {

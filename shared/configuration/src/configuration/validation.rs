@@ -53,6 +53,12 @@ impl Configuration {
                 return Err(value(&section, reason));
             }
         }
+        if !(0.0..=50.0).contains(&self.slam.submap_reach_m) {
+            return Err(value(
+                "slam",
+                "submap_reach_m is out of its bounds: expected 0 to 50 m",
+            ));
+        }
         if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));
@@ -100,7 +106,7 @@ impl Configuration {
         Ok(())
     }
 
-    /// Fixes are constraints of a graph. Those of a recording are in a log. Those beside a live
+    /// Fixes are constraints of a graph. The fixes of a recording are in a log. Those beside a live
     /// radar arrive during the run, or are in a log that is complete when it begins.
     fn validate_gnss(&self) -> Result<(), ConfigurationError> {
         let reason = match self.gnss.kind {
@@ -269,7 +275,7 @@ impl Configuration {
         scenarios.try_for_each(|(name, own)| limits(format!("budget.{name}"), own))
     }
 
-    /// Checks that the run reads what a simulation writes.
+    /// Checks that the run reads the output of the simulation.
     fn validate_simulation(&self) -> Result<(), ConfigurationError> {
         let Some(simulation) = &self.simulation else {
             return Ok(());

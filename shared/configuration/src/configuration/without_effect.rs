@@ -4,8 +4,8 @@ use toml::{Table, Value};
 
 use super::Configuration;
 
-/// Sections of sensors, and the kinds with which a key of them has an effect; with all but `none`
-/// the other keys have one.
+/// Sections of sensors, and the kinds that give one of their keys an effect; the other keys have an
+/// effect with all kinds except `none`.
 const SENSORS: [&str; 3] = ["gyro", "wheels", "gnss"];
 const OF_KINDS: [(&str, &[&str]); 3] = [
     ("file", &["log"]),
@@ -16,9 +16,6 @@ const OF_KINDS: [(&str, &[&str]); 3] = [
 impl Configuration {
     /// Returns a sentence for each of these overrides that has no effect, since the kind of its
     /// section is another.
-    ///
-    /// # Errors
-    /// A value that TOML cannot hold.
     pub fn without_effect(&self, overrides: &[String]) -> Result<Vec<String>, toml::ser::Error> {
         let table = Table::try_from(self)?;
         let sentence = |setting: &String| {

@@ -6,7 +6,7 @@ use schemars::{
 };
 use serde_json::Value;
 
-/// Removes what TOML does not have (null), what a reader does not need (defaults of whole sections,
+/// Removes null, which TOML lacks, details that a reader does not need (defaults of whole sections,
 /// Rust's formats and links), and the digits that an `f32` gains as an `f64`.
 #[derive(Clone, Debug)]
 pub struct ForToml;

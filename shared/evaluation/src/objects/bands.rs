@@ -24,13 +24,13 @@ impl Band {
     }
 }
 
-/// The figures of the objects in a band of range or speed. False positives count in the band of
-/// the tracked object, the others in that of the true one.
+/// The figures of the objects in a band of range or speed. False positives count in the band of the
+/// tracked object, the others in the band of the true object.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ObjectBand {
     /// The lower bound, m or m/s.
     pub from: f64,
-    /// The upper bound, m or m/s; `None`: there is none.
+    /// The upper bound, m or m/s; `None`: the band has no end.
     pub to: Option<f64>,
     /// Required objects, once for each scan.
     pub required: usize,

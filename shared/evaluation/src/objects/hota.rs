@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{TrackedObject, TrueObject, distance_m, share};
 
-/// Similarities from which on two objects are a pair: twentieths, from 0.05 to 0.95.
+/// The number of similarity thresholds for a pair of objects: twentieths, from 0.05 to 0.95.
 const LEVELS: usize = 19;
 const LEVEL_STEP: f64 = 0.05;
 /// The most that rounding takes from a similarity.
@@ -25,8 +25,8 @@ pub struct Hota {
     /// Detection: pairs over pairs, misses and false ones.
     #[serde(rename = "hota_detection")]
     pub detection: f64,
-    /// Association: of each pair, the scans in which its two identities are a pair over those in
-    /// which one of them is there.
+    /// Association: for each pair, the scans that pair its two identities over the scans with at
+    /// least one identity.
     #[serde(rename = "hota_association")]
     pub association: f64,
 }
@@ -110,8 +110,8 @@ impl Identities {
         identities
     }
 
-    /// Returns the scans in which two identities are both there and `shared` over those in which
-    /// one of them is there.
+    /// Returns the number of scans with both identities, `shared`, over the number with at least
+    /// one.
     fn overlap(&self, (truth, tracked): (u64, u64), shared: f64) -> f64 {
         shared / (self.truth[&truth] + self.tracked[&tracked] - shared)
     }
@@ -137,7 +137,7 @@ impl Hota {
     /// Evaluates a drive.
     pub(super) fn of(scans: &[Compared]) -> Self {
         let identities = Identities::of(scans);
-        // For each two identities, the scans in which they are a pair at each level.
+        // For each two identities, the number of scans that pair them at each level.
         let mut matches: BTreeMap<(u64, u64), [usize; LEVELS]> = BTreeMap::new();
         for scan in scans {
             for (row, column) in identities.pairs(scan) {

@@ -16,14 +16,11 @@ const TIME_AXIS: u32 = 56;
 const SIGMAS: f64 = 3.0;
 /// Margin above and below, as a share of the largest value.
 const HEADROOM: f64 = 0.08;
-/// The colour of a band: that of the estimate, pale.
+/// The colour of a band: the colour of the estimate, pale.
 const BAND: RGBColor = RGBColor(205, 226, 243);
 
 /// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma
 /// band.
-///
-/// # Errors
-/// [`PlotError::Empty`] if no pose has ground truth, and [`PlotError::Draw`].
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
     let last = bands
         .chains
@@ -96,7 +93,7 @@ struct Point {
 }
 
 impl Panel {
-    /// The panel of one component (x, y, yaw) of the error, in a unit of which `scale` make one SI
+    /// The panel of one component (x, y, yaw) of the error; `scale` units of the panel are one SI
     /// unit.
     fn new(bands: &Bands, y_desc: &'static str, part: usize, scale: f64) -> Self {
         let point = |s: &BandSample| Point {

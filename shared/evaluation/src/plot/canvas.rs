@@ -56,9 +56,6 @@ pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
 }
 
 /// Returns an empty diagram with its axes and their descriptions.
-///
-/// # Errors
-/// [`PlotError::Draw`].
 pub fn chart<'a, 'b>(
     area: &Area<'b>,
     x: Range<f64>,
@@ -88,9 +85,6 @@ pub fn within_margins<'a, 'b>(
 }
 
 /// Draws the grid and both axes with about so many ticks, and their descriptions.
-///
-/// # Errors
-/// [`PlotError::Draw`].
 pub fn axes(
     chart: &mut Chart<'_, '_>,
     [x_ticks, y_ticks]: [usize; 2],
@@ -116,9 +110,6 @@ pub fn axes(
 }
 
 /// Draws a line through points.
-///
-/// # Errors
-/// [`PlotError::Draw`].
 pub fn curve(
     chart: &mut Chart<'_, '_>,
     points: impl IntoIterator<Item = (f64, f64)>,
@@ -129,9 +120,6 @@ pub fn curve(
 }
 
 /// Returns a white document of `size` px with what `draw` draws.
-///
-/// # Errors
-/// [`PlotError::Draw`], or what `draw` returns.
 pub fn document(
     size: (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
@@ -171,9 +159,6 @@ pub enum Symbol {
 }
 
 /// Draws the title, the caption below it, and the legend on the right.
-///
-/// # Errors
-/// [`PlotError::Draw`].
 pub fn header(
     area: &Area<'_>,
     title: &str,

@@ -12,9 +12,6 @@ const HEADROOM: f64 = 0.12;
 
 /// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the
 /// RPE over the distance travelled.
-///
-/// # Errors
-/// [`PlotError::Empty`] if the evaluation has neither, and [`PlotError::Draw`].
 pub fn errors_svg(evaluation: &Evaluation) -> Result<String, PlotError> {
     match (&evaluation.kitti, &evaluation.rpe) {
         (Some(kitti), _) => by_length(kitti),

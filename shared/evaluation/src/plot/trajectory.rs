@@ -24,9 +24,6 @@ const MIN_EXTENT_M: f64 = 1.0;
 
 /// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or
 /// `estimate` alone in its own frame.
-///
-/// # Errors
-/// [`PlotError::Empty`], [`PlotError::Poses`] if a pose is invalid, and [`PlotError::Draw`].
 pub fn trajectory_svg(
     estimate: &[Pose],
     matched: Option<&MatchedPoses>,
@@ -40,11 +37,8 @@ pub fn trajectory_svg(
     }
 }
 
-/// Returns the plot of a trajectory of so many poses and metres, of which only some poses are
-/// `drawn`.
-///
-/// # Errors
-/// As [`trajectory_svg`].
+/// Returns the plot of a trajectory with this number of poses and this length; only the poses
+/// `drawn` are plotted.
 pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
     require_poses(Side::Estimate, drawn)?;
     scene_svg(&Scene {
@@ -57,9 +51,6 @@ pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, P
 
 /// Returns the plot of trajectories by their names, in the frame of the ground truth if there is
 /// one.
-///
-/// # Errors
-/// As [`trajectory_svg`].
 pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<String, PlotError> {
     for (_, poses) in paths {
         require_poses(Side::Estimate, poses)?;
@@ -180,7 +171,7 @@ struct View {
 }
 
 impl View {
-    /// The view of all `points`; `None` if there are none.
+    /// The view of all `points`; `None` without points.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
         let grow = |b: [f64; 4], p: &(f64, f64)| {
             [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]

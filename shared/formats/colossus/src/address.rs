@@ -1,4 +1,4 @@
-//! The address at which a radar is received.
+//! The address where a radar is received.
 
 use std::{
     fmt,
@@ -12,7 +12,7 @@ use crate::PORT;
 /// The prefix of an address of datagrams.
 const UDP: &str = "udp://";
 
-/// The address at which a radar is received.
+/// The address where a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// Host and port of the radar, which is connected to by TCP.
@@ -29,24 +29,18 @@ pub enum Address {
 /// An address that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadAddress {
-    /// The address is none for datagrams.
     #[error(
         "address `{0}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
     )]
     Udp(String),
-    /// The interface is no address of this machine.
     #[error("interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`")]
     Interface(String),
-    /// A connection by TCP needs no interface.
     #[error("interface is set, but only an address that begins with `udp://` needs one: remove it")]
     Unused,
 }
 
 impl Address {
     /// Parses `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, for the last with an interface or "".
-    ///
-    /// # Errors
-    /// The text is no address.
     pub fn parse(text: &str, interface: &str) -> Result<Self, BadAddress> {
         let Some(to) = text.strip_prefix(UDP) else {
             return match interface {

@@ -71,7 +71,8 @@ struct Special {
 }
 
 impl Video<'_> {
-    /// Returns what the message says of the radar, whose encoder has so many counts per turn.
+    /// Returns the message's description of the radar, whose encoder has `encoder_size` counts per
+    /// turn.
     fn configuration(&self, encoder_size: u16) -> Configuration {
         Configuration {
             azimuth_samples: self.special.azimuths,

@@ -1,6 +1,6 @@
-//! The time of each azimuth. What a radar sends as its time depends on its software and on its
-//! network: the byte order of the seconds, the unit of their fraction, and whether it has the time
-//! at all.
+//! The time of each azimuth. The time format of a radar depends on its software and on its network:
+//! the byte order of the seconds, the unit of their fraction, and whether the radar has the time at
+//! all.
 
 use std::{fmt, iter};
 
@@ -9,13 +9,13 @@ use crate::kept::KeptAzimuth;
 use crate::message::Azimuth;
 
 const SECOND_NS: i64 = 1_000_000_000;
-/// 2001-01-01 and 2101-01-01, s since 1970. A radar that was never told the time counts from 1970
-/// or from 2000.
+/// 2001-01-01 and 2101-01-01, s since 1970. A radar whose clock was never set counts from 1970 or
+/// from 2000.
 const YEARS_S: std::ops::Range<i64> = 978_307_200..4_133_980_800;
 /// Azimuths for which the clock is looked for. Stamps may come in bursts of a packet.
 const MAX_HELD: usize = 32;
-/// The largest ratio of the time between azimuths to that of the configured rotation. Units differ
-/// by 1000.
+/// The largest ratio of the time between azimuths to the time by the configured rotation. Units
+/// differ by 1000.
 const MAX_RATIO: f64 = 20.0;
 
 /// The order of the bytes of a number.
@@ -43,7 +43,6 @@ pub enum SplitUnit {
     /// Nanoseconds.
     #[default]
     Nanoseconds,
-    /// Microseconds.
     Microseconds,
 }
 
@@ -118,8 +117,7 @@ pub enum FoundClock {
     /// The radar measures time from another start, such as its own. The host's time at the first
     /// azimuth is added.
     Uptime(ClockFormat),
-    /// The radar's time does not advance as the radar turns. Azimuths have the times at which they
-    /// arrive.
+    /// The radar's time does not advance as the radar turns. Azimuths have their times of arrival.
     Arrival,
 }
 
@@ -142,9 +140,9 @@ impl fmt::Display for FoundClock {
 
 /// Gives each azimuth its time. One clock per connection.
 ///
-/// The first azimuths do not tell the format of their time: there are two byte orders, and a
-/// fraction below 1,000,000 may be of either unit. The difference of two azimuths does, because the
-/// configuration gives the time in which the radar turns from one to the other. So the first
+/// The first azimuth does not determine the format of its time: there are two byte orders, and a
+/// fraction below 1,000,000 may have either unit. The difference of two azimuths does, because the
+/// configuration gives the time that the radar takes to turn from one to the other. So the first
 /// azimuth is held back until the second, and no azimuth is lost or has a wrong time.
 #[derive(Clone, Debug)]
 pub struct RadarClock {
@@ -243,8 +241,8 @@ impl RadarClock {
         }
     }
 
-    /// Returns the format in which the time between two azimuths is nearest to that of the
-    /// configured rotation; `None` if it is far from that in all.
+    /// Returns the format whose time between two azimuths is nearest to the time by the configured
+    /// rotation; `None` if it is far from that in all.
     ///
     /// In the wrong byte order a fraction of a second advances at random, and in the wrong unit by
     /// 1000 times as much or as little. This is surer than whether the seconds are of these years:

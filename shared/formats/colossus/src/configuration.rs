@@ -42,11 +42,8 @@ pub struct Configuration {
     "the radar's configuration gives {what} as {value}, expected {} to {}", bounds.start(), bounds.end()
 )]
 pub struct BadConfiguration {
-    /// The number.
     pub what: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: RangeInclusive<f64>,
 }
 
@@ -70,15 +67,12 @@ impl Configuration {
         f64::from(self.encoder_size.max(1)) / f64::from(self.azimuth_samples.max(1))
     }
 
-    /// Returns the time in which the encoder advances by one count, ns.
+    /// Returns the time per encoder count, ns.
     pub(crate) fn ns_per_count(&self) -> f64 {
         self.period_ns() as f64 / f64::from(self.encoder_size.max(1))
     }
 
-    /// Rejects numbers of which no scan can be made.
-    ///
-    /// # Errors
-    /// The first number out of bounds.
+    /// Rejects numbers that make no scan.
     pub fn check(&self) -> Result<(), BadConfiguration> {
         let check = |what, value: f64, bounds: RangeInclusive<f64>| match bounds.contains(&value) {
             true => Ok(()),
@@ -116,7 +110,6 @@ impl Configuration {
     }
 }
 
-/// Decodes the payload of a configuration.
 pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> {
     let head: [u8; CONFIGURATION_BYTES] = head("a configuration", payload)?;
     let number = |k: usize| u16::from_be_bytes([head[2 * k], head[2 * k + 1]]);

@@ -6,7 +6,7 @@ use crate::malformed::MalformedMessage;
 use crate::protobuf::{Value, fields};
 
 const MESSAGE: &str = "health";
-/// The fields of readings: their numbers and what they are of.
+/// The fields of readings: their numbers and their subjects.
 const READINGS: [(u64, &str); 8] = [
     (1, "die temperature"),
     (2, "SoC temperature"),
@@ -27,9 +27,9 @@ const STATUS_FIELD: u64 = 5;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Health {
     readings: [Option<Reading>; READINGS.len()],
-    /// True if it transmits; `None`: it does not say.
+    /// True if it transmits; `None`: not reported.
     pub transmitting: Option<bool>,
-    /// Errors of the encoder; `None`: it does not say.
+    /// Errors of the encoder; `None`: not reported.
     pub encoder_errors: Option<i32>,
 }
 
@@ -37,9 +37,7 @@ pub struct Health {
 /// by their limits).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// The value.
     pub value: f32,
-    /// The quality.
     pub status: HealthStatus,
 }
 
@@ -48,11 +46,9 @@ pub struct Reading {
 pub enum HealthStatus {
     /// It is beyond its limits.
     Unhealthy,
-    /// It is near them.
     Warning,
-    /// It is within them.
     Healthy,
-    /// The radar does not say.
+    /// The radar does not report it.
     #[default]
     Unknown,
 }
@@ -69,14 +65,13 @@ impl fmt::Display for HealthStatus {
 }
 
 impl Health {
-    /// Returns the readings, each with what it is of.
+    /// Returns the readings, each with its subject.
     pub fn readings(&self) -> impl Iterator<Item = (&'static str, Reading)> + '_ {
         let named = READINGS.iter().zip(&self.readings);
         named.filter_map(|((_, name), reading)| Some((*name, (*reading)?)))
     }
 }
 
-/// Decodes the payload of a health message.
 pub(crate) fn decode(payload: &[u8]) -> Result<Health, MalformedMessage> {
     let mut health = Health::default();
     fields(MESSAGE, payload, |number, value| {
@@ -86,7 +81,7 @@ pub(crate) fn decode(payload: &[u8]) -> Result<Health, MalformedMessage> {
             (_, Value::Number(value)) if number == TRANSMITTING_FIELD => {
                 health.transmitting = Some(value != 0);
             }
-            // Negative numbers have ten bytes, of which the lower four count.
+            // Negative numbers have ten bytes, and the lower four count.
             (_, Value::Number(value)) if number == ENCODER_ERRORS_FIELD => {
                 health.encoder_errors = Some(value as i32);
             }

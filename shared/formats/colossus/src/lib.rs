@@ -2,9 +2,9 @@
 //! scans out.
 //!
 //! Reading order:
-//! - [`message`]: what a radar and its clients send;
+//! - [`message`]: the messages of a radar and its clients;
 //! - [`configuration`]: the radar's description of itself, its first message;
-//! - [`health`], [`navigation`]: what a radar says beside azimuths;
+//! - [`health`], [`navigation`]: the radar's messages beside azimuths;
 //! - [`write`](mod@write): messages as bytes, for clients and servers;
 //! - [`parser`]: messages from any pieces of a stream of bytes, damaged ones included;
 //! - [`asterix`]: the same messages from the datagrams of a radar that sends by UDP;

@@ -8,42 +8,35 @@ pub(crate) const AZIMUTH_BYTES: usize = 14;
 /// A payload that does not fit its message.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MalformedMessage {
-    /// The payload is too short.
     #[error("the payload of {message} has {actual} bytes, expected at least {expected}")]
     Short {
-        /// The kind of message.
         message: &'static str,
         /// Bytes required.
         expected: usize,
         /// Bytes present.
         actual: usize,
     },
-    /// The powers begin outside of the payload.
     #[error(
         "the powers of an azimuth begin at byte {offset} of a payload of {payload_bytes} bytes, expected {AZIMUTH_BYTES} or more"
     )]
     DataOffset {
-        /// The first byte of the powers, as the message says.
+        /// The first byte of the powers, as stated by the message.
         offset: u16,
         /// Bytes of the payload.
         payload_bytes: usize,
     },
-    /// Powers of 16 bits with half a power at the end.
     #[error("an azimuth of 16-bit powers has {bytes} bytes of powers, an odd number")]
     OddBytes {
         /// Bytes of the powers.
         bytes: usize,
     },
-    /// Navigation data with a part of a peak at the end.
     #[error("navigation data have {bytes} bytes of peaks, of 6 bytes each")]
     Peaks {
         /// Bytes of the peaks.
         bytes: usize,
     },
-    /// The protobuf of a message cannot be parsed.
     #[error("the protobuf of {message} is malformed at byte {at}")]
     Protobuf {
-        /// The kind of message.
         message: &'static str,
         /// The first byte of the field that cannot be parsed.
         at: usize,
@@ -56,32 +49,23 @@ pub(crate) const CATEGORY: u8 = 240;
 /// A datagram that is no part of an azimuth.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MalformedDatagram {
-    /// Navtech's own message by UDP.
     #[error(
         "Navtech's message {id} by UDP carries no powers: set the radar's data output to CAT-240"
     )]
-    Colossus {
-        /// The kind of message.
-        id: u8,
-    },
-    /// Another category of ASTERIX, or none.
+    Colossus { id: u8 },
     #[error("a datagram begins with {0}, expected the category {CATEGORY} of ASTERIX")]
     Category(u8),
-    /// The datagram is shorter or longer than its message.
     #[error("a message of {expected} bytes is in a datagram of {actual}")]
     Length {
-        /// Bytes of the message, as it says.
+        /// Bytes of the message, as stated by it.
         expected: usize,
         /// Bytes of the datagram.
         actual: usize,
     },
-    /// The message ends within an item.
     #[error("a message ends within its item {0}")]
     Short(&'static str),
-    /// An item that is required is missing.
     #[error("a message lacks the item {0}")]
     Missing(&'static str),
-    /// Powers in a form that no Navtech radar sends.
     #[error(
         "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
     )]

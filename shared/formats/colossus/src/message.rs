@@ -43,9 +43,7 @@ pub enum Message<'a> {
     Health(Health),
     /// Peaks that the radar has found in an azimuth: id 123.
     Navigation(Navigation<'a>),
-    /// Any other message.
     Other {
-        /// The kind of message.
         id: u8,
         /// The bytes.
         payload: &'a [u8],
@@ -56,22 +54,17 @@ pub enum Message<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Request {
-    /// Send the configuration.
     RequestConfiguration = 20,
-    /// Send azimuths.
     StartFft = 21,
-    /// Send no more azimuths.
     StopFft = 22,
     /// Send the health every 10 s.
     StartHealth = 23,
-    /// Send no more health.
     StopHealth = 24,
     /// Send azimuths of full length: no contours, which may vary in their number of bins.
     StartNonContourFft = 140,
 }
 
 impl Request {
-    /// All requests.
     pub const ALL: [Self; 6] = [
         Self::RequestConfiguration,
         Self::StartFft,
@@ -129,10 +122,6 @@ impl<'a> Powers<'a> {
     }
 }
 
-/// Decodes the payload of a message.
-///
-/// # Errors
-/// A payload that does not fit the message `id`.
 pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
     if let Some(request) = Request::ALL.into_iter().find(|r| r.id() == id) {
         return Ok(Message::Request(request));

@@ -5,7 +5,6 @@ use crate::malformed::{MalformedMessage, head};
 
 /// Azimuth, seconds, split seconds.
 const HEAD_BYTES: usize = 10;
-/// Range and power.
 const PEAK_BYTES: usize = 6;
 
 /// The peaks of one azimuth: id 123. All its numbers are big-endian, unlike the time of an
@@ -21,7 +20,6 @@ pub struct Navigation<'a> {
     peaks: &'a [[u8; PEAK_BYTES]],
 }
 
-/// A peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
     /// Range, m, in steps of a micrometre.

@@ -1,4 +1,4 @@
-//! Messages from a stream of bytes, whatever the pieces in which it arrives.
+//! Messages from a stream of bytes that arrives in arbitrary pieces.
 
 use thiserror::Error;
 
@@ -15,11 +15,9 @@ pub const MAX_BUFFER_BYTES: usize =
 /// One element of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
-    /// A message.
     Message(Message<'a>),
     /// Bytes that are no message; they are skipped.
     Damaged {
-        /// The first fault.
         reason: Damage,
         /// Bytes up to the next message.
         skipped_bytes: usize,
@@ -29,41 +27,35 @@ pub enum Event<'a> {
 /// A fault of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Damage {
-    /// The bytes are not the start of a message.
     #[error("the bytes do not start with Colossus' signature")]
     Signature,
-    /// The version of the protocol is unknown.
     #[error("a message has version {0} of the protocol, expected {VERSION}")]
     Version(u8),
-    /// The message is too long.
     #[error("a message has a payload of {0} bytes, more than {MAX_PAYLOAD_BYTES}")]
     PayloadSize(u32),
-    /// Another message starts within the payload.
     #[error("a message is cut short: another one starts within its payload")]
     CutShort,
-    /// The payload does not fit the message.
     #[error(transparent)]
     Malformed(#[from] MalformedMessage),
-    /// A datagram is no part of an azimuth.
     #[error(transparent)]
     Datagram(#[from] MalformedDatagram),
 }
 
 /// A buffer that is filled from a socket, and the messages in it.
 ///
-/// Read into [`Parser::space`], say how much with [`Parser::filled`], and take all events with
-/// [`Parser::next`].
+/// Read into [`Parser::space`], pass the number of bytes to [`Parser::filled`], and take all events
+/// with [`Parser::next`].
 ///
-/// After a fault the parser looks for the next signature. All whole messages after it are found; a
-/// message that is cut short may be returned with some bytes of the next one, and hold up the next
-/// ones until as many bytes are there as it says it has.
+/// After a fault the parser looks for the next signature. All whole messages after it are found. A
+/// message that is cut short may be returned with some bytes of the next message, and may delay the
+/// next messages until its stated number of bytes has arrived.
 #[derive(Debug, Default)]
 pub struct Parser {
     buffer: Vec<u8>,
     /// Received and not yet parsed: `buffer[start..end]`.
     start: usize,
     end: usize,
-    /// Bytes before `start`, of the last message, with which a signature may begin: the message was
+    /// Bytes before `start`, from the last message, that may begin a signature: that message was
     /// cut short then.
     before: usize,
     /// The first fault of the bytes that are being skipped.
@@ -203,8 +195,8 @@ fn agree(one: &[u8], other: &[u8]) -> bool {
     one.iter().zip(other).all(|(a, b)| a == b)
 }
 
-/// Returns the number of bytes at the end with which a signature begins. There is one at most, as
-/// its first byte does not repeat.
+/// Returns the number of bytes at the end that begin a signature. There is one at most, as its
+/// first byte does not repeat.
 fn begun(bytes: &[u8]) -> usize {
     let most = bytes.len().min(SIGNATURE.len() - 1);
     let begun = (1..=most).find(|n| bytes.ends_with(&SIGNATURE[..*n]));

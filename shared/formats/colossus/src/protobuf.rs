@@ -5,7 +5,7 @@ use crate::malformed::MalformedMessage;
 /// The wire type of a float.
 pub(crate) const FOUR_BYTES: u64 = 5;
 
-/// The value of a field, as far as its wire type tells.
+/// The value of a field, as far as its wire type determines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value<'a> {
     Number(u64),

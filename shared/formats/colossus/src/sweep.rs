@@ -1,6 +1,6 @@
 //! Azimuths to scans.
 //!
-//! Angles, times and scales are those of a recording of the same azimuths, to the bit: see
+//! Angles, times and scales equal a recording of the same azimuths, to the bit: see
 //! [`gyre_datasets::open`].
 
 mod counters;
@@ -60,7 +60,6 @@ pub struct Sweep {
 enum State {
     /// Dropped: the sweep has begun before.
     Waiting,
-    /// Written.
     Open,
     /// Dropped: the sweep is complete.
     Complete,
@@ -92,9 +91,6 @@ pub struct SweepAssembler {
 
 impl SweepAssembler {
     /// Returns an assembler at the start of a stream.
-    ///
-    /// # Errors
-    /// A configuration that does not pass [`Configuration::check`].
     pub fn new(
         configuration: &Configuration,
         constants: Constants,
@@ -124,7 +120,7 @@ impl SweepAssembler {
         self.rows.limits()
     }
 
-    /// Returns what has been lost, dropped and changed so far.
+    /// Returns the losses, drops and changes so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }
@@ -141,16 +137,16 @@ impl SweepAssembler {
         self.state == State::Open || self.kept.is_some()
     }
 
-    /// Returns whether this encoder count is that of the first azimuth of a turn: a stream that
+    /// Returns whether this encoder count belongs to the first azimuth of a turn: a stream that
     /// begins there has all of the turn.
     pub fn is_first(&self, count: u16) -> bool {
         let encoder = self.grid.encoder(count);
         encoder.is_some_and(|encoder| self.grid.is_first(encoder))
     }
 
-    /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented:
-    /// it is the one in which neighbouring bins differ less. In the wrong order the noise of the
-    /// less significant byte is the more significant one.
+    /// Returns the order of the two bytes of 16-bit powers, once it is known. The order is
+    /// undocumented: it is the order that gives smaller differences between neighbouring bins. In
+    /// the wrong order the noise of the less significant byte is the more significant one.
     pub fn power_order(&self) -> Option<ByteOrder> {
         self.rows.order.decided()
     }
@@ -191,7 +187,7 @@ impl SweepAssembler {
         }
     }
 
-    /// Begins at the first azimuth of a turn; discards those of a turn that has begun before.
+    /// Begins at the first azimuth of a turn; discards azimuths of a turn that has begun before.
     fn start(&mut self, here: Reading, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
         if self.grid.is_first(here.encoder) {
             self.begin(here, Seam::default(), azimuth, slot);

@@ -47,7 +47,6 @@ pub fn write_azimuth(out: &mut Vec<u8>, azimuth: &Azimuth<'_>) {
     out.extend_from_slice(powers);
 }
 
-/// Appends a keep-alive.
 pub fn write_keep_alive(out: &mut Vec<u8>) {
     write_header(out, id::KEEP_ALIVE, 0);
 }

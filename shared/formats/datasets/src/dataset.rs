@@ -1,6 +1,5 @@
 //! Readers of radar recordings: one trait, one file per format.
 
-mod boreas;
 mod dataset_toml;
 mod detect;
 mod eccentricity;
@@ -8,7 +7,6 @@ mod encoder;
 mod error;
 mod file_list;
 mod first_image;
-mod fomo;
 mod foreign;
 mod format;
 mod image_list;
@@ -18,11 +16,10 @@ mod images;
 mod mulran;
 mod navtech_notes;
 mod navtech_png;
-mod navtech_profile;
 mod navtech_scans;
 mod options;
-mod oxford;
 mod png_image;
+mod profiles;
 mod radiate;
 mod row_order;
 mod sensor_clock;
@@ -53,10 +50,8 @@ pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns,
 ///
 /// A scan that cannot be read gives an error; the others stay readable.
 pub trait Dataset: Send {
-    /// The file format.
     fn format(&self) -> Format;
 
-    /// Number of scans.
     fn len(&self) -> usize;
 
     /// Index of the first scan that can be read; those before it are of another part of the drive.
@@ -120,25 +115,18 @@ pub trait Dataset: Send {
         &[]
     }
 
-    /// The first place at which the recording is damaged or ends too early, so that scans may be
+    /// The first place where the recording is damaged or ends too early, so that scans may be
     /// missing: a sentence without its full stop. `None` if all that was recorded is there.
     fn damage(&self) -> Option<&str> {
         None
     }
 
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
-    ///
-    /// # Errors
-    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one
-    /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
     /// name, else on the only one: in the sensor's own axes and on its own clock, in the order of
     /// the recording. `None` without one.
-    ///
-    /// # Errors
-    /// No such topic, several without a name, or samples that cannot be read.
     fn logged(
         &mut self,
         of: SampleKind,
@@ -150,9 +138,6 @@ pub trait Dataset: Send {
 
     /// Reads the fixes of a GNSS receiver that the recording itself has, on the topic of this name,
     /// else on the only one. `None` without one.
-    ///
-    /// # Errors
-    /// No such topic, several without a name, or fixes that cannot be read.
     fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
         let _ = topic;
         Ok(None)
@@ -165,31 +150,43 @@ pub trait Dataset: Send {
     }
 }
 
+/// Checks that a slot is as large as the limits of a dataset.
+pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
+    let slices = [
+        ("bytes", limits.bytes, slot.bytes.len()),
+        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
+        ("stamps", limits.azimuths, slot.stamp_ns.len()),
+        ("flags", limits.azimuths, slot.flags.len()),
+    ];
+    match slices
+        .into_iter()
+        .find(|(_, needed, actual)| actual < needed)
+    {
+        None => Ok(()),
+        Some((what, needed, actual)) => Err(ReadError::SlotTooSmall {
+            what,
+            needed,
+            actual,
+        }),
+    }
+}
+
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
 /// itself.
 ///
 /// The format is detected unless `options` names it. Options that are not set are read from a
 /// `dataset.toml` in the folder, if there is one.
-///
-/// # Errors
-/// A folder without images of a known format, options out of bounds, or files that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     open_resolved(root, &options.or(&stored_options(root)?))
 }
 
 /// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
 /// file.
-///
-/// # Errors
-/// A file that cannot be read or has other keys.
 pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     dataset_toml::options(root)
 }
 
-/// Opens the dataset at `root` with these options alone, whatever `dataset.toml` says by now.
-///
-/// # Errors
-/// As [`open`].
+/// Opens the dataset at `root` with these options only: the current `dataset.toml` is ignored.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::locate(root, options.format)?, options)
@@ -198,9 +195,6 @@ pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Da
 /// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files
 /// that it had then. The folder is not listed, so it does not matter how many files it holds, or
 /// whether some came or went.
-///
-/// # Errors
-/// No file, options out of bounds, or files that cannot be read.
 pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
@@ -212,9 +206,6 @@ pub fn reopen(
 }
 
 /// Opens a recording that is not on disk, in its own format unless `options` names another.
-///
-/// # Errors
-/// A source without images, or options out of bounds.
 pub fn open_source(
     source: Box<dyn ImageSource>,
     options: &DatasetOptions,
@@ -229,25 +220,16 @@ fn open_found(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check_without_topics(found.format)?;
     Ok(match found.format {
-        Format::Oxford => Box::new(oxford::open(found, options)?),
-        Format::Oord => Box::new(oxford::open_oord(found, options)?),
-        Format::Boreas => Box::new(boreas::open(found, options)?),
-        Format::BoreasRt => Box::new(boreas::open_road_trip(found, options)?),
         Format::Mulran => Box::new(mulran::open(found, options)?),
-        Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
-        Format::Fomo => Box::new(fomo::open(found, options)?),
-        format @ (Format::Mcap | Format::Ros2Bag) => {
-            let path = found.folder.display();
-            return Err(OpenError::Recording(format!(
-                "{path} is a folder of images, and the format `{format}` is that of a recording as MCAP"
-            )));
-        }
-        Format::Other => {
-            let path = found.folder.display();
-            return Err(OpenError::Recording(format!(
-                "{path} is in a format that only the program which wrote it reads"
-            )));
-        }
+        format => match profiles::Profile::of(format) {
+            Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),
+            None => {
+                let path = found.folder.display();
+                return Err(OpenError::Recording(format!(
+                    "{path} is a folder of images, and the format `{format}` is not of images"
+                )));
+            }
+        },
     })
 }

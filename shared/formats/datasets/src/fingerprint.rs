@@ -1,4 +1,4 @@
-//! The identity of a recording: what tells it from another one without decoding it.
+//! The identity of a recording, computed without decoding it.
 
 use std::fs;
 
@@ -11,9 +11,7 @@ use crate::dataset::{Dataset, Format, OpenError};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fingerprint {
-    /// The file format.
     pub format: Format,
-    /// Number of scans.
     pub scans: usize,
     /// Size of all images, bytes.
     pub bytes: u64,
@@ -27,9 +25,6 @@ pub struct Fingerprint {
 
 impl Fingerprint {
     /// Takes the fingerprint of a recording on disk. Images are not read.
-    ///
-    /// # Errors
-    /// The size of an image cannot be read.
     pub fn of(dataset: &dyn Dataset) -> Result<Self, OpenError> {
         let (mut digest, mut bytes) = (Sha256::new(), 0);
         for index in 0..dataset.len() {

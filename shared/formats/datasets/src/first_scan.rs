@@ -1,14 +1,11 @@
-//! The first scan of a recording, which says what its radar can.
+//! The first scan of a recording, which shows the capabilities of its radar.
 
 use gyre_radar::{NoDoppler, OwnedScan, check_chirps};
 
 use crate::Dataset;
 
-/// Checks by the first scan of a recording that its radar says the velocity by Doppler: see
+/// Checks by the first scan of a recording that its radar measures the velocity by Doppler: see
 /// [`check_chirps`]. A scan that cannot be read is reported where it is played.
-///
-/// # Errors
-/// The one of these that is missing.
 pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {

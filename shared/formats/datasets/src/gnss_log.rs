@@ -1,25 +1,25 @@
 //! The log of a GNSS receiver as a file, or in a bag.
 //!
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
-//! - `table`: tables as CSV; `radiate`: the files of RADIATE, one for each fix;
+//! - `table`: tables as CSV;
 //! - [`ReceivedFixes`]: the growing log of a live receiver;
-//! - `faults`: what is wrong with the fixes, and which of them are left out.
+//! - `faults`: the faults of the fixes, and the removal of faulty fixes.
 
-mod error;
 mod faults;
-mod radiate;
 mod received;
 mod table;
 
 use std::path::{Path, PathBuf};
 
-pub use error::GnssLogError;
 pub use faults::GnssFaults;
 pub use received::ReceivedFixes;
 
 use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
-use crate::{gps_imu_twist::has_list, gyro_log::roots, table::Unreadable};
+use crate::{LogError, gps_imu_twist, logs, table::Raw};
+
+/// The section of the receiver in configurations.
+const OF: &str = "gnss";
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 8] = [
@@ -44,8 +44,8 @@ const OF_RECORDING: &str = "gnss.csv";
 pub struct GnssLog {
     /// The fixes in the order of their stamps, which all differ.
     pub fixes: Vec<LoggedFix>,
-    /// The plane in which the fixes are, which touches the earth at the first of them; `None` if
-    /// the log has coordinates in a plane of its own.
+    /// The plane of the fixes, which touches the earth at the first of them; `None` if the log has
+    /// coordinates in a plane of its own.
     pub plane: Option<LocalPlane>,
     /// Faults of the log, with the number of fixes that were left out for each.
     pub faults: GnssFaults,
@@ -53,8 +53,7 @@ pub struct GnssLog {
     pub path: PathBuf,
     /// The topic in the bag; `None` of a file.
     pub topic: Option<String>,
-    /// The reason why there are no fixes, of what a live receiver has sent; of any other log that
-    /// is an error.
+    /// The reason why the log of a live receiver has no fixes; in any other log that is an error.
     pub unusable: Option<String>,
 }
 
@@ -70,33 +69,43 @@ pub struct LoggedFix {
 }
 
 impl GnssLog {
-    /// Reads a log. The first row, or the number of columns, says of which format it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no positions, and one without a usable fix.
-    pub fn read(path: &Path) -> Result<Self, GnssLogError> {
-        let raw = Self::raw(path)?;
+    /// Reads a log. The first row, or the number of columns, determines the format.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let (raw, is_plane) = Self::raw(path)?;
         if let Some(reason) = raw.unreadable.are_most(raw.count()) {
             let path = path.to_owned();
-            return Err(GnssLogError::Unusable { path, reason });
+            return Err(LogError::Unusable {
+                of: OF,
+                path,
+                reason,
+            });
         }
-        Self::usable(raw, path)
+        Self::usable(raw, is_plane, path)
     }
 
-    fn raw(path: &Path) -> Result<Raw, GnssLogError> {
+    /// Returns the fixes of a log as they stand there, and whether they are m east and north, and
+    /// not degrees of latitude and longitude.
+    fn raw(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
         match path.is_dir() {
-            true => radiate::read(path),
+            true => {
+                // The lines of the place and of the first two rows of its covariance.
+                let fix = |stamp_ns, [at, first, second]: [[f64; 3]; 3]| RawFix {
+                    stamp_ns,
+                    at: [at[0], at[1]],
+                    altitude_m: at[2],
+                    sigma_m: RawFix::sigma_of([first[0], second[1]]),
+                    ..RawFix::default()
+                };
+                Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
+            }
             false => table::read(path),
         }
     }
 
     /// Returns all fixes of a log as one table.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
-    pub fn copy_of(path: &Path) -> Result<String, GnssLogError> {
-        let raw = Self::raw(path)?;
-        Ok(Self::table(&raw.rows, raw.is_plane))
+    pub fn copy_of(path: &Path) -> Result<String, LogError> {
+        let (raw, is_plane) = Self::raw(path)?;
+        Ok(Self::table(&raw.entries, is_plane))
     }
 
     /// Returns a table of fixes, m east and north in a plane of their own or degrees on the earth.
@@ -113,8 +122,8 @@ impl GnssLog {
         format!("stamp_ns,{at},altitude_m,sigma_m\n{rows}")
     }
 
-    /// Reads what a live receiver has sent during a run, be it among lines that are no fixes. A run
-    /// that has got nothing usable goes on without fixes, and with the reason.
+    /// Reads the log of a live receiver during a run. Lines without a fix are allowed. A run
+    /// without usable fixes continues without them, and keeps the reason.
     pub fn received(path: &Path) -> Self {
         let mut received = ReceivedFixes::new(path);
         match received.read_on() {
@@ -134,49 +143,37 @@ impl GnssLog {
     }
 
     /// Takes the fixes of this bag.
-    ///
-    /// # Errors
-    /// No usable fix.
-    pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, GnssLogError> {
+    pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, LogError> {
         let raw = Raw {
-            rows: fixes.fixes,
-            without_fix: fixes.without_fix,
-            ..Raw::default()
+            unmeasured: fixes.without_fix,
+            ..Raw::of(fixes.fixes)
         };
         Ok(Self {
             topic: Some(fixes.topic),
-            ..Self::usable(raw, bag)?
+            ..Self::usable(raw, false, bag)?
         })
     }
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
     /// folder of the images; of the first file of a recording its own, if it has one.
-    ///
-    /// # Errors
-    /// No log.
-    pub fn find(folder: &Path) -> Result<PathBuf, GnssLogError> {
+    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         let own = Self::of_recording(folder);
         // The first file itself may have been moved away.
         if !folder.is_dir() && own.is_file() {
             return Ok(own);
         }
-        // Of a bag or another recording in one file, the folder in which it lies.
+        // For a bag or a different recording in one file, the folder of the file.
         let folder = match folder.is_file() {
             true => folder.parent().unwrap_or(folder),
             false => folder,
         };
-        roots(folder)
-            .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
-            .find(|path| path.is_file() || (path.is_dir() && has_list(path)))
-            .ok_or_else(|| GnssLogError::None {
-                folder: folder.to_owned(),
-            })
+        logs::find(folder, OF, &PLACES)
     }
 
     /// Returns the fixes on the radar's clock, with the configured uncertainty where the log has
     /// none.
     pub fn on_radar(&self, config: &GnssConfig) -> Vec<GnssFix> {
-        let late_ns = (config.late_s * 1e9).round() as i64;
+        let late_ns = (config.delay_s * 1e9).round() as i64;
         let fixes = self.fixes.iter().map(|fix| GnssFix {
             stamp_ns: fix.stamp_ns.saturating_sub(late_ns),
             east_m: fix.east_north_m[0],
@@ -186,18 +183,19 @@ impl GnssLog {
         fixes.collect()
     }
 
-    fn usable(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
-        match Self::examined(raw, path) {
+    fn usable(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> Result<Self, LogError> {
+        match Self::examined(raw, is_plane, path) {
             (log, None) => Ok(log),
             (_, Some(error)) => Err(error),
         }
     }
 
-    /// Examines the fixes. Returns the log, and what is wrong where none can be used.
-    fn examined(raw: Raw, path: &Path) -> (Self, Option<GnssLogError>) {
+    /// Examines the fixes. Returns the log, or the reason if all fixes are unusable.
+    fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> (Self, Option<LogError>) {
         let all = raw.count();
-        let (fixes, plane, faults) = faults::examine(raw);
-        let error = fixes.is_empty().then(|| GnssLogError::Unusable {
+        let (fixes, plane, faults) = faults::examine(raw, is_plane);
+        let error = fixes.is_empty().then(|| LogError::Unusable {
+            of: OF,
             path: path.to_owned(),
             reason: faults.without_usable(all),
         });
@@ -210,23 +208,5 @@ impl GnssLog {
             unusable: None,
         };
         (log, error)
-    }
-}
-
-/// The fixes of a file as they stand there.
-#[derive(Clone, Debug, Default)]
-struct Raw {
-    rows: Vec<RawFix>,
-    /// The coordinates are m east and north, and not degrees of latitude and longitude.
-    is_plane: bool,
-    unreadable: Unreadable,
-    /// Messages or rows in which the receiver had no fix.
-    without_fix: usize,
-}
-
-impl Raw {
-    /// All entries, those that cannot be used too.
-    fn count(&self) -> usize {
-        (self.rows.len() + self.without_fix).saturating_add(self.unreadable.count)
     }
 }

@@ -34,33 +34,18 @@ const MAX_BYTES: u64 = 4 << 30;
 
 /// A trajectory that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum TrajectoryError {
-    /// A file that cannot be read.
     #[error("cannot read the trajectory {path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
-    /// A file of unknown format.
+    Io { path: PathBuf, source: io::Error },
     #[error(
         "{path} is not a trajectory of a known format (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
     )]
-    Unknown {
-        /// The file.
-        path: PathBuf,
-        /// The finding.
-        reason: String,
-    },
-    /// A line that does not match the format.
+    Unknown { path: PathBuf, reason: String },
     #[error("{path}, line {line}: {reason}")]
     Line {
-        /// The file.
         path: PathBuf,
-        /// The line, from 1.
         line: usize,
-        /// The problem.
         reason: String,
     },
 }
@@ -72,27 +57,12 @@ struct LineError {
     reason: String,
 }
 
-/// The format of a trajectory file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrajectoryFormat {
-    /// Oxford `radar_odometry.csv`: motions between scans, composed from the identity.
-    OxfordCsv,
-    /// Boreas `radar_poses.csv`.
-    BoreasCsv,
-    /// MulRan `global_pose.csv`: poses of the vehicle, transformed to the radar.
-    MulranCsv,
-    /// `seconds x y z qx qy qz qw`.
-    Tum,
-    /// Row-major 3 x 4 matrices without times; Boreas' odometry: with times, inverted.
-    Kitti,
-}
+/// Parses a format of trajectory files.
+type Parse = fn(&str) -> Result<Trajectory, LineError>;
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
-/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
-/// plane in which they move is found. Of a folder, its ground truth is read.
-///
-/// # Errors
-/// A file that cannot be read, or is not of a known format; a folder without ground truth.
+/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward):
+/// their plane of motion is found. Of a folder, its ground truth is read.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let failed = |source| TrajectoryError::Io {
         path: path.to_owned(),
@@ -108,15 +78,16 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.
-///
-/// # Errors
-/// A text that is not of a known format.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let format = detect(text).map_err(|reason| TrajectoryError::Unknown {
+    let parse = detect(text).map_err(|reason| TrajectoryError::Unknown {
         path: path.to_owned(),
         reason,
     })?;
-    parse(text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
+    let parsed = parse(text).and_then(|trajectory| {
+        check_places(text, &trajectory)?;
+        Ok(trajectory)
+    });
+    parsed.map_err(|LineError { line, reason }| TrajectoryError::Line {
         path: path.to_owned(),
         line,
         reason,
@@ -136,18 +107,6 @@ pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
         .flatten()
         .flat_map(|root| PLACES.iter().map(|p| root.join(p)))
         .find(|path| path.is_file())
-}
-
-fn parse(text: &str, format: TrajectoryFormat) -> Result<Trajectory, LineError> {
-    let trajectory = match format {
-        TrajectoryFormat::OxfordCsv => oxford::parse(text),
-        TrajectoryFormat::BoreasCsv => boreas::parse(text),
-        TrajectoryFormat::MulranCsv => mulran::parse(text),
-        TrajectoryFormat::Tum => tum::parse(text),
-        TrajectoryFormat::Kitti => kitti::parse(text),
-    }?;
-    check_places(text, &trajectory)?;
-    Ok(trajectory)
 }
 
 /// Rejects one time for several places.
@@ -174,25 +133,24 @@ fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
     Ok(())
 }
 
-fn detect(text: &str) -> Result<TrajectoryFormat, String> {
+/// Returns the parser for the format of the first line.
+fn detect(text: &str) -> Result<Parse, String> {
     let (_, first) = lines(text).next().ok_or("it is empty")?;
     let commas = first.split(',').count();
     let words = first.split_whitespace().count();
     check_separators(first, commas, words)?;
     match (commas, words) {
-        _ if first.contains("destination_timestamp") => Ok(TrajectoryFormat::OxfordCsv),
-        _ if boreas::TIMES.iter().any(|name| first.contains(name)) => {
-            Ok(TrajectoryFormat::BoreasCsv)
-        }
-        (13, _) => Ok(TrajectoryFormat::MulranCsv),
-        (1, 8) => Ok(TrajectoryFormat::Tum),
-        (1, 12 | 13) => Ok(TrajectoryFormat::Kitti),
+        _ if first.contains("destination_timestamp") => Ok(oxford::parse),
+        _ if boreas::TIMES.iter().any(|name| first.contains(name)) => Ok(boreas::parse),
+        (13, _) => Ok(mulran::parse),
+        (1, 8) => Ok(tum::parse),
+        (1, 12 | 13) => Ok(kitti::parse),
         _ => Err(format!("its first line has {} columns", commas.max(words))),
     }
 }
 
-/// Rejects what spreadsheets write in countries with decimal commas, and columns that are parted as
-/// those of other formats.
+/// Rejects the output of spreadsheets in countries with decimal commas, and the column separators
+/// of other formats.
 fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
     // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
     let is_decimal = |word: &str| match word.split_once(',') {

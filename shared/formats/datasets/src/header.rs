@@ -71,9 +71,6 @@ pub(crate) struct Header(Vec<String>);
 
 impl Header {
     /// Takes the first row of a table.
-    ///
-    /// # Errors
-    /// More columns than a table of a sensor has, or two of one name.
     pub fn of(first: &StringRecord) -> Result<Self, String> {
         let count = first.len();
         if count > MAX_COLUMNS {
@@ -108,7 +105,6 @@ impl Header {
         names.find_map(|(column, name)| Some((column, meaning(name)?)))
     }
 
-    /// Returns the names.
     pub fn names(&self) -> &[String] {
         &self.0
     }
@@ -201,7 +197,6 @@ fn with_rest(whole_ns: i64, rest: &str, unit_ns: i64) -> Option<i64> {
     Some(if is_all { rest_ns } else { whole_ns + rest_ns })
 }
 
-/// The unit of stamps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum StampUnit {
     /// An integer number of so many ns.

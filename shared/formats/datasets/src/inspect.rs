@@ -1,107 +1,51 @@
 //! Summary of a dataset and of its faults: `gyre inspect`.
+//!
+//! Each part of the inspection adds its figures, its printed lines and its findings to the
+//! [`Report`].
 
-mod display;
-mod findings;
-mod gnss;
 mod ground_truth;
-mod gyro;
+mod logs;
 mod rows;
-mod times;
 mod timing;
-mod velocity;
-mod wheels;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 
-pub use gnss::GnssReport;
-pub use ground_truth::GroundTruthReport;
-pub use gyro::{GyroReport, QuietReport};
-pub use rows::{Chirps, RowsReport};
-pub use times::LogTimes;
-pub use timing::{Gap, Stall, TimingReport};
-pub use velocity::VelocityReport;
-pub use wheels::WheelReport;
-
-use crate::dataset::ImageSize;
-use crate::dataset::OpenError;
-use crate::dataset::{Dataset, open};
-use crate::dataset::{DatasetOptions, Format};
+use crate::dataset::{Dataset, DatasetOptions, Format, OpenError, open};
 use gyre_radar::scan::OwnedScan;
 use gyre_radar::trajectory::Trajectory;
+use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig, PolarScan};
 
 /// Maximum number of pixels to decode, about 2 s; longer datasets are subsampled.
 const PIXEL_BUDGET: usize = 250_000_000;
+/// Maximum number of scans that are listed; more are counted.
+const MAX_LISTED: usize = 8;
 
-/// Summary of a dataset: [`std::fmt::Display`] prints it, serde serialises it.
+/// Summary of a dataset: [`std::fmt::Display`] prints it, serde serialises its figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Root of the dataset.
     pub root: PathBuf,
-    /// File format.
     pub format: Format,
-    /// Number of scans.
     pub scans: usize,
-    /// Number of scans read for this report, spread over the dataset.
-    pub scans_read: usize,
-    /// Size of the images as stored.
-    pub image: ImageSize,
-    /// True if images are stored as range x azimuth.
-    pub transposed: bool,
-    /// Azimuths of the scan with most of them.
-    pub azimuths: usize,
-    /// Range bins per azimuth.
-    pub bins: usize,
-    /// Depth of a range bin, m.
-    pub range_resolution_m: f32,
-    /// Offset of the ranges, m.
-    pub range_offset_m: f32,
-    /// Range of the centre of the last bin, m.
-    pub max_range_m: f32,
-    /// Encoder counts per turn, if azimuths come from an encoder.
-    pub encoder_counts: Option<u16>,
-    /// Definition of the stamps, one sentence.
-    pub stamp_meaning: &'static str,
-    /// Times of the scans; `None` if neither the file names nor a list give them.
-    pub timing: Option<TimingReport>,
-    /// Rows of the scans read.
-    pub rows: RowsReport,
-    /// The velocity of the radar by the Doppler shift of the last scan read; `None` where chirps do
-    /// not alternate.
-    pub velocity: Option<VelocityReport>,
-    /// Scans that could not be read.
-    pub unreadable: Vec<Unreadable>,
-    /// Ground truth files found.
-    pub ground_truths: Vec<GroundTruthReport>,
-    /// The log of a gyro beside the scans.
-    pub gyro: Option<GyroReport>,
-    /// The log of the wheels beside the scans.
-    pub wheels: Option<WheelReport>,
-    /// The fixes of a GNSS receiver in the bag, else its log beside the scans.
-    pub gnss: Option<GnssReport>,
+    /// All other figures, by their names in JSON.
+    #[serde(flatten)]
+    pub figures: Map<String, Value>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
-}
-
-/// A scan that could not be read.
-#[derive(Clone, Debug, Serialize)]
-pub struct Unreadable {
-    /// Index, from 0.
-    pub scan: usize,
-    /// File.
-    pub file: PathBuf,
-    /// Cause.
-    pub error: String,
+    /// The printed figures: a name and a text.
+    #[serde(skip)]
+    lines: Vec<(String, String)>,
 }
 
 /// Examines the dataset at `root`.
 ///
 /// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth
 /// is compared with it.
-///
-/// # Errors
-/// A dataset that cannot be opened; see [`open`].
 pub fn inspect(
     root: &Path,
     options: &DatasetOptions,
@@ -112,7 +56,7 @@ pub fn inspect(
     Ok(inspect_dataset(root, dataset, options, &logs, trajectory))
 }
 
-/// Settings by which the logs beside the scans are read.
+/// Settings for the readers of the logs beside the scans.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedLogs {
     /// The topic of GNSS in a bag, else the only one.
@@ -129,85 +73,223 @@ pub fn inspect_dataset(
     logs: &InspectedLogs,
     trajectory: Option<&Trajectory>,
 ) -> Report {
-    let timing = timing::examine(dataset.as_ref());
-    let read = read_scans(dataset.as_mut());
-    let mut report = assemble(root, dataset.as_ref(), read, timing);
-    report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
-    report.gyro = gyro::examine(root, report.timing.as_ref());
-    report.wheels = wheels::examine(root, logs.m_per_tick, report.timing.as_ref());
-    let topic = logs.gnss_topic.as_deref();
-    report.gnss = gnss::examine(root, dataset.as_mut(), topic, report.timing.as_ref());
-    report.findings = findings::list(&report, dataset.notes(), options);
+    let dataset = dataset.as_mut();
+    let mut report = Report {
+        root: root.to_owned(),
+        format: dataset.format(),
+        scans: dataset.len(),
+        figures: Map::new(),
+        findings: dataset.notes().to_vec(),
+        lines: Vec::new(),
+    };
+    let timing = timing::examine(dataset);
+    let read = ScansRead::of(dataset);
+    read.images(&mut report, dataset, options);
+    read.rows.lines(&mut report, dataset.encoder_counts());
+    velocity(&mut report, &read.scan.view());
+    match &timing {
+        Some(timing) => timing.add_to(&mut report),
+        None => report.find(
+            "The files are not named by times: scans have only the times of their rows.".to_owned(),
+        ),
+    }
+    report.figure("timing", &timing);
+    report.line("stamps", dataset.stamp_meaning().to_owned());
+    report.figure("stamp_meaning", dataset.stamp_meaning());
+    read.rows
+        .findings(&mut report, read.scans_read, &read.scan.geometry);
+    read.scans(&mut report);
+    ground_truth::examine(&mut report, dataset, trajectory);
+    logs::examine(&mut report, dataset, logs, timing.as_ref());
     report
+}
+
+impl Report {
+    fn line(&mut self, name: impl Into<String>, text: String) {
+        self.lines.push((name.into(), text));
+    }
+
+    fn figure(&mut self, name: &str, value: impl Serialize) {
+        self.figures.insert(name.to_owned(), json!(value));
+    }
+
+    fn find(&mut self, sentence: String) {
+        self.findings.push(sentence);
+    }
+
+    /// Returns the name of a file in the dataset.
+    fn name_of(&self, file: &Path) -> String {
+        let name = file.strip_prefix(&self.root).unwrap_or(file);
+        name.display().to_string()
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.root.display())?;
+        for (name, text) in &self.lines {
+            writeln!(f, "  {name:<13} {text}")?;
+        }
+        writeln!(f, "findings")?;
+        let mut findings = self.findings.iter();
+        findings.try_for_each(|sentence| writeln!(f, "  - {sentence}"))
+    }
 }
 
 /// Results of reading the scans.
 struct ScansRead {
     scans_read: usize,
-    rows: RowsReport,
-    unreadable: Vec<Unreadable>,
+    rows: rows::Survey,
+    /// Scans that could not be read, and why the first could not.
+    unreadable: Vec<Value>,
+    first_error: String,
     /// The last scan.
     scan: OwnedScan,
 }
 
-fn read_scans(dataset: &mut dyn Dataset) -> ScansRead {
-    let step = (dataset.len() * dataset.limits().bytes)
-        .div_ceil(PIXEL_BUDGET)
-        .max(1);
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    let (mut survey, mut unreadable, mut scans_read) = (rows::Survey::default(), Vec::new(), 0);
-    for index in (dataset.first()..dataset.len()).step_by(step) {
-        scans_read += 1;
-        match dataset.read(index, scan.slot()) {
-            Ok(geometry) => {
-                scan.geometry = geometry;
-                survey.add(&scan.view());
+impl ScansRead {
+    fn of(dataset: &mut dyn Dataset) -> Self {
+        let step = (dataset.len() * dataset.limits().bytes)
+            .div_ceil(PIXEL_BUDGET)
+            .max(1);
+        let mut read = Self {
+            scans_read: 0,
+            rows: rows::Survey::default(),
+            unreadable: Vec::new(),
+            first_error: String::new(),
+            scan: OwnedScan::with_limits(dataset.limits()),
+        };
+        for index in dataset.scans().step_by(step) {
+            read.scans_read += 1;
+            match dataset.read(index, read.scan.slot()) {
+                Ok(geometry) => {
+                    read.scan.geometry = geometry;
+                    read.rows.add(&read.scan.view());
+                }
+                Err(error) => {
+                    let error = error.to_string();
+                    let file = dataset.file(index);
+                    read.unreadable
+                        .push(json!({"scan": index, "file": file, "error": error}));
+                    if read.unreadable.len() == 1 {
+                        read.first_error = error;
+                    }
+                }
             }
-            Err(error) => unreadable.push(Unreadable {
-                scan: index,
-                file: dataset.file(index).to_owned(),
-                error: error.to_string(),
-            }),
+        }
+        read
+    }
+
+    fn images(&self, report: &mut Report, dataset: &dyn Dataset, options: &DatasetOptions) {
+        let (scans, scans_read) = (report.scans, self.scans_read);
+        report.line("format", report.format.to_string());
+        report.line(
+            "scans",
+            match scans_read < scans {
+                true => format!("{scans} ({scans_read} of them read)"),
+                false => scans.to_string(),
+            },
+        );
+        report.figure("scans_read", scans_read);
+        let (image, transposed) = (dataset.image_size(), dataset.is_transposed());
+        let side = match transposed {
+            true => ", transposed (range x azimuth)",
+            false => "",
+        };
+        report.line("images", format!("{image}{side}"));
+        report.figure("image", image);
+        report.figure("transposed", transposed);
+        let (geometry, azimuths) = (self.scan.geometry, self.rows.most_rows());
+        let (bins, bin_m) = (geometry.bins, geometry.range_resolution_m);
+        report.line(
+            "sweep",
+            format!("{azimuths} azimuths x {bins} range bins, clockwise"),
+        );
+        report.figure("azimuths", azimuths);
+        report.figure("bins", bins);
+        let offset_m = geometry.range_offset_m;
+        let offset = match offset_m == 0.0 {
+            true => String::new(),
+            false => format!(", offset {offset_m} m"),
+        };
+        let max_range_m = self.scan.view().range_m(bins as f32 - 1.0);
+        report.line(
+            "range",
+            format!("{bin_m:.6} m per bin{offset}, to {max_range_m:.1} m"),
+        );
+        for (name, value) in [
+            ("range_resolution_m", bin_m),
+            ("range_offset_m", offset_m),
+            ("max_range_m", max_range_m),
+        ] {
+            // The number with the decimals that an f32 has.
+            report.figure(name, value.to_string().parse::<f64>().ok());
+        }
+        if matches!(report.format, Format::Oxford | Format::Oord)
+            && options.range_resolution_m.is_none()
+        {
+            report.find(format!(
+                "The range resolution is {bin_m} m: with the 0.0432 m of the development kit, paths are more than 1 % short."
+            ));
         }
     }
-    ScansRead {
-        scans_read,
-        rows: survey.report(),
-        unreadable,
-        scan,
+
+    fn scans(&self, report: &mut Report) {
+        if report.scans == 1 {
+            report.find("There is only one scan, but a motion requires two.".to_owned());
+        }
+        if !self.unreadable.is_empty() {
+            let indices = self.unreadable.iter().map(|it| it["scan"].to_string());
+            let (places, first) = (some(indices), &self.first_error);
+            let (count, all) = (self.unreadable.len(), self.scans_read);
+            report.find(format!(
+                "{count} of {all} scans cannot be read (scans {places}): {first}."
+            ));
+        }
+        report.figure("unreadable", &self.unreadable);
     }
 }
 
-fn assemble(
-    root: &Path,
-    dataset: &dyn Dataset,
-    read: ScansRead,
-    timing: Option<TimingReport>,
-) -> Report {
-    let geometry = read.scan.geometry;
-    let max_range_m = read.scan.view().range_m(geometry.bins as f32 - 1.0);
-    Report {
-        root: root.to_owned(),
-        format: dataset.format(),
-        scans: dataset.len(),
-        scans_read: read.scans_read,
-        image: dataset.image_size(),
-        transposed: dataset.is_transposed(),
-        azimuths: read.rows.in_scan.1,
-        bins: geometry.bins,
-        range_resolution_m: geometry.range_resolution_m,
-        range_offset_m: geometry.range_offset_m,
-        max_range_m,
-        encoder_counts: dataset.encoder_counts(),
-        stamp_meaning: dataset.stamp_meaning(),
-        timing,
-        rows: read.rows,
-        velocity: velocity::examine(&read.scan.view()),
-        unreadable: read.unreadable,
-        ground_truths: Vec::new(),
-        gyro: None,
-        wheels: None,
-        gnss: None,
-        findings: Vec::new(),
+/// Adds the velocity of the radar by the Doppler shift of a scan whose chirps alternate.
+fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
+    let min_range_m = PointsConfig::default().min_range_m;
+    let (text, figures) = match DopplerEstimator::default().estimate(scan, min_range_m) {
+        Err(NoDoppler::UnknownChirps | NoDoppler::NotAlternating { .. } | NoDoppler::Scan(_)) => {
+            return report.figure("velocity", Value::Null);
+        }
+        Err(error) => {
+            let error = error.to_string();
+            let text = format!("unknown: {error}");
+            let none = Value::Null;
+            let figures =
+                json!({"velocity_mps": none, "sigma_mps": none, "bearings": 0, "error": error});
+            (text, figures)
+        }
+        Ok(found) => {
+            let ([ahead, left], [x, _, y]) = (found.velocity_mps, found.covariance);
+            let ([of_ahead, of_left], bearings) = ([x.sqrt(), y.sqrt()], found.bearings);
+            let text = format!(
+                "{ahead:.2} +- {of_ahead:.2} m/s ahead, {left:.2} +- {of_left:.2} m/s to the left, by the Doppler shift of {bearings} bearings of the last scan read"
+            );
+            let figures = json!({
+                "velocity_mps": found.velocity_mps,
+                "sigma_mps": [of_ahead, of_left],
+                "bearings": bearings,
+                "error": null,
+            });
+            (text, figures)
+        }
+    };
+    report.line("velocity", text);
+    report.figure("velocity", figures);
+}
+
+/// Lists the first items, and counts the rest.
+fn some(items: impl ExactSizeIterator<Item = String>) -> String {
+    let more = items.len().saturating_sub(MAX_LISTED);
+    let named = items.take(MAX_LISTED).collect::<Vec<_>>().join(", ");
+    match more {
+        0 => named,
+        _ => format!("{named} and {more} more"),
     }
 }

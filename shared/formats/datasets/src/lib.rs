@@ -2,11 +2,11 @@
 //!
 //! Reading order:
 //! - [`mod@dataset`]: the scans of a recording behind one trait;
-//! - [`fingerprint`]: what tells a recording from another one;
+//! - [`fingerprint`]: the identity of a recording;
 //! - [`GyroLog`], [`WheelLog`], [`GnssLog`]: what other sensors logged; [`ScanSamples`]: which of
 //!   it goes with each scan;
 //! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
-//! - [`mod@inspect`]: a summary of a recording and of its faults.
+//! - [`inspect()`]: a summary of a recording and of its faults.
 
 pub mod dataset;
 pub mod fingerprint;
@@ -16,7 +16,8 @@ mod gps_imu_twist;
 pub mod ground_truth;
 mod gyro_log;
 mod header;
-pub mod inspect;
+mod inspect;
+mod logs;
 mod plain_words;
 mod scan_samples;
 mod stretches;
@@ -25,18 +26,19 @@ mod wheel_log;
 
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, correct_eccentricity,
-    encoder_counts, foreign, frame_stamps, is_dataset, middle_ns, open, open_resolved, open_source,
-    parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
+    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, check_capacity,
+    correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset, middle_ns, open,
+    open_resolved, open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use first_scan::check_first_scan;
-pub use gnss_log::{GnssFaults, GnssLog, GnssLogError, LoggedFix, ReceivedFixes};
+pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
-pub use gyro_log::{GyroLog, LogError, LogFaults, LogGap, SampleTrack};
+pub use gyro_log::{GyroLog, LogFaults, LogGap, SampleTrack};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
+pub use logs::LogError;
 pub use plain_words::in_plain_words;
 pub use scan_samples::ScanSamples;
 pub use wheel_log::WheelLog;

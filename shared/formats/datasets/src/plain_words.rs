@@ -1,7 +1,7 @@
 //! Wrong values of a file or an override, in the words of a person.
 
-/// Returns what a deserialiser says of the value of `key` in the words of a person; `None` if it
-/// says something else than that the value is of another kind.
+/// Returns a deserialiser's message on the value of `key` in plain words; `None` if the message
+/// does not report a wrong type.
 pub fn in_plain_words(key: &str, message: &str) -> Option<String> {
     if let Some(variants) = message.strip_prefix("unknown variant ") {
         let (found, expected) = variants.split_once(", expected ")?;

@@ -7,9 +7,9 @@ use gyre_samples::{
 };
 
 use crate::{
-    WheelLog,
+    LogError, WheelLog,
     dataset::{Dataset, Format},
-    gyro_log::{GyroLog, LogError, LogFaults, SampleTrack},
+    gyro_log::{GyroLog, LogFaults, SampleTrack},
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
@@ -19,21 +19,17 @@ pub enum ScanSamples {
     None,
     /// From logs.
     Log {
-        /// The samples.
         track: SampleTrack,
         /// A sentence for each kind of fault in a log, with its path.
         faults: Vec<String>,
     },
-    /// With the scans of the recording of a run, whatever their stamps: those of these kinds.
+    /// Recorded with the scans of a run, whatever their stamps: the samples of these kinds.
     Recorded(Vec<SampleKind>),
 }
 
 impl ScanSamples {
-    /// Opens what the sections `[gyro]` and `[wheels]` name for the dataset in this folder, or for
-    /// this bag.
-    ///
-    /// # Errors
-    /// No log beside the scans, or one that cannot be read.
+    /// Opens the logs in the sections `[gyro]` and `[wheels]` for the dataset in this folder, or
+    /// for this bag.
     pub fn open(
         gyro: &GyroConfig,
         wheels: &WheelsConfig,
@@ -52,7 +48,11 @@ impl ScanSamples {
                     None => GyroLog::read(&GyroLog::find(folder)?)?,
                 })
             }
-            GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live(SampleKind::Gyro)),
+            GyroKind::Udp | GyroKind::Ros2 => {
+                return Err(LogError::Live {
+                    of: SampleKind::Gyro.section(),
+                });
+            }
             GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
         };
         let speeds = match wheels.kind {
@@ -64,7 +64,11 @@ impl ScanSamples {
                     None => WheelLog::read(&WheelLog::find(folder)?, wheels.m_per_tick)?,
                 })
             }
-            WheelsKind::Udp | WheelsKind::Ros2 => return Err(LogError::Live(SampleKind::Wheels)),
+            WheelsKind::Udp | WheelsKind::Ros2 => {
+                return Err(LogError::Live {
+                    of: SampleKind::Wheels.section(),
+                });
+            }
             WheelsKind::Log => {
                 let file = wheels.file.clone().unwrap_or_default();
                 Some(WheelLog::read(&file, wheels.m_per_tick)?)
@@ -79,9 +83,6 @@ impl ScanSamples {
     }
 
     /// Takes the samples of the log of a gyro.
-    ///
-    /// # Errors
-    /// It has none from the first scan to the last, or another axis than the configuration.
     pub fn of_gyro(
         log: &GyroLog,
         config: &GyroConfig,
@@ -96,9 +97,6 @@ impl ScanSamples {
     }
 
     /// Takes the samples of the log of the wheels.
-    ///
-    /// # Errors
-    /// It has none from the first scan to the last.
     pub fn of_wheels(
         log: &WheelLog,
         config: &WheelsConfig,
@@ -165,7 +163,7 @@ impl ScanSamples {
             && track.between(first_ns, last_ns).is_empty()
         {
             return Err(LogError::Elsewhere {
-                of,
+                of: of.section(),
                 path: path.to_owned(),
                 after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
                 steps: match faults.clock_steps_s.is_empty() {

@@ -9,8 +9,8 @@ pub(crate) fn between(count: usize, starts: impl Iterator<Item = usize>) -> Vec<
     bounds.windows(2).map(|pair| pair[0]..pair[1]).collect()
 }
 
-/// Returns the chain of stretches, each of which follows the one before, that has the most rows. No
-/// two neighbours of it are more than `look_back` stretches apart.
+/// Returns the chain of stretches with the most rows; each stretch follows the one before. No two
+/// neighbours of it are more than `look_back` stretches apart.
 pub(crate) fn longest_chain(
     stretches: &[Range<usize>],
     look_back: usize,

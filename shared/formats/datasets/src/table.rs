@@ -9,24 +9,18 @@ use crate::header::Header;
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
 /// Marks between columns that are looked for in the first row.
 const MARKS: [u8; 3] = [b',', b';', b'\t'];
-/// The first field of a row in place of as many as the second says, which could not be read before.
+/// The first field of a row that replaces unreadable rows; the second field is their number.
 const UNREADABLE: &str = "unreadable";
 
-/// The columns of a table in which each row is an entry.
+/// The columns of a table with one entry per row.
 pub(crate) trait Columns: Sized {
     /// The entry that a row becomes.
     type Entry;
 
     /// Finds the columns by their names.
-    ///
-    /// # Errors
-    /// A column that is missing, and the remedy.
     fn by_names(header: &Header) -> Result<Self, String>;
 
     /// Finds the columns of a table without names, by their number.
-    ///
-    /// # Errors
-    /// An unknown number, and the remedy.
     fn by_number(columns: usize) -> Result<Self, String> {
         Err(format!(
             "its {columns} columns have no names: the first row must name them"
@@ -46,10 +40,7 @@ pub(crate) trait Columns: Sized {
 #[derive(Clone)]
 pub(crate) struct Rows<C: Columns> {
     pub columns: C,
-    pub entries: Vec<C::Entry>,
-    pub unreadable: Unreadable,
-    /// Rows that state that nothing was measured.
-    pub unmeasured: usize,
+    pub raw: Raw<C::Entry>,
     /// Columns that state so, with the number for that.
     stating: Vec<(usize, f64)>,
     /// The number of columns, and the mark between them.
@@ -60,9 +51,6 @@ pub(crate) struct Rows<C: Columns> {
 
 impl<C: Columns> Rows<C> {
     /// Reads a table from its beginning.
-    ///
-    /// # Errors
-    /// Columns that are missing, and the remedy.
     pub fn of(text: &str) -> Result<Self, String> {
         let first = text.lines().next().unwrap_or_default().as_bytes();
         let mark = MARKS.into_iter().find(|mark| first.contains(mark));
@@ -85,9 +73,7 @@ impl<C: Columns> Rows<C> {
             stating,
             mark,
             count: row.len(),
-            entries: Vec::new(),
-            unreadable: Unreadable::default(),
-            unmeasured: 0,
+            raw: Raw::of(Vec::new()),
             lines: 0,
         };
         // Without names the first row is an entry.
@@ -117,16 +103,18 @@ impl<C: Columns> Rows<C> {
             text.eq_ignore_ascii_case("false") || text.parse() == Ok(*number)
         };
         match self.columns.entry(row).filter(|_| row.len() == self.count) {
-            Some(_) if self.stating.iter().any(states_so) => self.unmeasured += 1,
-            Some(entry) => self.entries.push(entry),
+            Some(_) if self.stating.iter().any(states_so) => self.raw.unmeasured += 1,
+            Some(entry) => self.raw.entries.push(entry),
             None if row.len() == self.count && self.columns.is_unmeasured(row) => {
-                self.unmeasured += 1;
+                self.raw.unmeasured += 1;
             }
             None => {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
                 let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
                 let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
-                self.unreadable.add(times, line, || why(row, self.count));
+                self.raw
+                    .unreadable
+                    .add(times, line, || why(row, self.count));
             }
         }
     }
@@ -139,6 +127,31 @@ fn reader(text: &str, mark: u8) -> csv::Reader<&[u8]> {
         .trim(csv::Trim::All)
         .delimiter(mark)
         .from_reader(text.as_bytes())
+}
+
+/// The entries of a log as they stand there.
+#[derive(Clone, Debug)]
+pub(crate) struct Raw<T> {
+    pub entries: Vec<T>,
+    pub unreadable: Unreadable,
+    /// Rows or messages that state that nothing was measured.
+    pub unmeasured: usize,
+}
+
+impl<T> Raw<T> {
+    /// Entries that are of no file.
+    pub fn of(entries: Vec<T>) -> Self {
+        Self {
+            entries,
+            unreadable: Unreadable::default(),
+            unmeasured: 0,
+        }
+    }
+
+    /// All entries, those that cannot be used too.
+    pub fn count(&self) -> usize {
+        (self.entries.len() + self.unmeasured).saturating_add(self.unreadable.count)
+    }
 }
 
 /// Rows that cannot be read.

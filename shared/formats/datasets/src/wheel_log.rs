@@ -1,6 +1,6 @@
 //! The log of the wheels' speed as a file: a table as CSV.
 //!
-//! `counts`: that of an encoder or an odometer, of which speeds are made.
+//! `counts`: the log of an encoder or an odometer, converted to speeds.
 
 mod counts;
 
@@ -13,14 +13,13 @@ use counts::CountColumns;
 
 use crate::{
     LogError, LogFaults, SampleTrack,
-    gyro_log::{
-        Raw, SampleColumns,
-        faults::{Plausible, examine},
-        read_table, roots,
-    },
+    gyro_log::faults::{Plausible, examine},
     header::{Header, Sign, Stamp},
-    table::Columns,
+    logs,
+    table::{Columns, Raw},
 };
+
+const OF: &str = SampleKind::Wheels.section();
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
@@ -40,48 +39,32 @@ pub struct WheelLog {
     pub samples: Vec<Sample>,
     /// Faults of the log, with the number of samples that were left out for each.
     pub faults: LogFaults,
-    /// The file.
     pub path: PathBuf,
 }
 
 impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or those of
-    /// ticks, `stamp_ns,ticks`, of which each is so many metres long.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
-    /// wheels, and ticks whose length is not given.
+    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or in
+    /// `stamp_ns,ticks` for ticks of `m_per_tick` metres.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
-        let no_speed = match read_table::<SpeedColumns>(path) {
-            Ok(raw) => return Self::examined(raw, path),
+        let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
+            Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
             Err(error) => error,
         };
-        match read_table::<CountColumns>(path) {
-            Ok(raw) => Ok(Self::with(counts::speeds(raw, path, m_per_tick)?, path)),
+        match logs::rows::<CountColumns>(path, OF) {
+            Ok(rows) => Ok(Self::with(counts::speeds(rows, path, m_per_tick)?, path)),
             Err(_) => Err(no_speed),
         }
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
-    /// the images.
-    ///
-    /// # Errors
-    /// There is none.
+    /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
+    /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
-        let paths = roots(folder).flat_map(|root| PLACES.iter().map(|place| root.join(place)));
-        let found = paths.into_iter().find(|path| path.is_file());
-        found.ok_or_else(|| LogError::None {
-            of: SampleKind::Wheels,
-            folder: folder.to_owned(),
-        })
+        logs::find(folder, OF, &PLACES)
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    ///
-    /// # Errors
-    /// Stamps or speeds that cannot be those of wheels.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        Self::examined(Raw::of(samples), path)
+        Self::examined(Raw::of(samples), false, path)
     }
 
     /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
@@ -89,8 +72,11 @@ impl WheelLog {
         SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
     }
 
-    fn examined(raw: Raw, path: &Path) -> Result<Self, LogError> {
-        Ok(Self::with(examine(raw, path, &SPEEDS)?, path))
+    fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
+        Ok(Self::with(
+            examine(raw, unit_is_assumed, path, &SPEEDS)?,
+            path,
+        ))
     }
 
     fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
@@ -102,7 +88,6 @@ impl WheelLog {
     }
 }
 
-/// Names of the speed.
 const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
 /// Units at the end of its name.
 const UNITS: [(&str, f64); 8] = [
@@ -116,7 +101,6 @@ const UNITS: [(&str, f64); 8] = [
     ("_mph", 0.44704),
 ];
 
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Columns with the direction of a speed that has no sign.
@@ -170,14 +154,6 @@ impl Columns for SpeedColumns {
             None => speed,
         };
         Some(Sample::speed(self.stamp.ns(row)?, speed))
-    }
-}
-
-impl SampleColumns for SpeedColumns {
-    const OF: SampleKind = SampleKind::Wheels;
-
-    fn unit_is_assumed(&self) -> bool {
-        self.unit.is_none()
     }
 }
 

@@ -1,14 +1,33 @@
 //! Findings of `inspect` on real and generated datasets.
 
 use crate::common::{Sweep, real, write_oxford, write_radiate};
-use gyre_datasets::inspect::Chirps;
 use gyre_datasets::{DatasetOptions, Report, inspect, read_trajectory};
 use gyre_radar::Trajectory;
+use serde_json::{Value, json};
 
 fn report(folder: &str, trajectory: Option<&Trajectory>) -> Option<Report> {
     let report = inspect(&real(folder)?, &DatasetOptions::default(), trajectory).unwrap();
     println!("{report}");
     Some(report)
+}
+
+/// The figure at a path as in `/timing/stalls`.
+fn at<'a>(report: &'a Report, path: &str) -> &'a Value {
+    let (name, rest) = path[1..].split_once('/').unwrap_or((&path[1..], ""));
+    let rest = if rest.is_empty() {
+        String::new()
+    } else {
+        format!("/{rest}")
+    };
+    report.figures[name].pointer(&rest).unwrap()
+}
+
+fn number(report: &Report, path: &str) -> f64 {
+    at(report, path).as_f64().unwrap()
+}
+
+fn count(report: &Report, path: &str) -> usize {
+    at(report, path).as_array().unwrap().len()
 }
 
 fn mentions(report: &Report, words: &[&str]) -> bool {
@@ -32,22 +51,24 @@ fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
     let Some(report) = report("radiate-2019-02-12", None) else {
         return;
     };
-    let timing = report.timing.as_ref().unwrap();
-    assert_eq!((report.scans, report.scans_read), (466, 466));
-    assert_eq!(timing.stalls.len(), 7, "{:?}", timing.stalls);
-    let worst = timing.stalls.iter().map(|s| s.late_s).fold(0.0, f64::max);
-    assert!((1.3..1.5).contains(&worst), "{worst}");
-    assert_eq!(timing.missing_scans, 0);
-    assert!(
-        (timing.period_s - 0.25002).abs() < 1e-5,
-        "{}",
-        timing.period_s
+    assert_eq!(
+        (report.scans, at(&report, "/scans_read")),
+        (466, &json!(466))
     );
+    let stalls = at(&report, "/timing/stalls").as_array().unwrap();
+    assert_eq!(stalls.len(), 7, "{stalls:?}");
+    let worst = stalls.iter().map(|s| s["delay_s"].as_f64().unwrap());
+    let worst = worst.fold(0.0, f64::max);
+    assert!((1.3..1.5).contains(&worst), "{worst}");
+    assert_eq!(at(&report, "/timing/missing_scans"), 0);
+    let period_s = number(&report, "/timing/period_s");
+    assert!((period_s - 0.25002).abs() < 1e-5, "{period_s}");
     assert_mentions(&report, &["stalled 7 times"]);
     assert_mentions(&report, &["without leading zeros"]);
     assert_mentions(&report, &["transposed", "576"]);
     assert_mentions(&report, &["Range bins 0 to 10", "ringing"]);
-    assert!(report.transposed && (report.max_range_m - 99.9).abs() < 0.1);
+    assert_eq!(at(&report, "/transposed"), true);
+    assert!((number(&report, "/max_range_m") - 99.9).abs() < 0.1);
 }
 
 #[test]
@@ -65,18 +86,15 @@ fn a_late_ground_truth_is_detected_with_a_trajectory() {
         poses: truth.poses.iter().step_by(n).copied().collect(),
     };
     let report = report("radiate-2019-02-12", Some(&every(5))).unwrap();
-    let clock = |name: &str| {
-        report
-            .ground_truths
-            .iter()
-            .find(|t| t.file.ends_with(name))
-            .unwrap()
-            .clock
-            .unwrap()
+    let delay_s = |name: &str| {
+        let truths = at(&report, "/ground_truths").as_array().unwrap();
+        let is_it = |it: &&Value| it["file"].as_str().unwrap().ends_with(name);
+        let clock = &truths.iter().find(is_it).unwrap()["clock"];
+        clock["delay_s"].as_f64().unwrap()
     };
-    assert!(clock("ground_truth.tum").agrees());
-    let late = clock("gnss_as_logged.tum");
-    assert!((1.4..1.7).contains(&late.late_s), "{late:?}");
+    assert!(delay_s("ground_truth.tum").abs() < 0.1);
+    let delay_s = delay_s("gnss_as_logged.tum");
+    assert!((1.4..1.7).contains(&delay_s), "{delay_s}");
     assert_mentions(&report, &["gnss_as_logged.tum", "late"]);
     assert!(!mentions(&report, &["ground_truth.tum is"]));
 }
@@ -86,10 +104,7 @@ fn tiny_foggy_has_no_ground_truth_and_no_stall() {
     let Some(report) = report("radiate-tiny_foggy", None) else {
         return;
     };
-    assert_eq!(
-        (report.scans, report.timing.as_ref().unwrap().stalls.len()),
-        (18, 0)
-    );
+    assert_eq!((report.scans, count(&report, "/timing/stalls")), (18, 0));
     assert_mentions(&report, &["transposed"]);
     assert_mentions(&report, &["No ground truth"]);
 }
@@ -101,14 +116,19 @@ fn resolution_and_bursts_of_oxford_are_reported() {
     };
     assert_mentions(&report, &["0.0438 m", "0.0432"]);
     assert_mentions(&report, &["bursts"]);
+    let rows = at(&report, "/rows");
+    let [all, not_measured, lost] = ["rows", "not_measured", "lost"].map(|it| &rows[it]);
+    assert_eq!([all, not_measured, lost], [4400, 0, 0]);
+    assert!((number(&report, "/rows/first_azimuth_deg/0") - 0.836).abs() < 1e-3);
+    let truth = &at(&report, "/ground_truths")[0];
     assert_eq!(
-        (report.rows.rows, report.rows.not_measured, report.rows.lost),
-        (4400, 0, 0)
+        (&truth["poses"], &truth["scans_covered"]),
+        (&json!(11), &json!(11))
     );
-    assert!((report.rows.first_azimuth_deg.0 - 0.836).abs() < 1e-3);
-    let truth = &report.ground_truths[0];
-    assert_eq!((truth.poses, truth.scans_covered), (11, Some(11)));
-    assert!(truth.nearest_pose_s.unwrap() < 2e-3, "{truth:?}");
+    assert!(
+        truth["nearest_pose_s"].as_f64().unwrap() < 2e-3,
+        "{truth:?}"
+    );
 }
 
 #[test]
@@ -116,17 +136,15 @@ fn boreas_rt_and_fomo_are_reported() {
     let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else {
         return;
     };
-    assert_eq!(
-        (rt.format.name(), rt.rows.chirps, rt.rows.not_measured),
-        ("boreas-rt", Chirps::Alternating, 0)
-    );
+    assert_eq!(rt.format.name(), "boreas-rt");
+    assert_eq!(at(&rt, "/rows/chirps"), "alternating");
+    assert_eq!(at(&rt, "/rows/not_measured"), 0);
     assert_mentions(&rt, &["Byte 10 alternates", "chirp"]);
     assert_mentions(&rt, &["only one scan"]);
     let fomo = report("samples/fomo-2025-10-14", None).unwrap();
-    assert_eq!(
-        (fomo.format.name(), fomo.rows.chirps, fomo.rows.not_measured),
-        ("fomo", Chirps::Unknown, 0)
-    );
+    assert_eq!(fomo.format.name(), "fomo");
+    assert_eq!(at(&fomo, "/rows/chirps"), "unknown");
+    assert_eq!(at(&fomo, "/rows/not_measured"), 0);
     assert_mentions(&fomo, &["only one scan"]);
     assert_mentions(&fomo, &["Byte 10 is 0"]);
     assert_mentions(&fomo, &["gt.txt", "positions only"]);
@@ -155,13 +173,13 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     pixels[39 * sweep.width() + 8..][..2].copy_from_slice(&5_u16.to_le_bytes());
     crate::common::write_png(&files[9], sweep.width(), sweep.rows, &pixels);
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
-    let timing = report.timing.as_ref().unwrap();
-    assert_eq!(
-        (report.scans, timing.missing_scans, timing.gaps[0].scan),
-        (11, 1, 4)
-    );
-    assert_eq!((report.unreadable.len(), report.unreadable[0].scan), (1, 6));
-    assert_eq!((report.rows.not_measured, report.rows.lost), (4, 1));
+    assert_eq!(report.scans, 11);
+    assert_eq!(at(&report, "/timing/missing_scans"), 1);
+    assert_eq!(at(&report, "/timing/gaps/0/scan"), 4);
+    assert_eq!(count(&report, "/unreadable"), 1);
+    assert_eq!(at(&report, "/unreadable/0/scan"), 6);
+    assert_eq!(at(&report, "/rows/not_measured"), 4);
+    assert_eq!(at(&report, "/rows/lost"), 1);
     assert_mentions(&report, &["1 scan is missing, before scans 4"]);
     assert_mentions(&report, &["truncated"]);
     let json = serde_json::to_string(&report).unwrap();
@@ -175,21 +193,16 @@ fn a_dataset_without_faults_has_few_findings() {
     // What macOS stores beside a file is no ground truth.
     std::fs::write(root.path().join("._ground_truth.tum"), "Mac OS X").unwrap();
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
-    let timing = report.timing.as_ref().unwrap();
-    assert!(report.ground_truths.is_empty());
-    assert_eq!(
-        (
-            timing.stalls.len(),
-            timing.gaps.len(),
-            timing.backwards.len()
-        ),
-        (0, 0, 0)
-    );
-    assert!(
-        !mentions(&report, &["stalled"])
-            && !mentions(&report, &["lost"])
-            && report.unreadable.is_empty()
-    );
+    for list in [
+        "/ground_truths",
+        "/timing/stalls",
+        "/timing/gaps",
+        "/timing/backwards",
+        "/unreadable",
+    ] {
+        assert_eq!(count(&report, list), 0, "{list}");
+    }
+    assert!(!mentions(&report, &["stalled"]) && !mentions(&report, &["lost"]));
 }
 
 #[test]
@@ -197,8 +210,8 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     let folder = tempfile::tempdir().unwrap();
     write_oxford(folder.path(), 8);
     let plain = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
-    assert!(plain.gyro.is_none() && !plain.to_string().contains("gyro"));
-    let first_ns = plain.timing.as_ref().unwrap().first_ns;
+    assert!(at(&plain, "/gyro").is_null() && !plain.to_string().contains("gyro"));
+    let first_ns = at(&plain, "/timing/first_ns").as_i64().unwrap();
     // 100 Hz for 10 s from half a second before the first scan; x points up; it turns for 4 s.
     let rows = (0..1000).filter(|k| !(700..720).contains(k)).map(|k| {
         let stamp_ns = first_ns - 500_000_000 + 10_000_000 * k;
@@ -216,15 +229,15 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     std::fs::write(folder.path().join("imu.csv"), text).unwrap();
     let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
     println!("{report}");
-    let gyro = report.gyro.as_ref().unwrap();
-    assert_eq!(gyro.times.samples, 980);
-    assert!((gyro.times.rate_hz - 100.0).abs() < 1e-6 && (gyro.times.missing - 0.02).abs() < 1e-6);
-    let [before, after] = gyro.times.after_scans_s.unwrap();
-    let scans_s = (report.timing.as_ref().unwrap().last_ns - first_ns) as f64 * 1e-9;
+    assert_eq!(at(&report, "/gyro/samples"), 980);
+    assert!((number(&report, "/gyro/rate_hz") - 100.0).abs() < 1e-6);
+    assert!((number(&report, "/gyro/missing") - 0.02).abs() < 1e-6);
+    let [before, after] = [0, 1].map(|k| number(&report, &format!("/gyro/after_scans_s/{k}")));
+    let scans_s = (number(&report, "/timing/last_ns") - first_ns as f64) * 1e-9;
     assert!((before + 0.5).abs() < 1e-6 && (after - (9.49 - scans_s)).abs() < 1e-6);
-    let quiet = gyro.quiet.unwrap();
-    assert!(quiet.after_s >= 4.0 && (quiet.mean_degps[0] - 0.01f64.to_degrees()).abs() < 1e-9);
-    assert_eq!(gyro.up_by_gravity.unwrap().name(), "x");
+    assert!(number(&report, "/gyro/quiet/after_s") >= 4.0);
+    let mean_degps = number(&report, "/gyro/quiet/mean_degps/0");
+    assert!((mean_degps - 0.01f64.to_degrees()).abs() < 1e-9);
     assert_mentions(&report, &["Samples are missing in 1 places"]);
     assert_mentions(&report, &["by gravity its axis x points up"]);
     assert_mentions(&report, &["gyre calibrate", "imu.csv"]);
@@ -243,7 +256,7 @@ fn the_logs_of_wheels_and_gnss_are_told_with_what_they_say_and_their_faults() {
     let folder = tempfile::tempdir().unwrap();
     write_oxford(folder.path(), 8);
     let examine = || inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
-    let first_ns = examine().timing.as_ref().unwrap().first_ns;
+    let first_ns = at(&examine(), "/timing/first_ns").as_i64().unwrap();
     let write = |name: &str, head: &str, row: &dyn Fn(i64) -> String| {
         let rows: String = (0..100).map(row).collect();
         std::fs::write(folder.path().join(name), format!("{head}\n{rows}")).unwrap();
@@ -264,17 +277,18 @@ fn the_logs_of_wheels_and_gnss_are_told_with_what_they_say_and_their_faults() {
     );
     let report = examine();
     println!("{report}");
-    let (wheels, gnss) = (
-        report.wheels.as_ref().unwrap(),
-        report.gnss.as_ref().unwrap(),
-    );
-    assert!((wheels.path_m - 99.0).abs() < 1e-6 && (wheels.fastest_mps - 10.0).abs() < 1e-6);
-    assert!((wheels.times.rate_hz - 10.0).abs() < 1e-6);
-    assert!(
-        gnss.on_the_earth && (gnss.reach_m - 99.1).abs() < 0.3,
-        "{gnss:?}"
-    );
-    assert_eq!((gnss.times.samples, gnss.sigma_m), (99, Some(0.5)));
+    for (path, expected, within) in [
+        ("/wheels/path_m", 99.0, 1e-6),
+        ("/wheels/fastest_mps", 10.0, 1e-6),
+        ("/wheels/rate_hz", 10.0, 1e-6),
+        ("/gnss/reach_m", 99.1, 0.3),
+        ("/gnss/samples", 99.0, 0.0),
+        ("/gnss/sigma_m", 0.5, 0.0),
+    ] {
+        let found = number(&report, path);
+        assert!((found - expected).abs() <= within, "{path}: {found}");
+    }
+    assert_eq!(at(&report, "/gnss/on_the_earth"), true);
     assert_mentions(&report, &["left out, or sorted: 1 at 0, 0"]);
     assert_mentions(&report, &["wheels.csv", "wheels.kind"]);
     assert_mentions(&report, &["gnss.csv", "gnss.kind"]);
@@ -293,11 +307,11 @@ fn stalls_of_the_gyro_of_radiate_are_reported() {
     let Some(report) = report("radiate-2019-02-12", None) else {
         return;
     };
-    let gyro = report.gyro.as_ref().unwrap();
+    assert!((number(&report, "/gyro/rate_hz") - 20.0).abs() < 0.1);
+    assert!((0.05..0.06).contains(&number(&report, "/gyro/missing")));
     assert!(
-        (gyro.times.rate_hz - 20.0).abs() < 0.1 && (0.05..0.06).contains(&gyro.times.missing),
-        "{gyro:?}"
+        at(&report, "/gyro/up_by_gravity").is_null(),
+        "gravity is taken out"
     );
-    assert!(gyro.up_by_gravity.is_none(), "gravity is taken out");
     assert_mentions(&report, &["missing in 13 places, for up to 0.80 s"]);
 }

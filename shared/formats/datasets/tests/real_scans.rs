@@ -304,7 +304,7 @@ fn a_gap_moves_no_scan_of_a_short_recording() {
     }
 }
 
-/// The truth is not known. By what the correlations of both chirps show, at zero in all directions,
+/// The truth is not known. The correlations of both chirps, at zero in all directions, show that
 /// the vehicle stands.
 #[test]
 fn a_scan_of_boreas_rt_says_that_its_vehicle_stands() {

@@ -136,45 +136,6 @@ fn real_kitti_and_tum_files_are_read() {
 }
 
 #[test]
-fn tum_yaw_is_independent_of_roll_and_pitch() {
-    let rotation = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
-    let q = rotation.coords;
-    let text = format!("# comment\n1.5 1 2 3 {} {} {} {}\n", q.x, q.y, q.z, q.w);
-    let pose = from_text("a.tum", &text).unwrap().poses[0];
-    assert!((pose.rotation.angle() - 1.1).abs() < 1e-12);
-    assert_eq!((pose.translation.x, pose.translation.y), (1.0, 2.0));
-}
-
-#[test]
-fn boreas_odometry_files_are_inverted_and_mirrored() {
-    // The first frame in the sensor frame after 2 m ahead and a right turn of 0.1 rad (y right, yaw
-    // clockwise).
-    let later = Isometry2::new(Vector2::new(2.0, 0.3), 0.1);
-    let m = later.inverse().to_homogeneous();
-    let line = |t: i64, m: &nalgebra::Matrix3<f64>| {
-        format!(
-            "{t} {} {} 0 {} {} {} 0 {} 0 0 1 0\n",
-            m[(0, 0)],
-            m[(0, 1)],
-            m[(0, 2)],
-            m[(1, 0)],
-            m[(1, 1)],
-            m[(1, 2)]
-        )
-    };
-    let text = [
-        line(1_630_597_331_060_160, &nalgebra::Matrix3::identity()),
-        line(1_630_597_331_310_779, &m),
-    ]
-    .concat();
-    let trajectory = from_text("boreas.txt", &text).unwrap();
-    let pose = trajectory.poses[1];
-    assert!((pose.translation.x - 2.0).abs() < 1e-12 && (pose.translation.y + 0.3).abs() < 1e-12);
-    assert!((pose.rotation.angle() + 0.1).abs() < 1e-12);
-    assert_eq!(trajectory.stamp_ns.unwrap()[1], 1_630_597_331_310_779_000);
-}
-
-#[test]
 fn invalid_files_are_rejected_with_their_line() {
     let cases = [
         ("", "empty"),

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// The longest time for which a chunk is not synchronised. What a power failure takes is that.
+/// The longest time for which a chunk is not synchronised. A power failure loses at most this much.
 const SYNC_PERIOD: Duration = Duration::from_secs(1);
 
 /// The call that synchronises a file.
@@ -70,7 +70,7 @@ impl Disk {
         Ok(())
     }
 
-    /// Cuts off what is behind the last complete table.
+    /// Cuts off everything behind the last complete table.
     pub fn cut_back(&self) -> io::Result<()> {
         self.file.set_len(self.complete_bytes)
     }

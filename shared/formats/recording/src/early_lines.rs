@@ -27,7 +27,7 @@ impl EarlyLines {
         }
     }
 
-    /// Returns the lines; before them one that says how many are left out, if there are any.
+    /// Returns the lines, preceded by a line with the number of omitted lines if there are any.
     pub fn into_lines(self) -> impl Iterator<Item = LogLine> {
         let left_out = (self.left_out > 0).then(|| LogLine {
             written_ns: self.lines.front().map_or(0, |line| line.written_ns),

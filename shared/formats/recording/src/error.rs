@@ -1,71 +1,83 @@
-//! The errors of recordings.
+//! The errors of recordings and bags.
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
+use gyre_datasets::OpenError;
+use gyre_ros2_messages::BadMessage;
 use mcap::McapError;
 use thiserror::Error;
 
-/// A recording that cannot be written or read.
+/// A recording or a bag that cannot be written or read. Its `Display` is one sentence.
 #[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum RecordingError {
-    /// The system refuses it.
     #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
-    /// The library cannot write or read it.
+    Io { path: PathBuf, source: io::Error },
+    /// An error of the library.
     #[error("{path}: {source}")]
-    Mcap {
-        /// The file.
-        path: PathBuf,
-        /// The library's error.
-        source: McapError,
-    },
-    /// Not a recording of a run.
+    Mcap { path: PathBuf, source: McapError },
+    #[error(
+        "{0} does not begin with the signature of MCAP: it is another file, or was not copied whole"
+    )]
+    NoMcap(PathBuf),
     #[error("{path} is not a recording of Gyre: {reason}")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// The missing part.
-        reason: String,
-    },
-    /// A part of it is damaged.
+    Foreign { path: PathBuf, reason: String },
+    /// A bag that cannot be read as it is.
+    #[error("the bag {path} {reason}")]
+    Unreadable { path: PathBuf, reason: String },
     #[error("{path} is damaged at byte {offset}: {reason}")]
     Damaged {
-        /// The file.
         path: PathBuf,
-        /// The position of the record.
         offset: u64,
-        /// The problem.
         reason: String,
     },
-    /// A message that was not recorded.
     #[error(
         "{path} has no message {seq} of topic `{topic}`: the recorder missed it, or the topic was not among its --topics"
     )]
     Absent {
-        /// The file.
         path: PathBuf,
-        /// The topic.
         topic: String,
-        /// The sequence number.
         seq: u64,
     },
+    #[error("cannot write a message: {0}")]
+    Message(#[from] BadMessage),
+    #[error("cannot write {path}: {reason}")]
+    Unwritable { path: PathBuf, reason: String },
 }
 
 impl RecordingError {
-    /// An error of the library. It hides what the system says.
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    pub(crate) fn unreadable(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            reason: reason.into(),
+        }
+    }
+
+    /// An error of the library, which wraps the error of the system.
     pub(crate) fn of(path: &Path, error: McapError) -> Self {
         let path = path.to_owned();
         match error {
             McapError::Io(source) => Self::Io { path, source },
             source => Self::Mcap { path, source },
+        }
+    }
+}
+
+impl From<RecordingError> for OpenError {
+    fn from(error: RecordingError) -> Self {
+        match error {
+            RecordingError::Io { path, source } => Self::Io { path, source },
+            other => Self::Recording(other.to_string()),
         }
     }
 }

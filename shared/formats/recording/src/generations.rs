@@ -1,5 +1,5 @@
-//! The generations of numbers in a recording: a live run gives numbers anew when masking is started
-//! again, and what had been recorded under them is void.
+//! The generations of numbers in a recording: a live run reassigns numbers when masking restarts,
+//! and earlier messages with these numbers become void.
 
 use std::{
     collections::BTreeMap,
@@ -11,11 +11,11 @@ use mcap::records::Metadata;
 
 use crate::Entry;
 
-/// The name of the records of generations of which the recorder has seen no message.
+/// The name of the records of generations without a recorded message.
 const NAME: &str = "gyre.generation";
 
-/// The first numbers of the generations that one process gives. One is left out whose numbers a
-/// later one has all given anew, so that the first numbers grow with the generations.
+/// The first numbers of the generations that one process gives. A generation is left out if a later
+/// one reassigned all its numbers, so the first numbers increase with the generations.
 #[derive(Debug, Default)]
 pub(crate) struct Generations(BTreeMap<u32, u64>);
 
@@ -35,7 +35,7 @@ impl Generations {
         true
     }
 
-    /// Returns whether a later generation has given the number of a message anew.
+    /// Returns whether a later generation has reassigned the number of a message.
     pub fn makes_void(&self, entry: &Entry) -> bool {
         self.starts_later_by(entry.generation, entry.seq)
     }
@@ -56,7 +56,7 @@ pub(crate) fn to_metadata(topic: &str, skipped: GivenAnew) -> Metadata {
     }
 }
 
-/// Reads such a record; `None` if it is another one.
+/// Reads such a record; `None` for a different record.
 pub(crate) fn of_metadata(record: &Metadata) -> Option<(String, GivenAnew)> {
     let of = record.metadata.first_key_value()?;
     let ((topic, value), true) = (of, record.name == NAME) else {

@@ -2,27 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_bags::is_bag;
-use gyre_datasets::{GnssLog, GnssLogError};
+use gyre_datasets::{GnssLog, LogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
-use crate::parts::first_part_in;
+use crate::{
+    bags::{self, is_bag},
+    parts::first_part_in,
+};
 
-/// Returns the log of what a live receiver has sent during the run with its results in `out`.
+/// Returns the path of the log of a live receiver during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
 }
 
-/// Reads what the section `[gnss]` names for the scans at `data`, of a live receiver what it has
-/// sent so far during the run with its results in `out`; `None` without GNSS.
-///
-/// # Errors
-/// No log, a topic that is not in the bag or of scans in no bag, or fixes that cannot be used.
-pub fn gnss_log(
-    config: &GnssConfig,
-    data: &Path,
-    out: &Path,
-) -> Result<Option<GnssLog>, GnssLogError> {
+/// Reads the log that the section `[gnss]` names for the scans at `data`; for a live receiver, its
+/// log so far during the run with its results in `out`; `None` without GNSS.
+pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<GnssLog>, LogError> {
     match config.kind {
         GnssKind::None => Ok(None),
         GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
@@ -33,12 +28,9 @@ pub fn gnss_log(
 
 /// Returns a table of the fixes that `gnss.kind = "auto"` takes with the scans at `data`, for a
 /// recording of the run.
-///
-/// # Errors
-/// As [`gnss_log`].
-pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, GnssLogError> {
+pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, LogError> {
     let in_bag = match is_bag(data) {
-        true => gyre_bags::fixes(data, config.topic.as_deref())?,
+        true => bags::fixes(data, config.topic.as_deref())?,
         false => None,
     };
     match in_bag {
@@ -51,12 +43,12 @@ pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, GnssLogE
 }
 
 /// Reads the fixes in the bag, else the log beside the scans.
-fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
-    let none_in_bag = |_| GnssLogError::NoneInBag {
+fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
+    let none_in_bag = |_| LogError::NoneInBag {
         bag: data.to_owned(),
     };
     match (is_bag(data), topic) {
-        (true, _) => match gyre_bags::fixes(data, topic)? {
+        (true, _) => match bags::fixes(data, topic)? {
             Some(fixes) => GnssLog::of(fixes, data),
             None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
         },
@@ -69,7 +61,7 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
                 false => GnssLog::read(&path),
             }
         }
-        (false, Some(topic)) => Err(GnssLogError::NoBag {
+        (false, Some(topic)) => Err(LogError::NoBag {
             topic: topic.to_owned(),
             data: data.to_owned(),
         }),

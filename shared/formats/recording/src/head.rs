@@ -15,7 +15,7 @@ const FORMAT: &str = "1";
 /// The run that a recording is of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Head {
-    /// Tells one recording from another one: all its parts have the same.
+    /// Identifies the recording: all its parts have the same identifier.
     pub id: String,
     /// The number of the part, from 1.
     pub part: usize,
@@ -46,10 +46,7 @@ impl Head {
         }
     }
 
-    /// Reads a record; `None` if it is another one.
-    ///
-    /// # Errors
-    /// It is of another version, or incomplete.
+    /// Reads a record; `None` for a different record.
     pub(crate) fn of_metadata(record: &Metadata) -> Option<Result<Self, String>> {
         (record.name == NAME).then(|| Self::parse(&record.metadata))
     }

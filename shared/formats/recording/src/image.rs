@@ -12,7 +12,6 @@ pub struct Rows {
     pub stride: usize,
     /// Bytes of a row.
     pub width: usize,
-    /// Number of rows.
     pub count: usize,
     /// Bytes of a cell.
     pub cell: usize,

@@ -1,5 +1,5 @@
-//! The ledger of a recording: what the next recorder of its run has to know, though the parts
-//! before may have been moved away. It is kept with the journal of the run, and read instead of the
+//! The ledger of a recording: the information for the next recorder of its run, even if the earlier
+//! parts have been moved away. It is kept with the journal of the run, and read instead of the
 //! parts.
 
 use std::{
@@ -40,16 +40,12 @@ impl Ledger {
         Self(out.join("journal").join("recording.toml"))
     }
 
-    /// Returns the file.
     pub fn path(&self) -> &Path {
         &self.0
     }
 
-    /// Reads what an earlier recorder of the run has begun to write to `to`, with the positions
-    /// behind its newest part. What a part holds that cannot be read counts as missed.
-    ///
-    /// # Errors
-    /// A ledger that cannot be read.
+    /// Reads the ledger of an earlier recorder that writes to `to`, with the positions behind its
+    /// newest part. Unreadable content of a part counts as missed.
     pub fn read(&self, to: &Path) -> Result<Option<Begun>, RecordingError> {
         let text = match gyre_storage::read_text(&self.0, SETTINGS) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -90,7 +86,7 @@ impl Ledger {
             .map_err(|StorageError { source, .. }| self.failed(source))
     }
 
-    /// The same for one file from each folder in which the run may be started again.
+    /// Returns the absolute path, so that the run may restart in any folder.
     fn absolute(&self, to: &Path) -> Result<PathBuf, RecordingError> {
         std::path::absolute(to).map_err(|source| self.failed(source))
     }

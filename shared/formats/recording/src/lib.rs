@@ -1,4 +1,5 @@
-//! Recordings of runs as MCAP files, for viewers and for exact replay.
+//! Recordings of runs as MCAP files, for viewers and for exact replay; and [`bags`] of ROS 2, which
+//! are MCAP files too.
 //!
 //! Each message of a run is in the file twice over, without its bulk being stored twice:
 //!
@@ -12,27 +13,29 @@
 //! number. [`image`] takes a payload apart and puts it together again.
 //!
 //! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed
-//! thirty times faster plays at its own pace. The publish time is that of the machine at which the
-//! recorder received it.
+//! thirty times faster plays at its own pace. The publish time is measured by the machine that runs
+//! the recorder, at reception.
 //!
-//! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so
-//! far. So a reader finds a message without decompressing what is before it, also in a file that
-//! has no summary because its writer was killed.
+//! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far.
+//! So a reader finds a message without decompressing earlier chunks, even in a file without a
+//! summary because its writer was killed.
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
-//! files), `walk` (the records of a file), `recording`, `generations`, `scans` (a
-//! [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (what a source plays, of
-//! whatever form).
+//! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`,
+//! `generations`, `scans` (a [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (the
+//! opening of sources in any form).
 
-mod chunk;
+pub mod bags;
 mod disk;
 mod early_lines;
 mod error;
+pub mod file;
 mod generations;
 mod gnss;
 mod head;
 pub mod image;
 mod ledger;
+mod log_tail;
 mod newest;
 mod open;
 mod parts;
@@ -42,7 +45,6 @@ mod scans;
 mod split;
 mod table;
 pub mod view;
-mod walk;
 mod writer;
 
 pub use error::RecordingError;
@@ -50,6 +52,7 @@ pub use gnss::{copied_fixes, gnss_log, received_fixes};
 pub use gyre_datasets::ReceivedFixes;
 pub use head::Head;
 pub use ledger::{Begun, Ledger};
+pub use log_tail::LogTail;
 pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};
 pub use parts::{next_part, parts};
 pub use position::{Position, Positions};

@@ -2,35 +2,27 @@
 
 use std::path::Path;
 
-use crate::{
-    Head, RecordingError,
-    position::Positions,
-    table::Table,
-    walk::{Step, Walk},
-};
+use mcap::records::op;
+
+use crate::{Head, RecordingError, file::McapFile, position::Positions, table::Table};
 
 /// Reads the head of a file, and the positions behind its newest messages.
 pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
-    let file = gyre_storage::open(path).map_err(|source| RecordingError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let mut file = McapFile::open(path)?;
     let (mut head, mut positions, mut has_chunk) = (None, Positions::new(), false);
-    let mut walk = Walk::new(path, &file)?;
-    while let Some(step) = walk.next()? {
-        match step {
-            Step::End => break,
-            Step::Chunk(_) => has_chunk = true,
-            Step::Channel(_) => {}
-            Step::Metadata(_, record) => {
-                if let Some(read) = Head::of_metadata(&record) {
-                    head = read.ok();
-                } else if let Some(table) = Table::of_metadata(&record).filter(|_| has_chunk) {
-                    for (topic, entries) in table.entries {
-                        let position = positions.entry(topic).or_default();
-                        entries.iter().for_each(|entry| position.pass(entry));
-                    }
-                }
+    while let Some((opcode, span)) = file.next_record()?
+        && !file.is_complete
+    {
+        has_chunk |= opcode == op::CHUNK;
+        let Some(record) = file.metadata(opcode, span)? else {
+            continue;
+        };
+        if let Some(read) = Head::of_metadata(&record) {
+            head = read.ok();
+        } else if let Some(table) = Table::of_metadata(&record).filter(|_| has_chunk) {
+            for (topic, entries) in table.entries {
+                let position = positions.entry(topic).or_default();
+                entries.iter().for_each(|entry| position.pass(entry));
             }
         }
     }
@@ -41,13 +33,15 @@ pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
     Ok((head, positions))
 }
 
-/// Returns the head of a file; `None` if it is not that of a recording, or cannot be read.
+/// Returns the head of a file; `None` if the file is not part of a recording, or is unreadable.
 pub(crate) fn head(path: &Path) -> Option<Head> {
-    let file = gyre_storage::open(path).ok()?;
-    let mut walk = Walk::new(path, &file).ok()?;
+    let mut file = McapFile::open(path).ok()?;
     // It is before all messages.
-    while let Step::Metadata(_, record) = walk.next().ok()?? {
-        if let Some(head) = Head::of_metadata(&record) {
+    while let Some((opcode, span)) = file.next_record().ok()?
+        && !matches!(opcode, op::CHUNK | op::CHANNEL | op::DATA_END | op::FOOTER)
+    {
+        let record = file.metadata(opcode, span).ok()?;
+        if let Some(head) = record.as_ref().and_then(Head::of_metadata) {
             return head.ok();
         }
     }

@@ -1,18 +1,18 @@
-//! Opens what a source plays: a recording of a run, a bag of ROS 2, or a dataset of [`gyre_radar`].
+//! Opens any source: a recording of a run, a bag of ROS 2, or a dataset of [`gyre_radar`].
 
 use std::path::{Path, PathBuf};
 
-use gyre_bags::is_bag;
 use gyre_datasets::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
 
 use crate::{
     Recording, RecordingError,
+    bags::{self, is_bag},
     parts::{first_part_in, parts},
     scans::Scans,
 };
 
 /// Returns whether a path names a recording of a run: its first file, or a folder that holds it and
-/// no other one. A bag of ROS 2 is none, though it has files of the same form.
+/// no other one. A bag of ROS 2 is not a recording, although its files have the same format.
 pub fn is_recording(path: &Path) -> bool {
     if is_bag(path) {
         return false;
@@ -24,12 +24,9 @@ pub fn is_recording(path: &Path) -> bool {
 }
 
 /// As [`gyre_datasets::open`].
-///
-/// # Errors
-/// As there; a recording that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     if is_bag(root) {
-        return gyre_bags::open(root, options);
+        return bags::open(root, options);
     }
     match is_recording(root) {
         true => open_parts(&parts(root), root, options),
@@ -38,9 +35,6 @@ pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
 }
 
 /// As [`gyre_datasets::open_resolved`].
-///
-/// # Errors
-/// As there; a recording that cannot be read.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     match is_recording(root) || is_bag(root) {
         true => open(root, options),
@@ -49,9 +43,6 @@ pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Da
 }
 
 /// As [`gyre_datasets::reopen`].
-///
-/// # Errors
-/// As there; a recording that cannot be read.
 pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
@@ -60,7 +51,7 @@ pub fn reopen(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     match format {
         Format::Mcap => {}
-        Format::Ros2Bag => return gyre_bags::reopen(root, options, &files),
+        Format::Ros2Bag => return bags::reopen(root, options, &files),
         _ => return gyre_datasets::reopen(root, options, format, files),
     }
     let paths: Vec<PathBuf> = (0..files.len())
@@ -70,10 +61,7 @@ pub fn reopen(
     open_parts(&paths, root, options)
 }
 
-/// As [`gyre_datasets::stored_options`]: of a recording those of its run.
-///
-/// # Errors
-/// As there; a recording that cannot be read.
+/// As [`gyre_datasets::stored_options`]: for a recording, the options of its run.
 pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     if is_bag(root) {
         return Ok(DatasetOptions {
@@ -88,9 +76,6 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
 }
 
 /// Opens a recording of a run with all its parts.
-///
-/// # Errors
-/// It is missing, or cannot be read.
 pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
     recording_of(&parts(root), root)
 }

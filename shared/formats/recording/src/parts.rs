@@ -30,7 +30,8 @@ pub fn parts(path: &Path) -> Vec<PathBuf> {
     parts.map(|(path, _)| path).collect()
 }
 
-/// Returns whether a file is this part of a recording, not another one with a number in its name.
+/// Returns whether a file is this part of a recording, not a different file with a number in its
+/// name.
 fn is_part(path: &Path, number: usize) -> bool {
     head(path).is_some_and(|head| head.part == number)
 }

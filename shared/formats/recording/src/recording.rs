@@ -2,24 +2,21 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs::File,
     mem,
     path::{Path, PathBuf},
 };
 
 use foxglove::{Decode, messages::RawImage};
-use gyre_bags::damaged::{Damage, Span, sentence};
 use gyre_messages::{GivenAnew, Item, NumberedBy, topic};
+use mcap::records::op;
 
 use crate::{
-    Entry, Head, RecordingError,
-    chunk::{self, Channels, Message},
-    exact_channel,
+    Entry, Head, RecordingError, exact_channel,
+    file::{Channel, McapFile, Message, Span},
     generations::{self, Generations},
     image::{Rows, read},
     table::Table,
     view::image_channel,
-    walk::{Step, Walk},
 };
 
 /// Parts that are not there which are named.
@@ -50,17 +47,12 @@ pub struct Recording {
 
 /// A file of a recording.
 struct Part {
-    path: PathBuf,
     /// See [`Head::part`].
     number: usize,
-    file: File,
-    channels: Channels,
+    file: McapFile,
     missed: BTreeMap<String, u64>,
-    /// The generations of a topic of which the recorder has seen no message.
+    /// The generations of a topic without a recorded message.
     skipped: Vec<(String, GivenAnew)>,
-    damage: Damage,
-    /// The position behind the last record, if the file has no end.
-    cut_at: Option<u64>,
 }
 
 /// The place of a message.
@@ -82,10 +74,8 @@ struct Kept {
 }
 
 impl Recording {
-    /// Opens the files of a recording, in order. Those of another one after the first are left out.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is no recording.
+    /// Opens the files of a recording, in order. Files of a different recording than the first are
+    /// left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
         let mut recording: Option<Self> = None;
         for path in paths {
@@ -109,8 +99,8 @@ impl Recording {
         })
     }
 
-    /// Adds a part. A message that an earlier one has is the same, unless its number was given
-    /// anew: the first message of a generation makes earlier ones void.
+    /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:
+    /// the first message of a generation makes earlier ones void.
     fn add(&mut self, part: Part, places: Places) {
         let number = self.parts.len();
         for (topic, skipped) in &part.skipped {
@@ -155,9 +145,8 @@ impl Recording {
         &self.head
     }
 
-    /// Returns its files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.parts.iter().map(|part| part.path.as_path())
+        self.parts.iter().map(|part| part.file.path.as_path())
     }
 
     /// Returns the messages of a topic in the order of their sequence numbers.
@@ -169,7 +158,7 @@ impl Recording {
     /// Returns the file that holds a message; the first one if none does.
     pub fn path_of(&self, topic: &str, seq: u64) -> &Path {
         let place = self.places.get(topic).and_then(|places| places.get(&seq));
-        &self.parts[place.map_or(0, |place| place.part)].path
+        &self.parts[place.map_or(0, |place| place.part)].file.path
     }
 
     /// Returns the numbers of messages that the recorders have counted as missed, by topic. One
@@ -198,28 +187,22 @@ impl Recording {
 
     /// Returns a sentence for each file that is damaged or has no end.
     pub fn damages(&self) -> impl Iterator<Item = String> {
-        let parts = self.parts.iter();
-        parts.filter_map(|part| sentence(&part.path, &part.damage, part.cut_at))
+        self.parts.iter().filter_map(|part| part.file.damage(true))
     }
 
     /// Returns the first of these sentences after which messages may be missing: the next recorder
     /// of a run repeats the messages that one which was killed had not written.
     pub fn damage(&self) -> Option<String> {
         let last = self.parts.len() - 1;
-        let cut_at = |number, part: &Part| part.cut_at.filter(|_| number == last);
         let mut parts = self.parts.iter().enumerate();
-        parts.find_map(|(number, part)| sentence(&part.path, &part.damage, cut_at(number, part)))
+        parts.find_map(|(number, part)| part.file.damage(number == last))
     }
 
-    /// Reads a message.
-    ///
-    /// # Errors
-    /// It was not recorded, cannot be read, or is damaged.
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
         let place = self.places.get(topic).and_then(|places| places.get(&seq));
         let Some(place) = place.copied() else {
             return Err(RecordingError::Absent {
-                path: self.parts[0].path.clone(),
+                path: self.parts[0].file.path.clone(),
                 topic: topic.to_owned(),
                 seq,
             });
@@ -232,14 +215,11 @@ impl Recording {
             ),
         };
         let kept = self.keep(place)?;
-        let (messages, part) = (&self.kept[kept].messages, &self.parts[place.part]);
-        stored(messages, &part.channels, topic, &place.entry).ok_or_else(|| damaged(&part.path))
+        let (messages, file) = (&self.kept[kept].messages, &self.parts[place.part].file);
+        stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| damaged(&file.path))
     }
 
     /// Reads the header of a message.
-    ///
-    /// # Errors
-    /// As [`Recording::read`]; a header that is not of the type.
     pub fn read_header<H: bytemuck::AnyBitPattern>(
         &mut self,
         topic: &str,
@@ -262,8 +242,8 @@ impl Recording {
         if self.kept.len() == KEPT {
             self.kept.remove(0);
         }
-        let part = &mut self.parts[place.part];
-        let messages = chunk::read(&part.path, &part.file, place.chunk, &mut part.channels)?;
+        let file = &mut self.parts[place.part].file;
+        let messages = file.read(place.chunk, |_| true)?;
         self.kept.push(Kept {
             part: place.part,
             chunk: place.chunk,
@@ -276,66 +256,49 @@ impl Recording {
 impl Part {
     /// Opens a file: its head, and where its messages are.
     fn open(path: &Path) -> Result<(Head, Self, Places), RecordingError> {
-        let file = gyre_storage::open(path).map_err(|source| RecordingError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
         let mut part = Self {
-            path: path.to_owned(),
             number: 0,
-            file,
-            channels: Channels::new(),
+            file: McapFile::open(path)?,
             missed: BTreeMap::new(),
             skipped: Vec::new(),
-            damage: Damage::new(),
-            cut_at: None,
         };
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
-        let (mut is_first, mut is_complete) = (true, false);
-        let mut walk = Walk::new(&part.path, &part.file)?;
-        while let Some(step) = walk.next()? {
-            match step {
-                // Behind it are the channels again, for one whose first chunk is damaged.
-                Step::End => is_complete = true,
-                Step::Channel(channel) => {
-                    part.channels.entry(channel.id).or_insert(channel.topic);
-                }
-                Step::Chunk(span) => {
+        let mut is_first = true;
+        while let Some((opcode, span)) = part.file.next_record()? {
+            match opcode {
+                // Behind the end are the channels again, for a file whose first chunk is damaged.
+                op::SCHEMA | op::CHANNEL => part.learn_channels(span)?,
+                op::CHUNK => {
                     // The first one has the channels.
                     if mem::take(&mut is_first) {
-                        match chunk::read(&part.path, &part.file, span, &mut part.channels) {
-                            Err(RecordingError::Damaged { offset, .. }) => {
-                                walk.records.damage.insert(offset);
-                            }
-                            read => drop(read?),
-                        }
+                        part.learn_channels(span)?;
                     }
                     chunk = Some(span);
                 }
-                Step::Metadata(span, record) => {
-                    if let Some(read) = Head::of_metadata(&record) {
-                        head = Some(read.map_err(|reason| part.foreign(reason))?);
-                    } else if let Some(skipped) = generations::of_metadata(&record) {
-                        part.skipped.push(skipped);
-                    } else if let Some(table) = Table::of_metadata(&record) {
-                        part.missed = table.missed;
-                        // Of a chunk that was not found its messages are known all the same.
-                        let chunk = chunk.take().unwrap_or(Span { bytes: 0, ..span });
-                        let topics = table.entries.into_iter();
-                        places.extend(topics.map(|(topic, entries)| (topic, entries, chunk)));
-                    } else if Table::is_of(&record) {
-                        walk.records.damage.insert(span.offset);
-                    }
-                }
+                _ => {}
+            }
+            let Some(record) = part.file.metadata(opcode, span)? else {
+                continue;
+            };
+            if let Some(read) = Head::of_metadata(&record) {
+                head = Some(read.map_err(|reason| part.foreign(reason))?);
+            } else if let Some(skipped) = generations::of_metadata(&record) {
+                part.skipped.push(skipped);
+            } else if let Some(table) = Table::of_metadata(&record) {
+                part.missed = table.missed;
+                // Of a chunk that was not found its messages are known all the same.
+                let chunk = chunk.take().unwrap_or(Span { bytes: 0, ..span });
+                let topics = table.entries.into_iter();
+                places.extend(topics.map(|(topic, entries)| (topic, entries, chunk)));
+            } else if Table::is_of(&record) {
+                part.file.damage.insert(span.offset);
             }
         }
-        part.cut_at = (!is_complete).then_some(walk.records.offset);
-        part.damage = walk.records.damage;
         let reason = "it has no metadata `gyre.recording`".to_owned();
-        let head: Head = head.ok_or_else(|| match part.damage.first() {
+        let head: Head = head.ok_or_else(|| match part.file.damage.first() {
             None => part.foreign(reason),
             Some(offset) => RecordingError::Damaged {
-                path: part.path.clone(),
+                path: part.file.path.clone(),
                 offset: *offset,
                 reason,
             },
@@ -344,24 +307,37 @@ impl Part {
         Ok((head, part, places))
     }
 
+    /// Learns the channels in a place, unless it is damaged.
+    fn learn_channels(&mut self, span: Span) -> Result<(), RecordingError> {
+        match self.file.read(span, |_| false) {
+            Err(RecordingError::Damaged { .. }) => Ok(()),
+            read => read.map(drop),
+        }
+    }
+
     fn foreign(&self, reason: String) -> RecordingError {
         RecordingError::Foreign {
-            path: self.path.clone(),
+            path: self.file.path.clone(),
             reason,
         }
     }
 }
 
 /// Puts a message together.
-fn stored(messages: &[Message], channels: &Channels, name: &str, entry: &Entry) -> Option<Stored> {
+fn stored(
+    messages: &[Message],
+    channels: &BTreeMap<u16, Channel>,
+    name: &str,
+    entry: &Entry,
+) -> Option<Stored> {
     let on = |message: &Message, channel: &str| {
         let is_named = channels
             .get(&message.channel)
-            .is_some_and(|name| name == channel);
+            .is_some_and(|it| it.topic == channel);
         is_named && message.sequence == entry.seq as u32
     };
     let (exact, bytes) = (exact_channel(name), topic(name)?.header.bytes);
-    // A number that was given anew may be twice in a chunk.
+    // A reassigned number may occur twice in a chunk.
     let is_it = |message: &Message| {
         let item = message.data.get(..size_of::<Item>()).and_then(read::<Item>);
         let is_it = |item: Item| (item.seq, item.generation) == (entry.seq, entry.generation);

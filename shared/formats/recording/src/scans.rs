@@ -32,9 +32,6 @@ pub(crate) struct Scans {
 
 impl Scans {
     /// Opens the scans of a recording.
-    ///
-    /// # Errors
-    /// It has none, or the first one cannot be read.
     pub fn open(mut recording: Recording) -> Result<Self, OpenError> {
         let entries: BTreeMap<usize, Entry> = recording
             .entries(Scan::TOPIC)
@@ -125,7 +122,7 @@ impl Scans {
     }
 }
 
-/// Returns what is missing in a recording: whole sentences.
+/// Returns notes on missing data in a recording: whole sentences.
 fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String> {
     let damages = recording.damages();
     let mut notes: Vec<String> = damages.map(|it| format!("{it}.")).collect();

@@ -14,7 +14,7 @@ use crate::{
     parts::part,
 };
 
-/// When a file is ended. What it holds then is looked at before each message.
+/// When a file is ended. The limits are checked before each message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
     /// The size, bytes; `None`: any. A file is larger by at most a chunk and its summary.
@@ -30,7 +30,7 @@ pub struct SplitWriter {
     head: Head,
     split: Split,
     writer: RecordingWriter,
-    /// Knows the parts; none for a recording that nobody goes on with.
+    /// Stores the parts; `None` for a recording that nobody continues.
     ledger: Option<Ledger>,
     /// The positions behind all that was added.
     positions: Positions,
@@ -39,10 +39,7 @@ pub struct SplitWriter {
 }
 
 impl SplitWriter {
-    /// Begins the part of the recording `to` that `head` says, behind `positions`.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::create`]; a ledger that cannot be written.
+    /// Begins the part of the recording `to` given by `head`, behind `positions`.
     pub fn create(
         to: PathBuf,
         head: Head,
@@ -68,9 +65,6 @@ impl SplitWriter {
     }
 
     /// Adds a message, to the next part if this one is full.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
         let Split { bytes, span_ns } = self.split;
         let is_full = bytes.is_some_and(|bytes| self.writer.bytes() >= bytes)
@@ -105,33 +99,21 @@ impl SplitWriter {
     }
 
     /// Adds a line of the log.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         self.writer.add_log(line)
     }
 
     /// Adds the health of the run.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
         self.writer.add_health(json, now_ns)
     }
 
     /// Writes a chunk if one is due.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         self.writer.flush_if_due()
     }
 
     /// Ends the recording, and returns the number of messages missed, by topic.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
         let missed = self.writer.finish()?;
         add(&mut self.missed, missed);

@@ -1,4 +1,4 @@
-//! The metadata record behind each chunk: the messages in it, and what was missed so far.
+//! The metadata record behind each chunk: its messages, and the messages missed so far.
 
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -14,7 +14,6 @@ const MISSED: &str = "missed.";
 /// A message of a chunk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Entry {
-    /// The sequence number.
     pub seq: u64,
     /// The number of its scan.
     pub scan: u64,
@@ -94,7 +93,7 @@ impl Table {
         record.name == NAME
     }
 
-    /// Reads a record; `None` if it is another one, or no table.
+    /// Reads a record; `None` for a different record, or an invalid table.
     pub fn of_metadata(record: &Metadata) -> Option<Self> {
         if !Self::is_of(record) {
             return None;

@@ -43,7 +43,7 @@ const ODOMETRY: &str = "odometry";
 const RADAR: &str = "radar";
 /// The frame of the scan before, for motions.
 const PREVIOUS: &str = "previous_scan";
-/// Height at which objects are drawn, m: a radar in the plane does not measure it.
+/// Display height of objects, m: a radar in the plane does not measure it.
 const OBJECT_HEIGHT_M: f64 = 1.6;
 /// Length of the head of an arrow, m.
 const ARROW_HEAD_M: f64 = 1.0;
@@ -70,7 +70,6 @@ pub struct LogLine {
 /// An encoded message for viewers.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The channel.
     pub channel: &'static str,
     /// Returns the schema of the message.
     pub schema: fn() -> Option<Schema>,
@@ -82,7 +81,6 @@ pub struct View {
 pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
-    /// The name.
     pub name: &'static str,
     /// Returns the schema of its messages.
     pub schema: fn() -> Option<Schema>,
@@ -126,8 +124,8 @@ impl View {
         }
     }
 
-    /// Returns the image of a message of a topic that has one; `None` if its payload is shorter
-    /// than its header says.
+    /// Returns the image of a message of a topic that has one; `None` if the payload is shorter
+    /// than the header requires.
     pub fn image_of(topic: &str, header: &[u8], payload: &[u8], stamp_ns: i64) -> Option<Self> {
         let rows = Rows::of(topic, header)?;
         let (image, _) = rows.split(payload)?;
@@ -287,7 +285,7 @@ fn fix(header: FixHeader) -> Vec<View> {
     found.into_iter().collect()
 }
 
-/// Returns the objects as one entity, which replaces that of the scan before.
+/// Returns the objects as one entity, which replaces the entity of the scan before.
 fn objects(header: ObjectsHeader) -> Vec<View> {
     let listed = header.list();
     let entity = SceneEntity {

@@ -27,7 +27,7 @@ use crate::{
 /// The longest time for which a message stays in memory. At four scans a second the history of the
 /// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// The size of a chunk, uncompressed, from which on it is written.
+/// A chunk of this size, uncompressed, is written.
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
@@ -39,7 +39,6 @@ const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 /// A wire message to record.
 #[derive(Clone, Debug)]
 pub struct Incoming {
-    /// The topic.
     pub topic: &'static str,
     /// The bytes of the header.
     pub header: Vec<u8>,
@@ -49,8 +48,7 @@ pub struct Incoming {
     pub received_ns: i64,
     /// Messages of the topic that were missed directly before it.
     pub missed: u64,
-    /// The numbers that were given anew by generations before its own, of which the recorder has no
-    /// message.
+    /// The numbers reassigned by earlier generations without a recorded message.
     pub skipped: Option<GivenAnew>,
 }
 
@@ -97,9 +95,6 @@ impl Times {
 
 impl RecordingWriter {
     /// Begins a file, which must not exist.
-    ///
-    /// # Errors
-    /// The file exists or cannot be written.
     pub fn create(path: &Path, head: &Head) -> Result<Self, RecordingError> {
         Self::create_with(path, head, Disk::synchronises())
     }
@@ -176,8 +171,7 @@ impl RecordingWriter {
 
     /// Adds a message, and writes a chunk if one is due.
     ///
-    /// # Errors
-    /// The file cannot be written. It is cut back to its last complete chunk.
+    /// After an error the file is cut back to its last complete chunk.
     pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
         let added = self.try_add(message);
         self.checked(added)?;
@@ -231,9 +225,6 @@ impl RecordingWriter {
     }
 
     /// Adds a line of the log at the time of the newest scan.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         if self.newest_ns.is_none() {
             self.early.push(line);
@@ -250,9 +241,6 @@ impl RecordingWriter {
 
     /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is
     /// left out.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
         let Some(stamp_ns) = self.newest_ns else {
             return Ok(());
@@ -278,7 +266,6 @@ impl RecordingWriter {
         self.write(channel, json.as_bytes(), times)
     }
 
-    /// Returns the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -333,10 +320,7 @@ impl RecordingWriter {
     }
 
     /// Writes the messages so far as a chunk if they are many, or have waited for long, and
-    /// synchronises the file once a second. Call it twice a second while there are none.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
+    /// synchronises the file once a second. Call it twice a second while there are no messages.
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         let (bytes, since) = self.pending;
         let is_due =
@@ -349,9 +333,6 @@ impl RecordingWriter {
     }
 
     /// Writes the messages so far as a chunk, and its table.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         let flushed = self.flush_all();
         self.checked(flushed)
@@ -371,10 +352,8 @@ impl RecordingWriter {
         Ok(self.disk.complete()?)
     }
 
-    /// Writes what is left and the summary, and returns the number of messages missed, by topic.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
+    /// Writes the remaining messages and the summary, and returns the number of messages missed, by
+    /// topic.
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
         for line in mem::take(&mut self.early).into_lines() {
             let added = self.try_add_log(&line);
@@ -384,8 +363,8 @@ impl RecordingWriter {
         Ok(self.table.missed)
     }
 
-    /// Goes on in the next part after this one has ended; returns the number of messages missed in
-    /// this one, by topic.
+    /// Continues in the next part after this one has ended; returns the number of messages missed
+    /// in this one, by topic.
     pub(crate) fn go_on(
         &mut self,
         path: &Path,
@@ -393,12 +372,12 @@ impl RecordingWriter {
     ) -> Result<BTreeMap<String, u64>, RecordingError> {
         let next = Self::create_with(path, head, self.disk.synchronise_of_next())?;
         let before = mem::replace(self, next);
-        // What viewers draw goes on.
+        // The state of viewers continues.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
         Ok(before.table.missed)
     }
 
-    /// Writes what is left and the summary.
+    /// Writes the remaining messages and the summary.
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);

@@ -1,4 +1,4 @@
-//! Messages as bytes: CDR, with the four bytes before it that say its byte order.
+//! Messages as bytes: CDR, after four bytes that state the byte order.
 
 use byteorder::{BigEndian, LittleEndian};
 use thiserror::Error;
@@ -13,40 +13,26 @@ const HEAD_BYTES: usize = LITTLE_ENDIAN.len();
 /// Bytes that are not a message of a type.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadMessage {
-    /// The bytes before the message.
     #[error(
         "{type_name}: {found:02x?} does not begin a message in CDR, expected [00, 00] or [00, 01]"
     )]
     Encoding {
-        /// The type expected.
         type_name: String,
         /// The first bytes, at most four.
         found: Vec<u8>,
     },
-    /// The message.
     #[error("{type_name}: {reason} in a message of {bytes} bytes")]
     Content {
-        /// The type expected.
         type_name: String,
         /// The bytes of the message.
         bytes: usize,
-        /// The problem.
         reason: String,
     },
-    /// A field that is not what its type is.
     #[error("{type_name}: {reason}")]
-    Field {
-        /// The type expected.
-        type_name: String,
-        /// The problem.
-        reason: String,
-    },
+    Field { type_name: String, reason: String },
 }
 
 /// Returns a message as little-endian CDR, as `rosbag2` stores it and DDS sends it.
-///
-/// # Errors
-/// A sequence or a text of more than 2^32 elements.
 pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
     let mut bytes = LITTLE_ENDIAN.to_vec();
     cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, message)
@@ -56,9 +42,6 @@ pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
 
 /// Returns the message in these bytes. What follows it is padding. It allocates no more than the
 /// bytes hold, whatever lengths they give.
-///
-/// # Errors
-/// Bytes that are not CDR, or not of this type.
 pub fn decode<T: Ros2Message>(bytes: &[u8]) -> Result<T, BadMessage> {
     let (head, content) = bytes
         .split_at_checked(HEAD_BYTES)

@@ -28,7 +28,7 @@ impl Definition {
         format!("{}::msg::dds_::{}_", self.package, self.name)
     }
 
-    /// Returns the fields, and after them those of all types in them: a schema of the encoding
+    /// Returns the fields, and after them the fields of all types in them: a schema of the encoding
     /// `ros2msg`, as in bags.
     pub fn text(&self) -> String {
         let mut parts = Vec::new();
@@ -54,7 +54,6 @@ impl Definition {
 
 /// A message of ROS 2.
 pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
-    /// The definition.
     const DEFINITION: &'static Definition;
 }
 

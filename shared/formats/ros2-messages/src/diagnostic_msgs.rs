@@ -7,9 +7,7 @@ use crate::{definition::message, std_msgs::Header};
 /// A value of a status.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyValue {
-    /// The name.
     pub key: String,
-    /// The value, as text.
     pub value: String,
 }
 message!(
@@ -19,11 +17,8 @@ message!(
     []
 );
 
-/// All is well.
 pub const OK: u8 = 0;
-/// Something needs attention.
 pub const WARN: u8 = 1;
-/// Something does not work.
 pub const ERROR: u8 = 2;
 /// Nothing has been heard for some time.
 pub const STALE: u8 = 3;
@@ -33,13 +28,10 @@ pub const STALE: u8 = 3;
 pub struct DiagnosticStatus {
     /// [`OK`], [`WARN`], [`ERROR`] or [`STALE`].
     pub level: u8,
-    /// The part.
     pub name: String,
-    /// A sentence.
     pub message: String,
     /// The hardware of the part.
     pub hardware_id: String,
-    /// Figures.
     pub values: Vec<KeyValue>,
 }
 message!(
@@ -53,9 +45,7 @@ message!(
 /// The status of several parts: the topic `/diagnostics`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiagnosticArray {
-    /// Time.
     pub header: Header,
-    /// The parts.
     pub status: Vec<DiagnosticStatus>,
 }
 message!(

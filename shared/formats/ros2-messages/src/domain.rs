@@ -25,13 +25,10 @@ pub struct Domain {
 /// A domain that cannot be joined.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DomainError {
-    /// The variable is not the number of a domain.
     #[error("ROS_DOMAIN_ID is `{0}`, but must be a number from 0 to {MAX_DOMAIN}")]
     Variable(String),
-    /// The number is too high.
     #[error("domain {0} does not exist: domains of ROS 2 are numbers from 0 to {MAX_DOMAIN}")]
     TooHigh(u16),
-    /// The interface is no address of this machine.
     #[error(
         "interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
     )]
@@ -43,9 +40,6 @@ impl Domain {
     /// on which this machine has this address, or on all. Where ROS 2 is restricted to this
     /// computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
     /// means the loopback.
-    ///
-    /// # Errors
-    /// No such domain, or no address.
     pub fn new(id: Option<u16>, interface: Option<&str>) -> Result<Self, DomainError> {
         let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
         Self::of(id, interface, &variable)
@@ -78,7 +72,6 @@ impl Domain {
         Ok(Self { id, interface })
     }
 
-    /// Returns the number of the domain.
     pub fn id(&self) -> u16 {
         self.id
     }

@@ -16,20 +16,19 @@ use crate::{
     std_msgs::Header,
 };
 
-/// Variance of what a planar odometry does not measure: z, roll and pitch, and their velocities. So
-/// large that no filter uses it; zero would mean that they are known exactly. The value is that of
-/// ROS 2's `diff_drive_controller`.
+/// Variance of the quantities that planar odometry does not measure: z, roll and pitch, and their
+/// velocities. So large that no filter uses it; zero would mean that they are known exactly. ROS
+/// 2's `diff_drive_controller` uses the same value.
 pub const UNKNOWN: f64 = 1e6;
 
 /// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
 const PLANAR: [usize; 3] = [0, 1, 5];
 
-/// Names of the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames {
-    /// The frame in which loops are closed.
+    /// The frame that loops correct.
     pub map: String,
-    /// The frame in which odometry is continuous.
+    /// The frame of continuous odometry.
     pub odom: String,
     /// The vehicle's frame.
     pub base: String,
@@ -86,11 +85,11 @@ pub struct Interval {
     pub is_measured: bool,
 }
 
-/// Returns a pose in the odometry frame, and the velocity with which it was reached, as odometry.
+/// Returns a pose in the odometry frame, and the velocity that led to it, as odometry.
 ///
 /// The covariance of the pose is along the axes of `odom`, as `robot_localization` expects it. The
-/// velocity is that of constant motion since the previous scan, in the frame of the vehicle, with
-/// the covariance that follows from that of the motion. That of a predicted motion has the variance
+/// velocity assumes constant motion since the previous scan, in the frame of the vehicle, with the
+/// covariance that follows from the motion's. The velocity of a predicted motion has the variance
 /// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
 pub fn odometry(
@@ -118,8 +117,8 @@ pub fn odometry(
     odometry
 }
 
-/// Returns the covariance of (x, y, yaw) among those of ROS. [`UNKNOWN`] is the variance of all
-/// others; of all six without one.
+/// Returns the covariance of (x, y, yaw) in ROS's order. [`UNKNOWN`] is the variance of the other
+/// axes, and of all six without a covariance.
 pub fn covariance(planar: Option<&Matrix3<f64>>) -> Covariance {
     let mut covariance = Covariance::default();
     for value in 0..geometry_msgs::VALUES {
@@ -199,7 +198,7 @@ pub fn pose(pose: &Pose) -> geometry_msgs::Pose {
 }
 
 /// Returns a map as a grid of `[columns, rows]` cells of `cell_m` metres, whose lowest x and y is
-/// `corner_m` and whose axes are those of `frame`.
+/// `corner_m` and whose axes are parallel to `frame`.
 pub fn occupancy_grid(
     stamp_ns: i64,
     frame: &str,

@@ -57,7 +57,6 @@ message!(
     []
 );
 
-/// A vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Vector3 {
     /// Forward.
@@ -74,7 +73,6 @@ message!(
     []
 );
 
-/// A rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quaternion {
     /// The vector's x.
@@ -94,7 +92,6 @@ message!(
 );
 
 impl Default for Quaternion {
-    /// Returns no rotation.
     fn default() -> Self {
         Self {
             x: 0.0,
@@ -105,12 +102,10 @@ impl Default for Quaternion {
     }
 }
 
-/// A pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// The position, m.
     pub position: Point,
-    /// The orientation.
     pub orientation: Quaternion,
 }
 message!(
@@ -123,7 +118,6 @@ message!(
 /// A pose with covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovariance {
-    /// The pose.
     pub pose: Pose,
     /// The covariance, along the axes of the frame of the pose.
     pub covariance: Covariance,
@@ -135,7 +129,6 @@ message!(
     [Pose]
 );
 
-/// A velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
     /// Linear, m/s.
@@ -153,9 +146,7 @@ message!(
 /// A velocity at a time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwistStamped {
-    /// Time and frame.
     pub header: Header,
-    /// The velocity.
     pub twist: Twist,
 }
 message!(
@@ -176,7 +167,6 @@ impl TwistStamped {
 /// A velocity with covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwistWithCovariance {
-    /// The velocity.
     pub twist: Twist,
     /// The covariance, in (m/s)^2, (rad/s)^2 and their products.
     pub covariance: Covariance,
@@ -188,12 +178,11 @@ message!(
     [Twist]
 );
 
-/// The pose of a frame in another one.
+/// The pose of a frame in another frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {
     /// The position, m.
     pub translation: Vector3,
-    /// The orientation.
     pub rotation: Quaternion,
 }
 message!(
@@ -206,11 +195,8 @@ message!(
 /// The pose of the frame `child_frame_id` in the frame of the header, at its time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {
-    /// Time and outer frame.
     pub header: Header,
-    /// The inner frame.
     pub child_frame_id: String,
-    /// The pose.
     pub transform: Transform,
 }
 message!(

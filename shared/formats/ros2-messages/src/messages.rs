@@ -1,5 +1,5 @@
-//! `messages`: the package of Navtech's driver until 2024, in which numbers are arrays of their
-//! bytes, most significant first but for `bin_size`.
+//! `messages`: the package of Navtech's driver until 2024, where numbers are arrays of their bytes,
+//! most significant byte first, except in `bin_size`.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::{definition::message, std_msgs::Header};
 /// The powers of one azimuth; see [`RadarFftDataMsg`](crate::navtech_msgs::RadarFftDataMsg).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RadarFftDataMessage {
-    /// The time at which the driver received it.
+    /// The time of receipt by the driver.
     pub header: Header,
     /// Not to be used.
     #[serde(with = "serde_bytes")]
@@ -44,7 +44,7 @@ message!(
 /// [`RadarConfigurationMsg`](crate::navtech_msgs::RadarConfigurationMsg).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RadarConfigurationMessage {
-    /// The time at which the driver received it.
+    /// The time of receipt by the driver.
     pub header: Header,
     /// Azimuths per turn, two bytes.
     #[serde(with = "serde_bytes")]

@@ -11,7 +11,6 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting(Pose);
 
-/// No mounting.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "three numbers are needed: m forward, m to the left, degrees counter-clockwise, as in 1.2,0,90"
@@ -19,7 +18,7 @@ pub struct Mounting(Pose);
 pub struct BadMounting;
 
 impl Default for Mounting {
-    /// Returns that of a radar in the origin of the vehicle's frame, which looks ahead.
+    /// Returns the mounting of a radar in the origin of the vehicle's frame, which looks ahead.
     fn default() -> Self {
         Self(Pose::identity())
     }
@@ -45,7 +44,7 @@ impl Mounting {
         &self.0
     }
 
-    /// Returns the motion of the vehicle, in its own earlier frame, from that of the radar:
+    /// Returns the motion of the vehicle, in its own earlier frame, from the motion of the radar:
     /// `B M B^-1` with the radar's pose `B`.
     pub fn of_vehicle(&self, of_radar: &Pose) -> Pose {
         self.0 * of_radar * self.0.inverse()
@@ -90,7 +89,7 @@ mod tests {
     #[test]
     fn a_radar_in_front_swings_out_where_the_vehicle_turns_on_the_spot() {
         let mounting: Mounting = "2,0,90".parse().unwrap();
-        // The radar looks to the left: what is ahead of the vehicle is to its right.
+        // The radar looks to the left: things ahead of the vehicle are to its right.
         let of_radar = mounting.0.inverse() * pose(0.0, 0.0, FRAC_PI_2) * mounting.0;
         let [x_m, y_m, yaw_rad] = xy_yaw(&mounting.of_vehicle(&of_radar));
         assert!(x_m.abs() < 1e-12 && y_m.abs() < 1e-12);

@@ -15,11 +15,9 @@ use crate::{
 pub struct Odometry {
     /// Time and frame of the pose.
     pub header: Header,
-    /// The vehicle's frame, in which the velocity is.
+    /// The vehicle's frame, which is the frame of the velocity.
     pub child_frame_id: String,
-    /// The pose.
     pub pose: PoseWithCovariance,
-    /// The velocity.
     pub twist: TwistWithCovariance,
 }
 message!(
@@ -66,7 +64,6 @@ message!(
 pub struct OccupancyGrid {
     /// Time and frame of the map.
     pub header: Header,
-    /// Size and place.
     pub info: MapMetaData,
     /// The cells by rows, from the origin on, as the bytes of an `int8`: 255 is -1.
     #[serde(with = "serde_bytes")]

@@ -10,7 +10,7 @@ use crate::{definition::message, sensor_msgs::Image, std_msgs::Header};
 /// The powers of one azimuth: the topic `radar_data/fft_data`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RadarFftDataMsg {
-    /// The time at which the driver received it.
+    /// The time of receipt by the driver.
     pub header: Header,
     /// Not to be used: the driver divides by the number of azimuths, where it should divide by the
     /// encoder's counts.
@@ -27,7 +27,6 @@ pub struct RadarFftDataMsg {
     /// The powers, nearest bin first.
     #[serde(with = "serde_bytes")]
     pub data: Vec<u8>,
-    /// Their number.
     pub data_length: u16,
 }
 message!(
@@ -41,13 +40,14 @@ message!(
 /// The radar's description of itself: the topic `radar_data/configuration_data`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RadarConfigurationMsg {
-    /// The time at which the driver received it.
+    /// The time of receipt by the driver.
     pub header: Header,
     /// Azimuths per turn.
     pub azimuth_samples: u16,
     /// Encoder counts per turn.
     pub encoder_size: u16,
-    /// Rows by which the driver turns its images, but not the encoder values beside them.
+    /// The rotation of images by the driver, in rows; the encoder values beside them are not
+    /// rotated.
     pub azimuth_offset: u16,
     /// Depth of a range bin, 1e-4 m.
     pub bin_size: f32,
@@ -55,9 +55,7 @@ pub struct RadarConfigurationMsg {
     pub range_in_bins: u16,
     /// Turns per second, or per 1000 s, as the version of the driver.
     pub expected_rotation_rate: u16,
-    /// Factor of ranges.
     pub range_gain: f32,
-    /// Offset of ranges.
     pub range_offset: f32,
 }
 message!(

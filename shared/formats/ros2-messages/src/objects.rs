@@ -1,7 +1,7 @@
 //! Tracked objects as detections, and as shapes that viewers draw.
 //!
-//! Both are in the frame `odom`, that of the vehicle at the first scan. In Gyre objects are in that
-//! of the radar, so they are moved and turned by the [`Mounting`].
+//! Both are in the frame `odom`: the vehicle's frame at the first scan. Gyre's objects are in the
+//! radar's frame, so they are moved and turned by the [`Mounting`].
 
 use gyre_geometry::{Pose, pose as planar};
 use gyre_messages::ListedObject;
@@ -23,7 +23,7 @@ pub const MOVING: &str = "moving";
 /// The class of an object that moved, and stands now.
 pub const STANDING: &str = "standing";
 
-/// Height at which objects are drawn, m: a radar in the plane does not measure it.
+/// Height for drawing objects, m: a radar in the plane does not measure it.
 const DRAWN_HEIGHT_M: f64 = 1.6;
 /// Diameter of an arrow's head, m.
 const ARROW_M: f64 = 0.9;
@@ -32,9 +32,9 @@ const LETTER_M: f64 = 1.2;
 
 /// Returns the objects of a scan as detections of the class [`MOVING`] or [`STANDING`].
 ///
-/// The covariance of a pose is that of the centre along the axes of `odom`. The heading has none in
-/// Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`]. Boxes have
-/// no height, for the same reason.
+/// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
+/// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
+/// Boxes have no height, for the same reason.
 pub fn detections(
     stamp_ns: i64,
     frames: &Frames,
@@ -70,8 +70,9 @@ pub fn detections(
     }
 }
 
-/// Returns the objects of a scan as shapes: a box of 1.6 m height, the way of a second as an arrow
-/// if it moves, and the identity as a text. Those of the scan before are removed.
+/// Returns the objects of a scan as shapes: a box of 1.6 m height, the displacement of a second as
+/// an arrow if the object moves, and the identity as a text. The shapes of the scan before are
+/// removed.
 pub fn markers(
     stamp_ns: i64,
     frames: &Frames,

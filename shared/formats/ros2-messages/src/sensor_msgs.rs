@@ -1,4 +1,4 @@
-//! `sensor_msgs`: images, and what an inertial sensor and a GNSS receiver measure.
+//! `sensor_msgs`: images, and the measurements of inertial sensors and GNSS receivers.
 
 use gyre_samples::{RawFix, Sample, SampleKind};
 use serde::{Deserialize, Serialize};
@@ -9,10 +9,8 @@ use crate::{
     std_msgs::Header,
 };
 
-/// An image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Image {
-    /// Time and frame.
     pub header: Header,
     /// Rows.
     pub height: u32,
@@ -39,7 +37,6 @@ message!(
 /// An image as a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CompressedImage {
-    /// Time and frame.
     pub header: Header,
     /// The format of the file, such as `png`.
     pub format: String,
@@ -58,9 +55,7 @@ message!(
 /// (-1) where there is no such measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {
-    /// Time and frame.
     pub header: Header,
-    /// The orientation.
     pub orientation: Quaternion,
     /// Covariance of the orientation.
     pub orientation_covariance: [f64; 9],

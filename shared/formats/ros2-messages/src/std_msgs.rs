@@ -4,10 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{builtin_interfaces::Time, definition::message};
 
-/// Time and frame of what a message says.
+/// Time and frame of a message.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    /// The time.
     pub stamp: Time,
     /// The name of the frame.
     pub frame_id: String,
@@ -28,7 +27,7 @@ impl Header {
         }
     }
 
-    /// Returns the time, ns since 1970; that of the receipt of a message whose driver sets none.
+    /// Returns the time, ns since 1970; the time of receipt of a message whose driver sets no time.
     pub fn stamp_or(&self, received_ns: i64) -> i64 {
         match self.stamp.ns() {
             0 => received_ns,
@@ -42,11 +41,8 @@ impl Header {
 pub struct ColorRGBA {
     /// Red.
     pub r: f32,
-    /// Green.
     pub g: f32,
-    /// Blue.
     pub b: f32,
-    /// Opacity.
     pub a: f32,
 }
 message!(

@@ -7,7 +7,6 @@ use crate::{definition::message, geometry_msgs::TransformStamped};
 /// Poses of frames in other ones: the topics `/tf` and `/tf_static`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TFMessage {
-    /// The poses.
     pub transforms: Vec<TransformStamped>,
 }
 message!(

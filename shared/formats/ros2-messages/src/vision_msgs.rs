@@ -26,9 +26,7 @@ message!(
 /// A class that an object may be of, and its pose if it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectHypothesisWithPose {
-    /// The class.
     pub hypothesis: ObjectHypothesis,
-    /// The pose.
     pub pose: PoseWithCovariance,
 }
 message!(
@@ -53,14 +51,11 @@ message!(
     [Pose, Vector3]
 );
 
-/// An object.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection3D {
-    /// Time and frame.
     pub header: Header,
     /// The classes that it may be of.
     pub results: Vec<ObjectHypothesisWithPose>,
-    /// The box around it.
     pub bbox: BoundingBox3D,
     /// The identity, which later messages repeat.
     pub id: String,
@@ -75,9 +70,7 @@ message!(
 /// The objects at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection3DArray {
-    /// Time and frame.
     pub header: Header,
-    /// The objects.
     pub detections: Vec<Detection3D>,
 }
 message!(

@@ -36,7 +36,6 @@ message!(
     []
 );
 
-/// A file with a mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeshFile {
     /// The name of the file.
@@ -52,10 +51,8 @@ message!(
     []
 );
 
-/// A shape.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
-    /// Time and frame.
     pub header: Header,
     /// The namespace of `id`.
     pub ns: String,
@@ -69,7 +66,6 @@ pub struct Marker {
     pub pose: Pose,
     /// The lengths of the sides, m.
     pub scale: Vector3,
-    /// The colour.
     pub color: ColorRGBA,
     /// The time for which it is drawn; zero: until it is removed.
     pub lifetime: Duration,
@@ -81,15 +77,12 @@ pub struct Marker {
     pub colors: Vec<ColorRGBA>,
     /// The name of a texture.
     pub texture_resource: String,
-    /// The texture.
     pub texture: CompressedImage,
     /// The place of each point in the texture.
     pub uv_coordinates: Vec<UVCoordinate>,
-    /// The text.
     pub text: String,
     /// The name of a mesh.
     pub mesh_resource: String,
-    /// The mesh.
     pub mesh_file: MeshFile,
     /// True to draw the mesh with its own colours.
     pub mesh_use_embedded_materials: bool,
@@ -115,10 +108,9 @@ message!(
     ]
 );
 
-/// Shapes that belong together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkerArray {
-    /// The shapes, in the order in which they are drawn or removed.
+    /// The shapes, in the order of drawing or removal.
     pub markers: Vec<Marker>,
 }
 message!(

@@ -14,7 +14,6 @@ use gyre_ros2_messages::{
     visualization_msgs::{CUBE, MarkerArray},
 };
 use gyre_samples::RawFix;
-use proptest::prelude::*;
 
 fn comes_back<T: Ros2Message + PartialEq + std::fmt::Debug>(message: &T) {
     let bytes = encode(message).unwrap();
@@ -156,16 +155,6 @@ fn schemas_have_the_definitions_of_all_parts_once() {
         Odometry::DEFINITION.dds_name(),
         "nav_msgs::msg::dds_::Odometry_"
     );
-}
-
-proptest! {
-    #[test]
-    fn any_bytes_are_a_message_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-        let framed = [&[0, 1, 0, 0][..], &bytes].concat();
-        let _ = decode::<RadarBScanMsg>(&framed);
-        let _ = decode::<DiagnosticArray>(&framed);
-        let _ = decode::<TFMessage>(&framed);
-    }
 }
 
 /// A sample of an inertial sensor, as rosbags 0.11.9 serialises it.

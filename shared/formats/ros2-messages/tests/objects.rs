@@ -95,7 +95,7 @@ fn objects_are_detections_with_identity_class_box_and_covariance() {
 
 #[test]
 fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
-    // What is ahead of the radar is to the left of the vehicle.
+    // The direction ahead of the radar is to the left of the vehicle.
     let mounting: Mounting = "1,0,90".parse().unwrap();
     let (header, frames) = (header(), "map,odo,car,top".parse().unwrap());
     let array = detections(STAMP_NS, &frames, &mounting, header.list());
@@ -124,7 +124,7 @@ fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
         (CUBE, 1),
         (TEXT_VIEW_FACING, 1),
     ];
-    // Those of the scan before are removed first.
+    // The objects of the scan before are removed first.
     assert_eq!(shapes[0].action, DELETEALL);
     assert_eq!(kinds[1..], expected);
     let is_in_odom = |it: &Marker| it.header.frame_id == "odom" && it.header.stamp.ns() == STAMP_NS;

@@ -320,7 +320,7 @@ fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refus
         assert!(refused.contains("no radar has bins"), "{refused}");
         assert!(newer(size as f32).is_err(), "{size}");
     }
-    // As an integer, most significant byte first, of which the driver knows nothing.
+    // As an integer, most significant byte first. The driver does not know this form.
     assert!(older(438_u64.to_be_bytes()).is_err());
 }
 

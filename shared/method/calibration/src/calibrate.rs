@@ -35,7 +35,6 @@ pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, 
 /// A fact with its change against the configured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
-    /// The fact.
     pub fact: Fact,
     /// Change against the configured value, in the fact's unit.
     pub change: Estimate,
@@ -46,7 +45,7 @@ pub struct FactEstimate {
 }
 
 impl FactEstimate {
-    /// Returns whether the drive says more about the fact than was known.
+    /// Returns whether the drive adds knowledge about the fact.
     pub fn is_useful(&self) -> bool {
         self.change.sigma < self.fact.useful_sigma()
     }
@@ -109,9 +108,6 @@ fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
 }
 
 /// Finds the facts of a drive.
-///
-/// # Errors
-/// A drive that does not determine them.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let none = FactVector::zeros();
     let before = drive.mean_track_with(&none)?;
@@ -120,7 +116,8 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
     let mut facts = solution.facts;
     let mut proposed = solution.determined();
-    // What the drive does not tell stays as configured, and what it tells is that beside it.
+    // Facts that the drive does not determine stay as configured, and the others are estimated
+    // beside them.
     while !proposed.is_empty() && proposed.len() < solution.free.len() {
         solution = Solution::find(drive, &before, &revisits, &proposed)?;
         for &fact in &proposed {

@@ -21,9 +21,9 @@ pub struct Compared {
     pub other: Option<f64>,
 }
 
-/// Estimates by how much the stamps of the other sensor are late, s: the smallest delay at which
-/// its measurements fit about as well as at the best one. `None` where they do not determine it.
-/// Speeds have no bias: `has_bias` is for rates.
+/// Estimates the delay of the stamps of the other sensor, s: the smallest delay that fits the
+/// measurements about as well as the best one. `None` where they do not determine it. Speeds have
+/// no bias: `has_bias` is for rates.
 pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let first_ns = motions.first()?.stamp_ns;
     let stamps: Vec<i64> = motions.iter().map(|it| it.stamp_ns).collect();
@@ -39,11 +39,11 @@ pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let log = Angles::new(&samples, first_ns, 1.5 * interval_s);
     let turns = turns(&stamps, &steps, &starts);
     let peak = search::nearest(&turns, &log)?;
-    let [_, _, late_s] = Fit::new(&turns, &log, &peak, has_bias)?.parameters;
+    let [_, _, delay_s] = Fit::new(&turns, &log, &peak, has_bias)?.parameters;
     Some(Estimate {
         // By the turns that a search finds right gyros are up to 0.4 of an interval late.
-        sigma: late_s.sigma.hypot(0.2 * interval_s),
-        ..late_s
+        sigma: delay_s.sigma.hypot(0.2 * interval_s),
+        ..delay_s
     })
 }
 
@@ -54,7 +54,7 @@ mod tests {
 
     /// The delay of a sensor whose measurements are so late and scaled, beside a radar with noise,
     /// over 40 s with these rates.
-    fn found(rate: fn(f64) -> f64, late_s: f64, scale: f64) -> Option<Estimate> {
+    fn found(rate: fn(f64) -> f64, delay_s: f64, scale: f64) -> Option<Estimate> {
         let over = |s: f64| {
             (0..25)
                 .map(|k| 0.01 * rate(s - 0.01 * f64::from(k)))
@@ -66,7 +66,7 @@ mod tests {
                 stamp_ns: i64::from(k) * 250_000_000,
                 interval_ns: 250_000_000,
                 radar: (k % 40 != 0).then_some(by_radar),
-                other: Some(scale * over(0.25 * f64::from(k) - late_s)),
+                other: Some(scale * over(0.25 * f64::from(k) - delay_s)),
             }
         };
         delay(&(0..160).map(motion).collect::<Vec<_>>(), true)
@@ -76,10 +76,10 @@ mod tests {
     fn a_delay_is_measured_and_none_is_made_up() {
         let winding = |s: f64| 0.055 * (0.314 * s).cos();
         let town = |s: f64| 0.2 * (0.4 * s).sin().powi(9) + 0.1 * (0.23 * s + 1.0).sin().powi(5);
-        for (late_s, scale) in [(-2.0, 1.0), (0.0, 0.8), (0.3, 1.3), (1.6, 1.0)] {
-            for found in [winding, town].map(|rate| found(rate, late_s, scale).unwrap()) {
-                let off = (found.value - late_s).abs() / found.sigma;
-                assert!(off < 4.0 && found.sigma < 0.07, "{late_s} s: {found:?}");
+        for (delay_s, scale) in [(-2.0, 1.0), (0.0, 0.8), (0.3, 1.3), (1.6, 1.0)] {
+            for found in [winding, town].map(|rate| found(rate, delay_s, scale).unwrap()) {
+                let off = (found.value - delay_s).abs() / found.sigma;
+                assert!(off < 4.0 && found.sigma < 0.07, "{delay_s} s: {found:?}");
             }
         }
         assert_eq!(found(|_| 0.0, 1.0, 1.0), None, "a straight road");

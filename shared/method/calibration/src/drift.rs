@@ -1,5 +1,5 @@
-//! The drift between revisits: the track from one scan of a place to a later one must lead to where
-//! the two scans lie to each other.
+//! The drift between revisits: the track from one scan of a place to a later one must lead to the
+//! registered relative pose of the two scans.
 
 use gyre_geometry::{Pose, covariance, xy_yaw};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -42,7 +42,7 @@ pub(crate) fn solve(
     let information = weighted.dot(slopes);
     let value = -weighted.dot(residuals) / information;
     let left = residuals + slopes * value;
-    // Larger residuals than the covariance says widen it; smaller ones do not narrow it.
+    // Residuals larger than the covariance widen it; smaller residuals do not narrow it.
     let excess = left.dot(&factor.solve(&left)) / (left.len().max(2) - 1) as f64;
     (information > 0.0).then(|| Estimate {
         value,

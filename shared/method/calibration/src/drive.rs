@@ -68,10 +68,6 @@ pub struct Track {
 }
 
 impl Drive {
-    /// Creates an empty drive.
-    ///
-    /// # Errors
-    /// A configuration that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             odometry: Odometry::new(config)?,
@@ -90,9 +86,6 @@ impl Drive {
     }
 
     /// Adds the next scan, which has this number in the recording.
-    ///
-    /// # Errors
-    /// A scan that cannot be used.
     pub fn push(&mut self, number: usize, scan: &OwnedScan) -> Result<(), OdometryError> {
         let mut scan = scan.view();
         if scan.geometry.doppler_s == 0.0 {
@@ -130,10 +123,10 @@ impl Drive {
         Ok(())
     }
 
-    /// Extracts the points of rising chirps, then those of falling ones. Together, the stronger of
-    /// two neighbours suppresses the other where both chirps see it: of rising chirps the near edge
-    /// of a thing would remain, of falling ones the far edge, which looks like a larger Doppler
-    /// shift.
+    /// Extracts the points of rising chirps, then the points of falling chirps. Together, the
+    /// stronger of two neighbours suppresses the other where both chirps see it: of rising chirps
+    /// the near edge of a thing would remain, of falling ones the far edge, which looks like a
+    /// larger Doppler shift.
     fn points_of_each_chirp(
         &mut self,
         scan: &PolarScan<'_>,
@@ -157,7 +150,7 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns whether chirps rise and fall by turns, as the scans say.
+    /// Returns whether chirps rise and fall by turns, as the scans report.
     pub fn alternates(&self) -> bool {
         self.alternates
     }
@@ -183,9 +176,6 @@ impl Drive {
     }
 
     /// Returns the mean of the tracks in both directions of time, as configured.
-    ///
-    /// # Errors
-    /// The refinement's configuration.
     pub fn mean_track(&self) -> Result<Track, ConfigError> {
         self.mean_track_with(&FactVector::zeros())
     }
@@ -198,9 +188,6 @@ impl Drive {
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.
-    ///
-    /// # Errors
-    /// The refinement's configuration.
     pub fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
@@ -284,7 +271,7 @@ impl Track {
             .collect()
     }
 
-    /// Returns whether the chain of motions starts anew between two scans.
+    /// Returns whether the chain of motions restarts between two scans.
     pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
         self.starts[earlier + 1..=later].contains(&true)
     }

@@ -9,25 +9,20 @@ use thiserror::Error;
 /// Why a drive cannot be used.
 #[derive(Debug, Error)]
 pub enum CalibrationError {
-    /// Too little motion.
     #[error(
         "{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more, so give a longer recording or a larger --scans"
     )]
     TooShort {
-        /// Number of scans.
         scans: usize,
         /// Length of the path, m.
         path_m: f64,
     },
-    /// Nothing to see.
     #[error(
         "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones"
     )]
     Undetermined,
-    /// Places that are seen again cannot be looked for.
     #[error("revisits cannot be found: {0}")]
     Revisits(#[from] ClosingError<Infallible>),
-    /// A length that cannot be that of the path.
     #[error(
         "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
     )]
@@ -37,7 +32,6 @@ pub enum CalibrationError {
         /// The length of the path by odometry, m.
         path_m: f64,
     },
-    /// The refinement's configuration.
     #[error(transparent)]
     Refinement(#[from] ConfigError),
 }

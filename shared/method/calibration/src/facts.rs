@@ -1,4 +1,4 @@
-//! The facts about a radar that a drive can tell, and what they do to its points.
+//! The facts about a radar that a drive can determine, and their effects on its points.
 
 use gyre_geometry::{SparsePoint, Twist};
 use nalgebra::{SMatrix, SVector, Vector2};
@@ -24,7 +24,7 @@ pub enum Fact {
     EccentricitySin,
     /// Doppler coefficient, s.
     Doppler,
-    /// Share by which the times of rows within a sweep are too short: 0 where they are right.
+    /// Relative shortening of the times of rows within a sweep: 0 if they are right.
     RowTime,
 }
 
@@ -38,8 +38,8 @@ impl Fact {
         Self::RowTime,
     ];
 
-    /// Returns the standard deviation from which on a drive says no more about the fact than is
-    /// known of any radar. Of facts that only confirm it is 0.
+    /// Returns the standard deviation above which a drive adds nothing to the prior knowledge about
+    /// any radar. Of facts that only confirm it is 0.
     pub fn useful_sigma(self) -> f64 {
         match self {
             Self::RangeOffset => 0.2,

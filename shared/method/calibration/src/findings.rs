@@ -17,11 +17,11 @@ use constant::{constant, resolution};
 
 /// The configuration of the drive before it is calibrated.
 pub struct Configured {
-    /// The constants by which the scans were read.
+    /// The constants that were used to read the scans.
     pub geometry: SweepGeometry,
-    /// The eccentricity of the encoder by which they were read, rad.
+    /// The eccentricity of the encoder that was used to read them, rad.
     pub eccentricity_rad: f64,
-    /// The range from which on points are used, m.
+    /// The shortest range of the points that are used, m.
     pub min_range_m: f64,
     /// Length of the path by another sensor, m.
     pub distance_m: Option<f64>,
@@ -30,14 +30,12 @@ pub struct Configured {
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
 
-/// All that was found.
 pub struct Found {
-    /// Number of scans.
     pub scans: usize,
     /// Length of the path, m.
     pub path_m: f64,
     has_settled: bool,
-    /// Mean overlap of scans of one place as configured, and with what the drive determines.
+    /// Mean overlap of scans of one place as configured, and with the drive's findings.
     overlap: [f64; 2],
     /// The constants but for the range resolution.
     pub constants: Vec<Constant>,
@@ -50,10 +48,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Compares what was found with what is configured.
-    ///
-    /// # Errors
-    /// A length of the path that cannot be that of this drive.
+    /// Compares the findings with the configuration.
     pub fn new(
         drive: &Drive,
         calibration: &Calibration,
@@ -66,7 +61,7 @@ impl Found {
             .copied()
             .unwrap_or_default();
         let geometry = &configured.geometry;
-        // Where the scans say which chirps rise, its sign is that of the chirp.
+        // If the scans contain the direction of chirps, its sign is the chirp's.
         let doppler_s = match (drive.alternates(), f64::from(geometry.doppler_s)) {
             (true, configured) => configured.abs(),
             (false, configured) => configured,
@@ -110,8 +105,8 @@ impl Found {
         })
     }
 
-    /// Returns the means of what several drives say, each weighted by its uncertainty, and their
-    /// overlap yet to be compared. The rest is in what each of them says alone.
+    /// Returns the means over several drives, each weighted by its uncertainty, with their overlap
+    /// yet to be compared. Each drive keeps the rest in its own findings.
     pub(crate) fn mean(first: &Self, others: &[&Self]) -> Self {
         let drives = || iter::once(&first).chain(others);
         let constants = (0..first.constants.len()).map(|k| {
@@ -141,7 +136,7 @@ impl Found {
         change
     }
 
-    /// Takes the overlap as configured and with what is proposed, which is not if that is less.
+    /// Takes the overlap as configured and as proposed; a lower overlap revokes the proposal.
     pub(crate) fn compared(mut self, overlap: [f64; 2]) -> Self {
         self.overlap = overlap;
         if overlap[1] < overlap[0] {

@@ -2,12 +2,12 @@
 //!
 //! Both turn together, so the log fits where the radar's turns correlate with it best: over all
 //! three axes and all offsets of its clock, first coarsely, then by least squares for the offset,
-//! the scale and the bias at once. The radar's turns are those of the track, by radar alone.
+//! the scale and the bias at once. The radar's turns come from the track, by radar alone.
 //!
 //! - `turns`: the radar's; `angles`: the gyro's, over any time;
 //! - `search`: the axis and the coarse offset, and whether another pair fits about as well;
 //! - `fit`: the least squares, with the jackknife over blocks of the drive;
-//! - [`GyroCalibration`]: what was found; [`GyroError`]: why nothing was.
+//! - [`GyroCalibration`]: the findings; [`GyroError`]: why nothing was found.
 
 pub(crate) mod angles;
 mod error;
@@ -31,26 +31,22 @@ use turns::turns;
 /// Offsets of the clocks that are looked at, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s,
 /// and the two clocks of a recording of RADIATE 64 s.
 pub(crate) const MAX_LATE_S: f64 = 120.0;
-/// Scales that a gyro can have: beyond, its unit is another one.
+/// Scales that a gyro can have: beyond, its unit is different.
 const SCALES: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// Least standard deviation of the offset, periods of the gyro: its samples are interpolated.
 const PERIOD_SHARE: f64 = 0.1;
-/// Least standard deviation of the scale: that of an axis which leans by 2.5 degrees.
+/// Least standard deviation of the scale, from an axis that leans by 2.5 degrees.
 const SCALE_SIGMA: f64 = 1e-3;
-/// Least standard deviation of the bias, rad/s: a track turns by itself where constants of the
-/// radar are wrong.
+/// Least standard deviation of the bias, rad/s: a track turns spuriously if constants of the radar
+/// are wrong.
 const BIAS_SIGMA_RADPS: f64 = 1e-4;
 /// An offset that is known less well is refused, s: at 10 degrees per second it is half a degree.
 const MAX_LATE_SIGMA_S: f64 = 0.05;
-/// As is a scale.
 const MAX_SCALE_SIGMA: f64 = 0.05;
 
 /// Finds the offset, the axis, the scale and the bias of a gyro by a track of the drive.
 ///
 /// Over `max_gap_s` without samples its rate is not interpolated.
-///
-/// # Errors
-/// A log that does not tell them.
 pub fn calibrate_gyro(
     drive: &Drive,
     track: &Track,
@@ -67,8 +63,8 @@ pub fn calibrate_gyro(
     calibrate_turns(&stamps, &headings, &starts, samples, max_gap_s)
 }
 
-/// As [`calibrate_gyro`], from the headings of the scans, counter-clockwise; `starts` says where
-/// the chain of motions begins anew.
+/// As [`calibrate_gyro`], from the headings of the scans, counter-clockwise; `starts` marks where
+/// the chain of motions restarts.
 pub(crate) fn calibrate_turns(
     stamps: &[i64],
     headings: &[f64],
@@ -86,19 +82,19 @@ pub(crate) fn calibrate_turns(
     let begins_s = angles.span_s().map(|[first_s, _]| first_s);
     let peak = search::peak(&turns, &angles).map_err(|none| GyroError::of(none, begins_s))?;
     let fit = fit::Fit::new(&turns, &angles, &peak, true).ok_or(GyroError::Unsettled)?;
-    let [scale, bias_radps, late_s] = fit.parameters;
+    let [scale, bias_radps, delay_s] = fit.parameters;
     let floored = |estimate: Estimate, floor: f64| Estimate {
         sigma: estimate.sigma.hypot(floor),
         ..estimate
     };
     let least_s = PERIOD_SHARE * angles.period_s();
-    let late_s = floored(late_s, least_s);
+    let delay_s = floored(delay_s, least_s);
     let span_s = turns.last().map_or(1.0, |turn| turn.to_s);
     let found = GyroCalibration {
         up: peak.up(),
         scale: floored(scale, SCALE_SIGMA),
         bias_radps: floored(bias_radps, BIAS_SIGMA_RADPS),
-        late_s,
+        delay_s,
         halves_s: fit.halves_s,
         drift: floored(fit.drift, least_s / span_s),
         correlation: peak.correlation.abs(),
@@ -107,8 +103,8 @@ pub(crate) fn calibrate_turns(
     if !SCALES.contains(&scale.value) && (scale.value - 1.0).abs() > 3.0 * scale.sigma {
         return Err(GyroError::Scale { scale: scale.value });
     }
-    match late_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
+    match delay_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
         true => Ok(found),
-        false => Err(GyroError::Straight { late_s, scale }),
+        false => Err(GyroError::Straight { delay_s, scale }),
     }
 }

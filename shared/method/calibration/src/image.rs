@@ -1,4 +1,4 @@
-//! The image of a scan that another one is compared with.
+//! The image of a scan for comparison with other scans.
 
 use nalgebra::Vector2;
 

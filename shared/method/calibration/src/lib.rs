@@ -1,8 +1,8 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
-//! A wrong constant displaces what a scan sees by a smooth field, which moves with the vehicle. So
-//! two scans of one place from different poses cannot coincide, whatever their relative pose: the
-//! slope of their overlap by each constant, at the relative pose that is best for it, shows the
+//! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
+//! So two scans of one place from different poses cannot coincide, whatever their relative pose:
+//! the slope of their overlap by each constant, at the relative pose that is best for it, shows the
 //! direction of the right one. Wrong constants also make the track drift, and a road that is driven
 //! twice lies twice. Both are residuals of the constants, and [`calibrate`] solves them.
 //!
@@ -12,8 +12,8 @@
 //! - `pair`, `image`: two scans with their relative pose and the slope of their overlap;
 //! - `overlap`: all pairs of a drive, solved for the constants, with the jackknife over blocks of
 //!   the drive;
-//! - `revisits`, `drift`: places that are seen again, and what the drift between them says about
-//!   the eccentricity;
+//! - `revisits`, `drift`: places that are seen again, and the conclusions from the drift between
+//!   them about the eccentricity;
 //! - [`calibrate`]: the method;
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
@@ -21,7 +21,8 @@
 //! - [`calibrate_gyro`], [`calibrate_wheels`]: the clock and the axes of a gyro, the clock and the
 //!   scale of the wheels, by the same track; [`delay()`]: the clock of either, by the motions of a
 //!   run;
-//! - [`Study`]: a drive with all that, and what several drives of one radar say together.
+//! - [`Study`]: a drive with all these results, and the joint conclusion from several drives of one
+//!   radar.
 
 mod calibrate;
 mod delay;
@@ -60,15 +61,14 @@ pub use wheels::{WheelCalibration, WheelError, calibrate_wheels};
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The number.
     pub value: f64,
     /// The standard deviation.
     pub sigma: f64,
 }
 
 impl Estimate {
-    /// Returns the mean of two independent estimates, weighted by their information. Where they
-    /// contradict each other by more than their standard deviations, that of the mean is larger
+    /// Returns the mean of two independent estimates, weighted by their information. If the
+    /// difference exceeds their standard deviations, the standard deviation of the mean is larger
     /// accordingly.
     #[must_use]
     pub fn combined(&self, other: &Self) -> Self {

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::Estimate;
 
-/// Scans that are slower say little, m/s.
+/// Slower scans contribute little, m/s.
 const MIN_SPEED_MPS: f64 = 3.0;
 /// Directions of motion farther from straight ahead are no driving, rad.
 const MAX_SLIP_RAD: f64 = 0.5;

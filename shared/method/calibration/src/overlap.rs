@@ -17,7 +17,7 @@ const BASELINES_M: [f64; 4] = [5.0, 10.0, 20.0, 35.0];
 const SPACING_M: f64 = 2.5;
 /// Pairs along the path, at most: of a longer drive they are farther apart.
 const MAX_PAIRS: usize = 1200;
-/// Views that a thread keeps, those of the scans within the longest baseline.
+/// Views that a thread keeps: the scans within the longest baseline.
 const VIEWS: usize = 24;
 /// Blocks of the drive for the jackknife.
 const BLOCKS: usize = 12;
@@ -181,9 +181,9 @@ impl System {
         self.rows.len()
     }
 
-    /// Solves for the change of the facts at which the slopes vanish, with the standard deviations
-    /// by the jackknife over blocks of the drive; the facts that are not in `free` keep their
-    /// values. `None` if the pairs do not determine them.
+    /// Solves for the change of the facts that makes the slopes vanish, with the standard
+    /// deviations by the jackknife over blocks of the drive; the facts that are not in `free` keep
+    /// their values. `None` if the pairs do not determine them.
     pub fn solve(&self, free: &[Fact]) -> Option<[Estimate; FACTS]> {
         let value = self.solve_without(free, None)?;
         let mut variance = FactVector::zeros();

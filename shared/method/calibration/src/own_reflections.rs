@@ -9,12 +9,11 @@ use gyre_radar::PolarScan;
 const CELL_M: f64 = 0.25;
 const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;
 const SECTORS: usize = 90;
-/// Share of the scans in which a cell of the vehicle's own returns power.
+/// Least share of scans with power in a cell of the vehicle's own reflections.
 const SHARE: f64 = 0.9;
-/// Scans that are needed.
 const MIN_SCANS: usize = 50;
 
-/// Counts the scans in which the cells around the vehicle return power.
+/// Counts the scans with power in each cell around the vehicle.
 #[derive(Clone, Debug)]
 pub struct OwnReflections {
     counts: Vec<usize>,
@@ -31,7 +30,7 @@ impl Default for OwnReflections {
 }
 
 impl OwnReflections {
-    /// The range up to which they are looked for, m.
+    /// The longest range of the search, m.
     pub const REACH_M: f64 = 15.0;
 
     /// Adds a scan that was measured while the vehicle moved; power above `floor` counts.

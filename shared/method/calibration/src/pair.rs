@@ -19,15 +19,14 @@ pub(crate) struct View {
     scan: usize,
     twist: Twist,
     points: Vec<Seen>,
-    /// The image of all points; where chirps alternate that of rising chirps, then that of falling
-    /// ones.
+    /// The image of all points; if chirps alternate, first of rising chirps, then of falling ones.
     images: Vec<Image>,
 }
 
 struct Seen {
     at: Vector2<f64>,
     weight: f64,
-    /// The sign of its Doppler shift: 1, or where chirps alternate that of its chirp.
+    /// The sign of its Doppler shift: 1, or the chirp's sign if chirps alternate.
     chirp: f64,
     displacement: Displacement,
 }
@@ -84,9 +83,9 @@ impl View {
         }
     }
 
-    /// The image that a point of another view is compared with, and the sign of its Doppler shifts:
-    /// where chirps alternate that of the opposite chirp, which a wrong Doppler coefficient moves
-    /// the other way. Those of one chirp would lie together whatever it is.
+    /// The image to compare with a point of another view, and the sign of its Doppler shifts. If
+    /// chirps alternate, the image is of the opposite chirp, which a wrong Doppler coefficient
+    /// moves the other way. Images of one chirp would coincide with any coefficient.
     fn image_for(&self, point: &Seen) -> (&Image, f64) {
         match self.images.as_slice() {
             [rising, _] if point.chirp < 0.0 => (rising, 1.0),
@@ -111,7 +110,7 @@ struct Sums {
     slope: FactVector,
 }
 
-/// Aligns two views, each with the image of the other, and returns what their overlap says about
+/// Aligns two views, each with the image of the other, and returns the slopes of their overlap by
 /// the facts.
 pub(crate) fn compare(drive: &Drive, a: &View, b: &View, initial: &Pose) -> Option<PairSlope> {
     let mut pose = *initial;

@@ -15,7 +15,6 @@ const AROUND: usize = 2;
 /// Fainter points are left out.
 const MIN_WEIGHT: f32 = 0.3;
 
-/// Returns the picture.
 pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
     let (earlier, later) = scans(calibration);
     let (width, height) = (2.0 * SIDE + 48.0, SIDE + HEADER + 16.0);

@@ -12,7 +12,6 @@ use crate::{CalibrationError, Drive, Track, facts::FactVector};
 /// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Revisit {
-    /// The later scan.
     pub later: usize,
     /// The earlier scan.
     pub earlier: usize,

@@ -1,14 +1,12 @@
-//! A drive with what it says, and several drives of one radar together.
+//! A drive with its findings, and several drives of one radar together.
 
 use std::iter;
 
 use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
 
-/// A drive, and what it says.
+/// A drive and its findings.
 pub struct Study {
-    /// The drive.
     pub drive: Drive,
-    /// The solution.
     pub calibration: Calibration,
     /// The constants beside the configured ones.
     pub found: Found,
@@ -16,9 +14,6 @@ pub struct Study {
 
 impl Study {
     /// Finds the constants of a drive.
-    ///
-    /// # Errors
-    /// A drive that does not determine them; a length of the path that cannot be its own.
     pub fn new(drive: Drive, configured: &Configured) -> Result<Self, CalibrationError> {
         let calibration = calibrate(&drive)?;
         let found = Found::new(&drive, &calibration, configured)?;
@@ -29,11 +24,8 @@ impl Study {
         })
     }
 
-    /// Combines what this drive and others of one radar say, each with its own uncertainty. It is
-    /// proposed if their scans overlap more with it, all together.
-    ///
-    /// # Errors
-    /// Scans that cannot be registered with it.
+    /// Combines the findings of this drive and of others of one radar, each with its own
+    /// uncertainty. It is proposed if their scans overlap more with it, all together.
     pub fn combined(&self, others: &[Self]) -> Result<Found, CalibrationError> {
         let of_others: Vec<_> = others.iter().map(|it| &it.found).collect();
         let mean = Found::mean(&self.found, &of_others);

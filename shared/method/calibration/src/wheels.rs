@@ -1,7 +1,7 @@
 //! The clock and the scale of the wheels, from the distances that the radar drives.
 //!
 //! As for a [gyro](crate::calibrate_gyro): the log fits where the radar's distances correlate with
-//! it best, over all offsets of its clock. What tells the offset is how the speed changes.
+//! it best, over all offsets of its clock. Changes of the speed determine the offset.
 
 use std::path::Path;
 
@@ -25,26 +25,25 @@ const PERIOD_SHARE: f64 = 0.1;
 const SCALE_SIGMA: f64 = 2e-3;
 /// An offset that is known less well is refused, s: while braking at 5 m/s² it is half a m/s.
 const MAX_LATE_SIGMA_S: f64 = 0.1;
-/// Scales that wheels can have: beyond, their unit is another one.
+/// Scales that wheels can have: beyond, their unit is different.
 const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 
 /// The clock and the scale of the wheels, by the distances of the radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
-    /// Time by which the stamps of the wheels are late, s.
-    pub late_s: Estimate,
+    /// The delay of the wheels' stamps, s.
+    pub delay_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
-    /// Correlation of the distances with those of the radar.
+    /// Correlation of the distances with the radar's.
     pub correlation: f64,
     /// Number of distances that were compared, of a second each.
     pub distances: usize,
 }
 
-/// Why a drive does not tell the clock of the wheels.
+/// Why a drive does not determine the clock of the wheels.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WheelError {
-    /// The times of the log are not those of the scans.
     #[error(
         "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {seconds} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
     )]
@@ -52,29 +51,24 @@ pub enum WheelError {
         /// Distances that the log has samples for, at most.
         seconds: usize,
     },
-    /// Two offsets fit about as well.
     #[error(
-        "the wheels drive as the radar best with late_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
+        "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
         best[0], best[1], rival[0], rival[1]
     )]
     Ambiguous {
         /// The best offset, s, and its correlation.
         best: [f64; 2],
-        /// Another one.
         rival: [f64; 2],
     },
-    /// The least squares do not end near the peak.
     #[error(
         "the offset of the clocks is not determined: parts of the drive lead to different ones"
     )]
     Unsettled,
-    /// The speed changes too little.
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
         .0.value, .0.sigma
     )]
     Steady(Estimate),
-    /// The speeds have another unit.
     #[error(
         "the radar drives {0:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)"
     )]
@@ -86,7 +80,7 @@ impl From<NoPeak> for WheelError {
         match none {
             NoPeak::Apart { turns } => Self::Apart { seconds: turns },
             NoPeak::Ambiguous { best, rival } => {
-                let of = |it: Peak| [it.late_s, it.correlation];
+                let of = |it: Peak| [it.delay_s, it.correlation];
                 Self::Ambiguous {
                     best: of(best),
                     rival: of(rival),
@@ -99,9 +93,6 @@ impl From<NoPeak> for WheelError {
 /// Finds the offset and the scale of the wheels by a track of the drive.
 ///
 /// Over `max_gap_s` without samples their speed is not interpolated.
-///
-/// # Errors
-/// A log that does not tell them.
 pub fn calibrate_wheels(
     drive: &Drive,
     track: &Track,
@@ -133,32 +124,32 @@ fn calibrate_distances(
     let log = Angles::new(samples, first_ns, max_gap_s);
     let peak = peak(&distances, &log)?;
     let fit = Fit::new(&distances, &log, &peak, false).ok_or(WheelError::Unsettled)?;
-    let [scale, _, late_s] = fit.parameters;
+    let [scale, _, delay_s] = fit.parameters;
     let floored = |estimate: Estimate, floor: f64| Estimate {
         sigma: estimate.sigma.hypot(floor),
         ..estimate
     };
-    let late_s = floored(late_s, PERIOD_SHARE * log.period_s());
+    let delay_s = floored(delay_s, PERIOD_SHARE * log.period_s());
     if !SCALES.contains(&scale.value) {
         return Err(WheelError::Scale(scale.value));
     }
-    match late_s.sigma <= MAX_LATE_SIGMA_S {
+    match delay_s.sigma <= MAX_LATE_SIGMA_S {
         true => Ok(WheelCalibration {
-            late_s,
+            delay_s,
             scale: floored(scale, SCALE_SIGMA),
             correlation: peak.correlation,
             distances: fit.turns,
         }),
-        false => Err(WheelError::Steady(late_s)),
+        false => Err(WheelError::Steady(delay_s)),
     }
 }
 
 impl WheelCalibration {
-    /// Returns the mean of what drives of one vehicle say, each weighted by its uncertainty.
+    /// Returns the mean over drives of one vehicle, each weighted by its uncertainty.
     #[must_use]
     pub fn mean(&self, others: &[Self]) -> Self {
         others.iter().fold(*self, |mean, other| Self {
-            late_s: mean.late_s.combined(&other.late_s),
+            delay_s: mean.delay_s.combined(&other.delay_s),
             scale: mean.scale.combined(&other.scale),
             correlation: mean.correlation.min(other.correlation),
             distances: mean.distances + other.distances,
@@ -174,9 +165,9 @@ impl WheelCalibration {
             Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
             None => "kind = \"auto\"\n".to_owned(),
         };
-        let (late, scale) = (self.late_s, self.scale);
+        let (late, scale) = (self.delay_s, self.scale);
         format!(
-            "\n[wheels]\n{kind}{tick}late_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
+            "\n[wheels]\n{kind}{tick}delay_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
             late.value,
             late.sigma.max(1e-4),
             scale.value,
@@ -186,7 +177,7 @@ impl WheelCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside what is configured if wheels are used.
+    /// Returns the lines of a table, beside the configured values if wheels are used.
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
             let verdict = match (value - found.value).abs() > WRONG_SIGMAS * found.sigma {
@@ -199,9 +190,9 @@ impl WheelCalibration {
                 found.value, found.sigma
             )
         };
-        let (late, scale) = (&self.late_s, &self.scale);
+        let (late, scale) = (&self.delay_s, &self.scale);
         [
-            line("wheels, late by", late, " s", configured.late_s),
+            line("wheels, late by", late, " s", configured.delay_s),
             line("wheels, scale", scale, "", configured.scale),
             format!(
                 "{:<21} {} distances of a second, correlation {:.4}",
@@ -245,10 +236,10 @@ mod tests {
         (stamps.collect(), driven.collect())
     }
 
-    fn wheels(seed: f64, late_s: f64, scale: f64) -> Vec<Sample> {
+    fn wheels(seed: f64, delay_s: f64, scale: f64) -> Vec<Sample> {
         let samples = (-200 * 20..(SECONDS + 200) * 20).map(|k| {
             let time_s = 0.05 * k as f64;
-            let stamp_ns = START_NS + ((time_s + late_s) * 1e9) as i64;
+            let stamp_ns = START_NS + ((time_s + delay_s) * 1e9) as i64;
             Sample::speed(stamp_ns, speed(time_s, seed) / scale)
         });
         samples.collect()
@@ -260,14 +251,14 @@ mod tests {
         /// Whatever the offset and the scale, they are found within their uncertainties.
         #[test]
         fn clock_and_scale_are_found(
-            late_s in -60.0..60.0f64, scale in 0.95..1.05f64, seed in 1.0..9.0f64,
+            delay_s in -60.0..60.0f64, scale in 0.95..1.05f64, seed in 1.0..9.0f64,
         ) {
             let (stamps, driven) = radar(seed);
             let starts = vec![false; stamps.len()];
-            let log = wheels(seed, late_s, scale);
+            let log = wheels(seed, delay_s, scale);
             let found = calibrate_distances(&stamps, &driven, &starts, &log, 0.25).unwrap();
-            let late = found.late_s;
-            prop_assert!((late.value - late_s).abs() < 4.0 * late.sigma, "{late:?} {late_s}");
+            let late = found.delay_s;
+            prop_assert!((late.value - delay_s).abs() < 4.0 * late.sigma, "{late:?} {delay_s}");
             prop_assert!((found.scale.value - scale).abs() < 4.0 * found.scale.sigma);
             prop_assert!(late.sigma < 0.05 && found.scale.sigma < 0.01, "{found:?}");
         }

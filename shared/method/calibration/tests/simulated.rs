@@ -9,8 +9,8 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 
 const ECCENTRICITY_RAD: f64 = 4e-3;
-/// The errors of the constants with which the drive is read: range offset (m), eccentricity (rad),
-/// Doppler coefficient (s).
+/// The errors of the constants for reading the drive: range offset (m), eccentricity (rad), Doppler
+/// coefficient (s).
 const WRONG_BY: [f64; 3] = [0.2, -ECCENTRICITY_RAD, -0.02];
 
 /// Calibrates a short drive around a block that is read with wrong constants.
@@ -58,13 +58,13 @@ fn assert_found(profile: Profile) {
 }
 
 #[test]
-#[ignore = "nightly: takes most of a minute"]
+#[ignore = ".ci/nightly: takes most of a minute"]
 fn wrong_constants_are_found_where_all_chirps_rise() {
     assert_found(Profile::Cts350xRadiate);
 }
 
 #[test]
-#[ignore = "nightly: takes most of a minute"]
+#[ignore = ".ci/nightly: takes most of a minute"]
 fn wrong_constants_are_found_where_chirps_alternate() {
     assert_found(Profile::Ras6);
 }

@@ -51,7 +51,7 @@ impl Constraint {
         }
     }
 
-    /// Creates a loop whose error is independent of those of other loops.
+    /// Creates a loop whose error is independent of the errors of other loops.
     pub fn closing(from: usize, to: usize, motion: UncertainMotion) -> Self {
         Self {
             from,
@@ -133,8 +133,8 @@ pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> 
     })
 }
 
-/// Returns the information of `members` loops of one group relative to that of one loop, if the
-/// errors of any two of them have the correlation `correlation` in 0..=1: that of the mean of
+/// Returns the information of `members` loops of one group relative to one loop, if the errors of
+/// any two of them have the correlation `correlation` in 0..=1: the information of the mean of
 /// equally correlated measurements.
 pub(crate) fn group_information(members: usize, correlation: f64) -> f64 {
     let members = members as f64;

@@ -7,7 +7,6 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EstimationError {
-    /// A constraint names a keyframe that has not been added.
     #[error(
         "the constraint from keyframe {from} to {to} names a keyframe that has not been added: there are {keyframes}, counted \
          from 0. Add odometry constraints in the order of the keyframes, and loops after both of their keyframes"
@@ -17,7 +16,6 @@ pub enum EstimationError {
         from: usize,
         /// The keyframe that is measured.
         to: usize,
-        /// Number of keyframes.
         keyframes: usize,
     },
     /// An odometry constraint does not lead from the last keyframe to a new one.
@@ -30,15 +28,12 @@ pub enum EstimationError {
         from: usize,
         /// The keyframe that is measured.
         to: usize,
-        /// The last keyframe.
         last: usize,
     },
-    /// A constraint relates a keyframe to itself.
     #[error(
         "the constraint of keyframe {0} with itself says nothing: a constraint needs two keyframes"
     )]
     SameKeyframe(usize),
-    /// A measured motion has a value that is NaN or infinite.
     #[error("the motion measured from keyframe {from} to {to} is not finite")]
     NotFinite {
         /// The keyframe that the motion is measured from.
@@ -46,7 +41,6 @@ pub enum EstimationError {
         /// The keyframe that is measured.
         to: usize,
     },
-    /// A covariance is not positive definite, so the constraint cannot be weighted.
     #[error(
         "the covariance of the motion from keyframe {from} to {to} is not positive definite: every measured motion needs the \
          uncertainty of its x, y and yaw"
@@ -57,15 +51,10 @@ pub enum EstimationError {
         /// The keyframe that is measured.
         to: usize,
     },
-    /// A measured position cannot be weighted.
     #[error(
         "the position measured at keyframe {keyframe} is not finite, or its variance or share is not above zero"
     )]
-    Position {
-        /// The keyframe.
-        keyframe: usize,
-    },
-    /// The trajectory filter is full.
+    Position { keyframe: usize },
     #[error(
         "the trajectory filter is full: it holds {limit} keyframes, with a covariance of {} MB. Use the pose graph for a longer \
          trajectory, or raise the limit",
@@ -75,33 +64,17 @@ pub enum EstimationError {
         /// The largest number of keyframes.
         limit: usize,
     },
-    /// A keyframe is asked for that does not exist.
     #[error("there is no keyframe {keyframe}: there are {keyframes}, counted from 0")]
-    NoKeyframe {
-        /// The keyframe.
-        keyframe: usize,
-        /// Number of keyframes.
-        keyframes: usize,
-    },
-    /// Poses to start from are not those of the keyframes of the graph.
+    NoKeyframe { keyframe: usize, keyframes: usize },
+    /// The number of poses to start from differs from the number of keyframes of the graph.
     #[error(
         "there are {poses} poses to start from, and {keyframes} keyframes: each keyframe needs one"
     )]
-    StartPoses {
-        /// Number of poses.
-        poses: usize,
-        /// Number of keyframes.
-        keyframes: usize,
-    },
-    /// The poses are not determined within the range of numbers.
+    StartPoses { poses: usize, keyframes: usize },
     #[error(
         "the constraints do not determine the poses: covariances differ by too many orders of magnitude, or poses are beyond the range          of numbers"
     )]
     Singular,
-    /// There is not enough memory for the equations.
     #[error("there is not enough memory for the equations of {keyframes} keyframes")]
-    Memory {
-        /// Number of keyframes.
-        keyframes: usize,
-    },
+    Memory { keyframes: usize },
 }

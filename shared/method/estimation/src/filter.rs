@@ -29,8 +29,8 @@ pub struct FilterOptions {
 }
 
 impl Default for FilterOptions {
-    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups of which each
-    /// counts as one loop.
+    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups that count as
+    /// one loop each.
     fn default() -> Self {
         Self {
             max_keyframes: 2000,
@@ -47,11 +47,11 @@ impl Default for FilterOptions {
 /// a loop to its square, and no measurement is linearised again after later ones: use
 /// [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
 ///
-/// The paper's filter keeps the covariance of x, y and yaw of each pose. This one keeps that of a
-/// small motion of the world that takes the estimated pose to the true one. To first order both are
-/// the same, and [`TrajectoryFilter::pose`] converts. But here an error of yaw moves the poses
-/// after it around an arc instead of along its tangent, so a correction after a long drift is as
-/// good as that of the graph, and the Jacobians of Eqs. 2 and 3 are simpler.
+/// The paper's filter keeps the covariance of x, y and yaw of each pose. This filter keeps the
+/// covariance of a small motion of the world that takes the estimated pose to the true one. To
+/// first order both are the same, and [`TrajectoryFilter::pose`] converts. But here an error of yaw
+/// moves the poses after it around an arc instead of along its tangent, so a correction after a
+/// long drift is as good as the graph's, and the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
     options: FilterOptions,
@@ -68,8 +68,8 @@ struct Observation {
     ends: [usize; 2],
     /// The relative pose as predicted.
     predicted: Pose,
-    /// Jacobian H of its x, y and yaw with respect to the error of the second pose, and with
-    /// opposite sign to that of the first.
+    /// Jacobian H of its x, y and yaw with respect to the error of the second pose; for the first
+    /// pose it has the opposite sign.
     jacobian: Matrix3<f64>,
 }
 
@@ -88,12 +88,8 @@ impl TrajectoryFilter {
     /// all poses.
     ///
     /// The result depends a little on the order of loops, as each is linearised at the estimate
-    /// that it finds. A filter cannot take information back: of a group of dependent loops, each
-    /// later one adds what it raises the information of the group by.
-    ///
-    /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
-    /// covariance; or the filter is full.
+    /// that it finds. A filter cannot take information back: in a group of dependent loops, each
+    /// later loop adds its increase of the group's information.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -107,9 +103,6 @@ impl TrajectoryFilter {
 
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et
     /// al., Eq. 3): the initial guess of their registration (Eq. 4).
-    ///
-    /// # Errors
-    /// Either keyframe does not exist.
     pub fn predict(&self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(from.max(to), self.poses.len())?;
         let observation = self.observe([from, to]);
@@ -126,9 +119,6 @@ impl TrajectoryFilter {
     }
 
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
-    ///
-    /// # Errors
-    /// The keyframe does not exist.
     pub fn pose(&self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(keyframe, self.poses.len())?;
         let motion = self.poses[keyframe];
@@ -248,8 +238,8 @@ impl TrajectoryFilter {
         Some(())
     }
 
-    /// Returns what the next loop of a group adds to the information of the group, relative to that
-    /// of one loop, and counts it.
+    /// Returns the increase of a group's information by its next loop, relative to one loop, and
+    /// counts the loop.
     fn share(&mut self, group: Option<u64>) -> f64 {
         let Some(group) = group else { return 1.0 };
         let members = self.groups.entry(group).or_default();

@@ -29,14 +29,12 @@ pub struct G2o {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum G2oError {
-    /// A line is neither a vertex, an edge nor a comment.
     #[error(
         "line {line}: {tag:?} is not read, only VERTEX_SE2, EDGE_SE2, FIX of the first vertex, and comments"
     )]
     Tag {
         /// The line, counted from 1.
         line: usize,
-        /// The first word.
         tag: String,
     },
     /// A line has too few or too many fields, or one that is not a finite number.
@@ -44,20 +42,15 @@ pub enum G2oError {
     Fields {
         /// The line, counted from 1.
         line: usize,
-        /// The first word.
         tag: &'static str,
-        /// The fields that it needs.
         needed: &'static str,
     },
-    /// A vertex appears twice.
     #[error("line {line}: vertex {id} appears a second time")]
     Twice {
         /// The line, counted from 1.
         line: usize,
-        /// The vertex.
         id: u64,
     },
-    /// An edge has an information matrix that is not positive definite.
     #[error(
         "line {line}: the information matrix of the edge from {from} to {to} is not positive definite"
     )]
@@ -75,22 +68,17 @@ pub enum G2oError {
     Vertex {
         /// The line, counted from 1.
         line: usize,
-        /// The vertex.
         id: u64,
-        /// The problem.
         problem: &'static str,
     },
-    /// Two consecutive keyframes have no edge.
     #[error(
         "there is no edge from vertex {from} to the next one, {to}: a trajectory needs odometry between all its keyframes"
     )]
     Gap {
         /// The earlier vertex.
         from: u64,
-        /// The later vertex.
         to: u64,
     },
-    /// The file has no edge.
     #[error("there is no EDGE_SE2")]
     Empty,
 }
@@ -110,9 +98,6 @@ struct Raw {
 
 impl G2o {
     /// Reads the text of a g2o file.
-    ///
-    /// # Errors
-    /// The text is no g2o file of poses in the plane, or consecutive poses have no edge.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
         let mut raw = Raw::default();
         for (number, line) in text.lines().enumerate() {
@@ -158,8 +143,8 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     let _ = writeln!(text, "{content}");
 }
 
-/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into that along
-/// those of `from`.
+/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into (x, y, yaw)
+/// along the axes of `from`.
 fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
 }

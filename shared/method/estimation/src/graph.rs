@@ -38,8 +38,8 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups of
-    /// which each counts as one loop.
+    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups that
+    /// count as one loop each.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
@@ -57,8 +57,8 @@ impl Default for GraphOptions {
 /// squares.
 ///
 /// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it
-/// comes, so that the verdict does not depend on what came before it, and all against each other by
-/// the kernel when the graph is solved.
+/// comes, so that the verdict does not depend on earlier loops, and all against each other by the
+/// kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     state: State,
@@ -73,12 +73,11 @@ pub struct PoseGraph {
     factorised: bool,
 }
 
-/// The estimate.
 #[derive(Clone)]
 struct State {
     poses: Vec<Pose>,
-    /// The pose of the graph's frame in that of the positions; `None` without positions that tell
-    /// it. In the equations it follows the poses.
+    /// The pose of the graph's frame in the frame of the positions; `None` without positions that
+    /// determine it. In the equations it follows the poses.
     frame: Option<Pose>,
 }
 
@@ -109,12 +108,11 @@ pub struct WeightedLoop {
 /// The result of solving a pose graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
-    /// Half the sum of the squared normalised residuals, those of loops after the kernel.
+    /// Half the sum of the squared normalised residuals, with loops after the kernel.
     pub cost: f64,
-    /// Number of linearisations.
     pub iterations: usize,
     /// True if the poses are at a minimum of the cost. If not, the iterations were too few, and a
-    /// further solution goes on from there.
+    /// further solution continues from there.
     pub converged: bool,
 }
 
@@ -139,10 +137,6 @@ impl PoseGraph {
     /// Takes a constraint: an odometry constraint adds a keyframe where it leads, a loop is tested
     /// against the odometry between its keyframes. Loops correct no pose until
     /// [`PoseGraph::solve`].
-    ///
-    /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
-    /// covariance.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         let Kind::Odometry = constraint.kind else {
             let tested = self.test(constraint)?;
@@ -162,9 +156,6 @@ impl PoseGraph {
     /// Takes a loop as [`PoseGraph::apply`] does, whose chi-square is known from an earlier
     /// [`PoseGraph::test`]: that takes time in proportion to the path between the keyframes, and
     /// the odometry between them does not change.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::apply`].
     pub fn apply_tested(
         &mut self,
         constraint: &Constraint,
@@ -184,9 +175,6 @@ impl PoseGraph {
 
     /// Tests a loop against the odometry between its keyframes, as [`PoseGraph::apply`] does,
     /// without taking it.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::apply`].
     pub fn test(&self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         let edge = self.edge(constraint)?;
         Ok(self.verdict(self.against_odometry(&edge)))
@@ -205,11 +193,8 @@ impl PoseGraph {
         &self.state.poses
     }
 
-    /// Moves all poses, for instance to those of a file, as the start of the next solution. The
+    /// Moves all poses, for instance to the poses of a file, as the start of the next solution. The
     /// first pose stays fixed where it is put.
-    ///
-    /// # Errors
-    /// There is not one pose for each keyframe.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
         if poses.len() != self.state.poses.len() {
             return Err(EstimationError::StartPoses {
@@ -222,14 +207,14 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Returns half the sum of the squared normalised residuals at the present poses, those of
-    /// loops after the kernel.
+    /// Returns half the sum of the squared normalised residuals at the present poses, with loops
+    /// after the kernel.
     pub fn cost(&self) -> f64 {
         0.5 * self.chi_square(&self.state, Weights::Kernel)
     }
 
-    /// Returns all loops that passed the gate, in the order in which they came, or by keyframes
-    /// after [`PoseGraph::solve_anew`].
+    /// Returns all loops that passed the gate, in the order of arrival, or by keyframes after
+    /// [`PoseGraph::solve_anew`].
     pub fn loops(&self) -> impl Iterator<Item = WeightedLoop> + '_ {
         self.loops.iter().map(|closing| {
             let [from, to] = closing.edge.ends;
@@ -270,7 +255,7 @@ impl PoseGraph {
         Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })
     }
 
-    /// The system is not that of the present constraints.
+    /// Marks the system as out of date.
     fn forget_system(&mut self) {
         self.system = None;
         self.factorised = false;

@@ -12,13 +12,13 @@ pub enum Kernel {
     /// Geman and McClure, 1987: weight (s / (s + c))^2. Right loops lose some weight too: 0.71 at
     /// c = 3 for s = 16.
     GemanMcClure {
-        /// The chi-square s at which the weight is 1/4.
+        /// The chi-square s where the weight is 1/4.
         scale: f64,
     },
     /// Dynamic covariance scaling (Agarwal et al., ICRA 2013): weight 1 up to c = phi, then (2 phi
     /// / (phi + c))^2.
     DynamicCovarianceScaling {
-        /// The chi-square up to which a loop keeps its weight.
+        /// A loop keeps its weight up to this chi-square.
         phi: f64,
     },
 }

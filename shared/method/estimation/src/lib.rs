@@ -7,8 +7,8 @@
 //!   chi-square test;
 //! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all
 //!   keyframes, for short trajectories;
-//! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it
-//!   does with wrong loops; [`Position`]: measured positions in a frame of their own;
+//! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: its
+//!   treatment of wrong loops; [`Position`]: measured positions in a frame of their own;
 //! - [`G2o`]: pose graphs as files of other programs;
 //! - [`places`]: recognises places that are visited again, and measures the loops between them.
 //!
@@ -38,10 +38,10 @@
 //! ```
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]: x forward, y left in m, yaw counter-clockwise in rad. Poses are
-//! those of keyframes in the frame that the first pose is given in. The covariance of a pose or of
-//! a motion is that of its (x, y, yaw), with x and y along the axes of the frame that it is given
-//! in: for a constraint, of the keyframe `from`.
+//! As in [`gyre_geometry`]: x forward, y left in m, yaw counter-clockwise in rad. Poses are
+//! keyframe poses in the frame of the given first pose. The covariance of a pose or of a motion is
+//! the covariance of its (x, y, yaw), with x and y along the axes of its frame: for a constraint,
+//! the frame of the keyframe `from`.
 
 mod constraint;
 mod error;

@@ -33,13 +33,13 @@
 //! after the transform. Points need neither, and are smaller than a raster.
 //!
 //! # Measured
-//! By `gyre-lab places`, on a simulated drive of Oxford (9.0 km, 3,338 keyframes), another one
+//! By `gyre-lab places`, on a simulated drive of Oxford (9.0 km, 3,338 keyframes), a second one
 //! along a drive of Boreas (7.9 km, 2,756) and a drive of RADIATE (350), each behind the refined
-//! odometry and behind the search alone. Recall is that of the first five within 10 m; closed are
-//! the keyframes within 5 m of an earlier one that have a right loop; errors are those of loops in
-//! the opposite direction. RADIATE's ground truth is metres off between the two directions, so that
-//! it tells wrong loops but no errors. Keyframes of Oxford and Boreas had the velocity from the
-//! pose before to the pose after; those of RADIATE are the run's.
+//! odometry and behind the search alone. Recall counts the first five within 10 m; closed are the
+//! keyframes within 5 m of an earlier one that have a right loop; errors are of loops in the
+//! opposite direction. RADIATE's ground truth is metres off between the two directions, so that it
+//! shows wrong loops but no errors. Keyframes of Oxford and Boreas had the velocity from the pose
+//! before to the pose after; keyframes of RADIATE have the run's.
 //!
 //! | drive, odometry | recall@5 | closed | wrong loops | mean forward | rms | correlation of right ones within 5 m, of wrong ones |
 //! |---|---|---|---|---|---|---|
@@ -52,21 +52,21 @@
 //!
 //! The smallest correlation of an accepted loop, 0.65, lies between right and wrong ones. The
 //! normalised estimation error squared of these loops is 1.4 to 3.0 of its expectation, with the
-//! scales of the covariance in `configs/simulated-oxford.toml`: they are somewhat overconfident.
+//! scales of the covariance in `research/worlds/methods/simulated-oxford.toml`: they are somewhat
+//! overconfident.
 //!
 //! # Memory
-//! [`PlaceIndex::BYTES_PER_PLACE`] for a keyframe, of which the sieve is
-//! [`Descriptor::SIEVE_BYTES`]. The points of keyframes, which verification needs again, are the
-//! caller's: 20 bytes each.
+//! [`PlaceIndex::BYTES_PER_PLACE`] for a keyframe, including [`Descriptor::SIEVE_BYTES`] for the
+//! sieve. The points of keyframes, which verification needs again, are the caller's: 20 bytes each.
 //!
 //! Everything is planned once: nothing is allocated afterwards but when a keyframe is added. The
 //! same input gives the same result.
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]. A motion is the pose of the queried (later) keyframe in the frame of
-//! the found (earlier) one, and its covariance that of (x, y, yaw) along the axes of the found one:
-//! a [`Constraint::closing`](crate::Constraint::closing) from the found keyframe to the queried
-//! one.
+//! As in [`gyre_geometry`]. A motion is the pose of the queried (later) keyframe in the frame of
+//! the found (earlier) one, and its covariance is the covariance of (x, y, yaw) along the axes of
+//! the found one: a [`Constraint::closing`](crate::Constraint::closing) from the found keyframe to
+//! the queried one.
 
 mod descriptor;
 mod file;
@@ -84,5 +84,4 @@ pub use verification::{LoopVerifier, Verification, VerificationOutcome};
 const RASTER_CELLS: usize = 255;
 const CELL_M: f64 = 0.8;
 
-/// The rasters are planned for the searches.
 const PLANNED: &str = "rasters and spectra have the shape that the searches are planned for";

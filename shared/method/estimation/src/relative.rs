@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 pub(crate) struct Relative {
     /// The pose of `to` in the frame of `from`.
     pub motion: Pose,
-    /// Jacobian of (x, y, yaw) of the motion with respect to those of `from`.
+    /// Jacobian of (x, y, yaw) of the motion with respect to (x, y, yaw) of `from`.
     pub by_from: Matrix3<f64>,
     /// Jacobian with respect to (x, y, yaw) of `to`.
     pub by_to: Matrix3<f64>,
@@ -35,8 +35,8 @@ impl Relative {
         }
     }
 
-    /// Returns (x, y, yaw) of the measured motion minus those of the predicted one, yaw in (-pi,
-    /// pi]: the innovation.
+    /// Returns (x, y, yaw) of the measured motion minus the predicted motion, yaw in (-pi, pi]: the
+    /// innovation.
     pub fn innovation(&self, measured: &UncertainMotion) -> Vector3<f64> {
         measured.error(&self.motion)
     }

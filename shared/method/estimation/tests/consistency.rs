@@ -22,8 +22,7 @@ impl MeanNees {
         self.samples += 1;
     }
 
-    /// Asserts that the mean lies in the interval that holds that of consistent covariances with a
-    /// probability of 95 %.
+    /// Asserts that the mean lies in the 95 % interval of consistent covariances.
     fn check(&self, name: &str, drives: u64) {
         assert_eq!(self.samples, drives as usize);
         let chi_square = ChiSquared::new((3 * self.samples) as f64).unwrap();
@@ -46,7 +45,7 @@ fn estimates_are_consistent_without_loops_before_and_after_closing() {
 }
 
 #[test]
-#[ignore = "nightly: as many drives as tell small faults from chance"]
+#[ignore = ".ci/nightly: as many drives as tell small faults from chance"]
 fn estimates_of_many_drives_are_consistent() {
     assert_consistent(200);
 }

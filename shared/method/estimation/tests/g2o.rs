@@ -28,7 +28,7 @@ fn a_file_written_comes_back() {
     }
 }
 
-/// GTSAM 4.3 reads edges up to the first line that it does not know, and says nothing.
+/// GTSAM 4.3 reads edges up to the first unknown line, and reports nothing.
 #[test]
 fn no_line_that_gtsam_does_not_know_is_before_an_edge() {
     let drive = Drive::new(40, 20, ODOMETRY, 1);
@@ -44,8 +44,8 @@ fn no_line_that_gtsam_does_not_know_is_before_an_edge() {
 
 #[test]
 fn the_information_of_an_edge_lies_along_the_axes_of_its_end() {
-    // A left turn: along the axes of the end, x is certain to 0.1 m and y to 0.2 m; along those of
-    // the start it is the other way round.
+    // A left turn: along the axes of the end, x is certain to 0.1 m and y to 0.2 m; along the axes
+    // of the start it is the other way round.
     let text = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 2 1 1.5707963267948966\n\
                 EDGE_SE2 0 1 2 1 1.5707963267948966 100 0 0 25 0 400\n";
     let read = G2o::parse(text).unwrap().constraints[0];

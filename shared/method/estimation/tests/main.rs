@@ -9,6 +9,7 @@ mod consistency;
 mod filter;
 mod g2o;
 mod graph;
+mod place_allocations;
 mod places;
 mod positions;
 mod wrong_loops;

@@ -1,8 +1,5 @@
 //! After construction, describing, querying and verifying places allocate nothing.
-#![allow(clippy::unwrap_used, unsafe_code)]
-
-#[path = "places/scenes.rs"]
-mod scenes;
+#![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -10,6 +7,8 @@ use std::cell::Cell;
 use gyre_estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex};
 use gyre_geometry::pose;
 use gyre_scan_matching::RefinementConfig;
+
+use crate::places::scenes;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };

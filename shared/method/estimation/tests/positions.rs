@@ -55,7 +55,7 @@ fn robust() -> Kernel {
     GraphOptions::default().kernel
 }
 
-/// Half the sum of the squared normalised residuals, written anew.
+/// Half the sum of the squared normalised residuals, written independently.
 fn cost(drive: &Drive, positions: &[Position], poses: &[Pose], frame: &Pose) -> f64 {
     let motions = drive.odometry.iter().map(|it| {
         let found = poses[it.from].inverse() * poses[it.to];
@@ -89,7 +89,7 @@ fn the_solution_is_where_no_pose_lowers_the_sum_of_squares() {
         let step = 1e-4;
         let slope = |of: &dyn Fn(f64) -> f64| (of(step) - of(-step)) / (2.0 * step);
         let by_frame = |step| cost(&drive, &positions, &poses, &moved(&frame, axis, step));
-        // In units in which a unit is a standard deviation: sqrt of the curvature.
+        // In units of a standard deviation: sqrt of the curvature.
         let curvature = (by_frame(step) + by_frame(-step) - 2.0 * at_solution) / (step * step);
         assert!(
             slope(&by_frame).abs() < 1e-2 * curvature.sqrt(),

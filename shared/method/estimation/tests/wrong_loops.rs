@@ -51,7 +51,7 @@ impl Case {
                 self.random.random_range(-PI..PI),
             );
             let truth = &self.drive.truth;
-            // As if the place of `from` lay at that of `to`.
+            // As if the place of `from` lay at the place of `to`.
             let moved = truth[to] * shift * truth[from].inverse();
             loops.extend(self.run(from, to, moved, length));
         }

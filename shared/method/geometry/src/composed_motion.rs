@@ -8,7 +8,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{Pose, UncertainMotion, xy_yaw};
 
-/// A motion of an odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometryMotion {
     /// The pose of the later frame in the earlier one.
@@ -23,7 +22,7 @@ pub struct OdometryMotion {
 }
 
 impl Default for OdometryMotion {
-    /// No motion, without any error: that of a message of zeros, where a chain of motions starts.
+    /// No motion, without any error, as in a message of zeros where a chain of motions starts.
     fn default() -> Self {
         Self {
             drift_share: 0.0,
@@ -43,7 +42,7 @@ impl OdometryMotion {
         }
     }
 
-    /// Returns the motion by itself.
+    /// Returns the motion and its covariance, without the shares.
     pub fn alone(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,
@@ -128,9 +127,9 @@ impl ComposedMotion {
         }
     }
 
-    /// Continues with the next motion. One that is exactly zero, as of a vehicle that stands or
-    /// where a chain starts anew, leaves the pose as it is, with its noise. What a vehicle drives
-    /// between two chains is in no covariance.
+    /// Continues with the next motion. A motion that is exactly zero, as of a vehicle that stands
+    /// or where a chain restarts, leaves the pose unchanged, with its noise. Displacement between
+    /// two chains is in no covariance.
     #[must_use]
     pub fn then(&self, next: &OdometryMotion) -> Self {
         let before = UncertainMotion {

@@ -1,8 +1,8 @@
 //! Covariances of (x, y, yaw), in m^2, m rad and rad^2.
 //!
-//! The covariance of a motion is that of its x, y and yaw along the axes of the *earlier* frame.
-//! The error of a motion is therefore the difference of these values, estimate minus truth, with
-//! the difference in yaw wrapped to (-pi, pi].
+//! The covariance of a motion is the covariance of its x, y and yaw along the axes of the *earlier*
+//! frame. The error of a motion is therefore the difference of these values, estimate minus truth,
+//! with the difference in yaw wrapped to (-pi, pi].
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -22,7 +22,7 @@ pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
 }
 
-/// Share by which rounding may take a covariance out of the cone of positive semidefinite matrices.
+/// Tolerance of the test for positive semidefinite matrices, relative: rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// Returns whether a covariance is finite and positive semidefinite, but for rounding: no variance
@@ -95,7 +95,7 @@ impl UncertainMotion {
         }
     }
 
-    /// Returns the error: (x, y, yaw) of this motion minus those of the true one, yaw in (-pi, pi].
+    /// Returns the error: (x, y, yaw) of this motion minus the true motion, yaw in (-pi, pi].
     pub fn error(&self, truth: &Pose) -> Vector3<f64> {
         let apart = self.motion.translation.vector - truth.translation.vector;
         Vector3::new(

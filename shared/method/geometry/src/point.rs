@@ -20,7 +20,7 @@ pub struct SparsePoint {
     pub time_s: f32,
     /// Weight from 0 to 1. A weight that is not above 0 counts as 0.
     pub weight: f32,
-    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 if
+    /// Metres to add to the range for each m/s of the sensor's speed towards the point; 0 if
     /// unknown.
     pub doppler_s: f32,
 }

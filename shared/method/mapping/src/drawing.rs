@@ -8,8 +8,8 @@ use nalgebra::Point2;
 
 use crate::{Evidence, MapError, MapOptions, Overlay, map_png};
 
-/// Odometry's trajectory is drawn if it is somewhere by so many cells beside the other one: nearer
-/// lines are one.
+/// Odometry's trajectory is drawn if it is somewhere this many cells away from the corrected one:
+/// nearer lines coincide.
 const APART_CELLS: f64 = 3.0;
 
 /// The map of keyframes in the frame of the first one that is drawn. Poses are given in one other
@@ -23,7 +23,7 @@ pub struct Drawing {
     is_corrected: bool,
 }
 
-/// The first keyframe, in the frame that poses are given in, and in that of odometry.
+/// The first keyframe, in the frame of the given poses, and in the frame of odometry.
 #[derive(Clone, Copy)]
 struct First {
     pose: Pose,
@@ -33,9 +33,6 @@ struct First {
 impl Drawing {
     /// Starts without a keyframe. What does not fit into memory lies in a file in `folder`, which
     /// has no name.
-    ///
-    /// # Errors
-    /// An option that is out of bounds.
     pub fn new(options: &MapOptions, folder: &Path) -> Result<Self, MapError> {
         Ok(Self {
             evidence: Evidence::new(options, folder)?,
@@ -46,9 +43,6 @@ impl Drawing {
     }
 
     /// Draws the next keyframe at `pose`.
-    ///
-    /// # Errors
-    /// The file of what does not fit into memory cannot be read or written.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), MapError> {
         let odometry = keyframe.pose.motion;
         let pose = *pose;
@@ -61,21 +55,17 @@ impl Drawing {
         Ok(())
     }
 
-    /// Returns what the keyframes say.
+    /// Returns the evidence of the keyframes.
     pub fn evidence(&mut self) -> &mut Evidence {
         &mut self.evidence
     }
 
-    /// Returns the number of keyframes.
     pub fn keyframes(&self) -> usize {
         self.odometry.len()
     }
 
     /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
-    /// loop; and with odometry's trajectory where that is another one.
-    ///
-    /// # Errors
-    /// A map without keyframes or too large for a picture.
+    /// loop, and with odometry's trajectory if it differs.
     pub fn png(&mut self, trajectory: &[Pose], loops: &[[Pose; 2]]) -> Result<Vec<u8>, MapError> {
         let map_from_given = self.first.map_or(Pose::identity(), |it| it.pose.inverse());
         let trajectory: Vec<Pose> = trajectory

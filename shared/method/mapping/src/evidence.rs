@@ -19,9 +19,9 @@ use crate::{
 
 /// Tiles in memory: 70 MB. A keyframe touches 16 to 25 of them.
 const IN_MEMORY: usize = 256;
-/// A keyframe is drawn anew when it moves a place that it sees by more than this share of a cell.
+/// A keyframe is drawn again when it moves a visible place by more than this share of a cell.
 const MOVED_CELLS: f64 = 0.3;
-/// Looks from nearby by which evidence is held back: what was looked at once or twice is not yet
+/// Looks from nearby that reduce the evidence: a cell that was looked at once or twice is not yet
 /// certain.
 const PRIOR: f64 = 1.0;
 /// Looks from nearby of a cell that is well known.
@@ -30,7 +30,7 @@ const WELL_KNOWN: f64 = 8.0;
 /// The evidence of keyframes at their poses about the cells of a map: how often each returned power
 /// of how often it was looked at.
 ///
-/// It is the same whatever the order in which keyframes were drawn, and wherever they were drawn
+/// It is independent of the order of drawing keyframes, and of the places where they were drawn
 /// before.
 ///
 /// Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
@@ -38,14 +38,14 @@ pub struct Evidence {
     options: MapOptions,
     view: View,
     store: TileStore,
-    /// The pose at which each keyframe is drawn, by its `seq`.
+    /// The pose of each drawn keyframe, by its `seq`.
     drawn: BTreeMap<u64, Pose>,
     changed: BTreeSet<TileIndex>,
     /// The contribution of a keyframe to a tile: the cell and the amount.
     returned: BTreeMap<TileIndex, Vec<(u32, u32)>>,
 }
 
-/// A change of what is drawn.
+/// A change of the drawing.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     Draw,
@@ -53,8 +53,8 @@ enum Change {
 }
 
 impl Change {
-    /// Sums do not overflow for fewer looks at one cell than 200,000; an erased keyframe takes away
-    /// what it has added.
+    /// Sums do not overflow for fewer looks at one cell than 200,000; an erased keyframe subtracts
+    /// its earlier sum.
     fn apply(self, sum: &mut u32, amount: u32) {
         *sum = match self {
             Self::Draw => sum.wrapping_add(amount),
@@ -66,9 +66,6 @@ impl Change {
 impl Evidence {
     /// Starts without any. Tiles that do not fit into memory lie in a file in `folder`, which has
     /// no name and does not outlive the process.
-    ///
-    /// # Errors
-    /// An option that is out of bounds.
     pub fn new(options: &MapOptions, folder: &Path) -> Result<Self, OptionError> {
         options.validate()?;
         Ok(Self {
@@ -81,12 +78,10 @@ impl Evidence {
         })
     }
 
-    /// Returns the options.
     pub fn options(&self) -> &MapOptions {
         &self.options
     }
 
-    /// Returns the number of keyframes.
     pub fn keyframes(&self) -> usize {
         self.drawn.len()
     }
@@ -102,8 +97,8 @@ impl Evidence {
         std::mem::take(&mut self.changed)
     }
 
-    /// Returns whether a keyframe that is at `pose` (in the map frame) ought to be drawn: it is not
-    /// yet, or at a pose by which something that it sees is off by more than 0.3 cells.
+    /// Returns whether a keyframe at `pose` (in the map frame) should be drawn: it is not drawn
+    /// yet, or its drawn pose displaces a visible point by more than 0.3 cells.
     pub fn has_moved(&self, seq: u64, pose: &Pose) -> bool {
         let limit_m = MOVED_CELLS * self.options.cell_m;
         self.drawn.get(&seq).is_none_or(|drawn| {
@@ -115,9 +110,6 @@ impl Evidence {
 
     /// Draws a keyframe at `pose` in the map frame. If it is drawn already, it is taken out there
     /// first.
-    ///
-    /// # Errors
-    /// The file of the tiles cannot be read or written.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), StorageError> {
         self.view.take(keyframe);
         if let Some(drawn) = self.drawn.insert(keyframe.seq, *pose) {
@@ -182,9 +174,6 @@ impl Evidence {
     }
 
     /// Makes the image of a tile, and returns whether some keyframe touches it.
-    ///
-    /// # Errors
-    /// The file of the tiles cannot be read or written.
     pub fn image(&mut self, index: TileIndex, image: &mut TileImage) -> Result<bool, StorageError> {
         let Some(tile) = self.store.get(index)? else {
             return Ok(false);

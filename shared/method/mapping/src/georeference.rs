@@ -34,17 +34,14 @@ pub(crate) struct Georeference {
     pub offset: Vector2<f64>,
 }
 
-/// UTM: scale at the central meridian, its easting (m), and the radius of the earth (m), with which
-/// the scale grows away from it.
+/// UTM: scale at the central meridian, its easting (m), and the radius of the earth (m), which
+/// determines the growth of the scale away from the meridian.
 const UTM_SCALE: f64 = 0.9996;
 const UTM_EASTING_M: f64 = 500_000.0;
 const EARTH_M: f64 = 6_371_000.0;
 
 impl Origin {
     /// Checks that the origin is on the earth, within UTM.
-    ///
-    /// # Errors
-    /// Another one.
     pub fn validate(&self) -> Result<(), OriginError> {
         let fits = (-80.0..84.0).contains(&self.latitude_deg)
             && (-180.0..180.0).contains(&self.longitude_deg)
@@ -82,8 +79,8 @@ impl Georeference {
     }
 }
 
-/// The angle from true to grid north, rad clockwise: UTM coordinates a little farther north tell
-/// it.
+/// The angle from true to grid north, rad clockwise: from the UTM coordinates of a point a little
+/// farther north.
 fn convergence(latitude: f64, longitude: f64, zone: u8) -> f64 {
     let step_deg = 1e-4;
     let (south, west, _) = utm::to_utm_wgs84(latitude - step_deg, longitude, zone);

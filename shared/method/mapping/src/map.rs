@@ -52,9 +52,6 @@ pub struct Map {
 /// Writes a map into `folder`: `tiles/X_Y.png` (grey: evidence, opacity: how often it was looked
 /// at; see [`Cell`]), then `map.toml`, without which the folder is not a map. A map that is there
 /// is replaced. It survives a power failure when this returns.
-///
-/// # Errors
-/// A folder that cannot be written, or has other content than a map.
 pub fn write_map(
     folder: &Path,
     evidence: &mut Evidence,
@@ -106,9 +103,6 @@ fn clear(folder: &Path) -> Result<(), MapError> {
 }
 
 /// Checks that a folder has no tiles, or only such as a map has: that a map may be written there.
-///
-/// # Errors
-/// A folder that cannot be read, or has other content than a map.
 pub fn require_tiles_only(folder: &Path) -> Result<(), MapError> {
     tiles_in(folder).map(drop)
 }
@@ -141,9 +135,6 @@ fn tile_path(folder: &Path, tile: TileIndex) -> PathBuf {
 
 impl Map {
     /// Opens the map in `folder`.
-    ///
-    /// # Errors
-    /// A folder without a whole map, or with one of another version.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let refused = |reason: String| MapError::NotAMap {
             path: folder.to_owned(),
@@ -180,7 +171,7 @@ impl Map {
         })
     }
 
-    /// The version, which other versions of this program say in the same way.
+    /// The version, which other versions of this program write in the same form.
     fn version(text: &str) -> Result<i64, String> {
         let table: toml::Table =
             toml::from_str(text).map_err(|error| format!("map.toml: {}", error.message()))?;

@@ -14,12 +14,11 @@ pub enum Occupancy {
     Unknown,
     /// It returned little of the power that it might have.
     Free,
-    /// It returned power.
     Occupied,
 }
 
 impl Occupancy {
-    /// Returns what a cell is.
+    /// Classifies a cell.
     pub fn of(cell: Cell) -> Self {
         match cell {
             cell if cell.looked < KNOWN_LOOKED => Self::Unknown,

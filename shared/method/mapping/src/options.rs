@@ -11,9 +11,9 @@ pub struct MapOptions {
     pub cell_m: f64,
     /// Range of the nearest returns, m: nothing nearer was looked at.
     pub near_m: f64,
-    /// Range up to which a keyframe sees, m.
+    /// The longest range that a keyframe sees, m.
     pub reach_m: f64,
-    /// Range at which a view weighs half as much as one from nearby, m.
+    /// Range where a view has half the weight of a view from nearby, m.
     pub half_weight_m: f64,
     /// Standard deviation of the bearing of a return, degrees: a return is spread along its arc by
     /// so much.
@@ -36,19 +36,13 @@ impl Default for MapOptions {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("the map's {name} is {value}, but must be {bounds}")]
 pub struct OptionError {
-    /// The option.
     pub name: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: &'static str,
 }
 
 impl MapOptions {
     /// Checks the bounds of all options.
-    ///
-    /// # Errors
-    /// The first option that is out of bounds.
     pub fn validate(&self) -> Result<(), OptionError> {
         let option = |fits: bool, name, value, bounds| match fits {
             true => Ok(()),

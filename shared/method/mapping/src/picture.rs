@@ -32,7 +32,8 @@ const MAX_CELL_M: f64 = 3.2;
 /// The overlay drawn over a map, all in the map frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
-    /// The trajectory by which the map was drawn, or one through it, in pieces that are not joined.
+    /// The trajectory that was used to draw the map, or one through it, in pieces that are not
+    /// joined.
     pub trajectory: &'a [&'a [Pose]],
     /// The trajectory by odometry alone, drawn thin; empty where it is the same.
     pub odometry: &'a [Pose],
@@ -40,8 +41,8 @@ pub struct Overlay<'a> {
     pub loops: &'a [[Point2<f64>; 2]],
 }
 
-/// Returns options with the smallest cells, doubled from the default ones, of which a picture of
-/// the map around `poses` has at most 2,048 a side; none are larger than 3.2 m.
+/// Returns options with the smallest cells, doubled from the default, that give a picture of the
+/// map around `poses` at most 2,048 cells a side; cells are at most 3.2 m.
 pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
     let finite = || {
         let places = poses.iter().map(|pose| pose.translation.vector);
@@ -60,9 +61,6 @@ pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
 /// Returns the picture of a map as a PNG file: at most 4,096 pixels a side and a footer, x to the
 /// right, with the start and its heading, a scale bar with the metres of a pixel, and a legend.
 /// Memory: 250 MB at most.
-///
-/// # Errors
-/// A tile that cannot be read, and a map that is empty or wider than a million cells.
 pub fn map_png(source: &mut impl TileSource, overlay: &Overlay<'_>) -> Result<Vec<u8>, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let ground = Ground::read(source, &extent)?;

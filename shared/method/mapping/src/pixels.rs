@@ -5,9 +5,6 @@ use png::{BitDepth, ColorType};
 use crate::{Cell, MapError};
 
 /// Encodes rows of pixels of 8 bits a channel.
-///
-/// # Errors
-/// More pixels than a PNG file can have.
 pub fn encode(width: usize, color: ColorType, pixels: &[u8]) -> Result<Vec<u8>, MapError> {
     let height = pixels.len() / (width * color.samples()).max(1);
     let mut bytes = Vec::new();
@@ -50,8 +47,8 @@ const STRONG: [f32; 3] = [255.0, 236.0, 190.0];
 const WEAK_EVIDENCE: f32 = 45.0;
 const STRONG_EVIDENCE: f32 = 100.0;
 
-/// Steps of evidence and of looks that the eye does not tell apart: a picture without them is half
-/// as large.
+/// Steps of evidence and of looks that are invisible to the eye: a picture without them is half as
+/// large.
 const EVIDENCE_STEP: u8 = 4;
 const LOOKED_STEP: u8 = 15;
 

@@ -10,35 +10,18 @@ use crate::{Cell, Evidence, OptionError, TileImage, TileIndex, georeference::Ori
 /// A map that cannot be drawn, written or read.
 #[derive(Debug, Error)]
 pub enum MapError {
-    /// A file that cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
-    /// An option that is out of bounds.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// A place that is not on the earth, or beyond UTM.
     #[error(transparent)]
     Origin(#[from] OriginError),
-    /// A folder that is not a map.
     #[error("{} is not a map: {reason}", path.display())]
-    NotAMap {
-        /// The folder.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// A tile that cannot be read.
+    NotAMap { path: PathBuf, reason: String },
     #[error("{}: {reason}; draw the map anew", path.display())]
-    Tile {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
-    /// No keyframe.
+    Tile { path: PathBuf, reason: String },
     #[error("the map is empty: no keyframe was drawn")]
     Empty,
-    /// More cells than a picture can have.
     #[error(
         "the map has {columns} x {rows} cells, too many for {form}: choose larger cells, or the map's folder"
     )]
@@ -47,10 +30,8 @@ pub enum MapError {
         columns: usize,
         /// Cells along y.
         rows: usize,
-        /// The form.
         form: &'static str,
     },
-    /// Pixels that cannot be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(String),
 }
@@ -64,9 +45,6 @@ pub trait TileSource {
     fn tiles(&self) -> Vec<TileIndex>;
 
     /// Reads a tile; one that does not exist is blank.
-    ///
-    /// # Errors
-    /// A tile that cannot be read.
     fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError>;
 }
 

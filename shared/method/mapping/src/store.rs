@@ -1,4 +1,4 @@
-//! The evidence of all tiles, of which only so many are in memory.
+//! The evidence of all tiles, with a limited number of tiles in memory.
 
 use std::{
     collections::BTreeMap,
@@ -26,9 +26,8 @@ pub const ONE: u32 = 1 << 14;
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
-    /// The returns of each cell, row after row, that of the lowest y first.
+    /// The returns of each cell, row after row, from the lowest y up.
     pub returned: [u32; CELLS],
-    /// Number of looks at each block.
     pub looked: [u32; BLOCKS * BLOCKS],
 }
 
@@ -97,10 +96,7 @@ impl TileStore {
         }
     }
 
-    /// Returns a tile that a keyframe touches; `None` for another one.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written.
+    /// Returns a tile that a keyframe touches; `None` for any other tile.
     pub fn get(&mut self, index: TileIndex) -> Result<Option<&mut Tile>, StorageError> {
         self.clock += 1;
         let clock = self.clock;

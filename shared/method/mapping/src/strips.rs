@@ -6,9 +6,6 @@ use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSo
 const MAX_CELLS: usize = 1 << 29;
 
 /// Returns the extent of a map that becomes one picture of the form `form`.
-///
-/// # Errors
-/// An empty map, or one that is too large.
 pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let [columns, rows] = extent.cells();
@@ -22,11 +19,8 @@ pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent
     }
 }
 
-/// Calls `take` with the cells of each row of tiles, that of the highest y first, as rows of the
-/// whole width.
-///
-/// # Errors
-/// A tile that cannot be read, and those of `take`.
+/// Calls `take` with the cells of each row of tiles, from the highest y down, as rows of the whole
+/// width.
 pub fn for_each(
     source: &mut impl TileSource,
     extent: &TileExtent,

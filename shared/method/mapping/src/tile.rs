@@ -54,8 +54,8 @@ fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Cell {
-    /// The share of looks at which the cell returned power: the square root of that share, from 0
-    /// (never) to 255.
+    /// The share of looks with returned power: the square root of that share, from 0 (never) to
+    /// 255.
     pub evidence: u8,
     /// Number of looks, from 0 (never) to 255 (8 times from nearby, or oftener).
     pub looked: u8,
@@ -64,7 +64,7 @@ pub struct Cell {
 /// The cells of a tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileImage {
-    /// Row after row, that of the highest y first; in each the lowest x first.
+    /// Row after row, from the highest y down; in each row the lowest x first.
     pub cells: Vec<Cell>,
 }
 
@@ -77,7 +77,7 @@ impl Default for TileImage {
 }
 
 impl TileImage {
-    /// Returns the rows, that of the highest y first.
+    /// Returns the rows, from the highest y down.
     pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Cell]> {
         self.cells.chunks_exact(TILE_CELLS)
     }

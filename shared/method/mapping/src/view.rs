@@ -13,8 +13,8 @@ const SECTORS: usize = 360;
 /// Sectors to either side that a return speaks for: a return hides weaker ones at its range within
 /// the beam, so that not every azimuth has points of a wall that all of them see.
 const BEAM_SECTORS: usize = 3;
-/// A wall returns as much in a cell of this side as it can. Of what it returns, a cell has a share
-/// in proportion to its side, m.
+/// A wall returns as much in a cell of this side as it can. A smaller cell has a share of the
+/// wall's return in proportion to its side, m.
 const FULL_CELL_M: f64 = 0.2;
 /// A return is spread along its arc over so many standard deviations to either side.
 const SPREAD_SIGMAS: f64 = 2.0;
@@ -27,7 +27,7 @@ const SPREAD_SIGMAS: f64 = 2.0;
 pub struct View {
     options: MapOptions,
     points: Submap,
-    /// The range up to which each sector was looked at, m.
+    /// The farthest range of a look into each sector, m.
     farthest_m: [f64; SECTORS],
     own_m: [f64; SECTORS],
 }

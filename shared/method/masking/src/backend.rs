@@ -34,7 +34,6 @@ impl Backend {
 }
 
 impl fmt::Display for Backend {
-    /// The value in configurations.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Auto => "auto",
@@ -73,9 +72,6 @@ impl fmt::Display for Provider {
 }
 
 /// Reads a backend of a configuration.
-///
-/// # Errors
-/// No backend, or one that earlier versions had.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
     let name = String::deserialize(source)?;
     if name == "tract" {

@@ -14,18 +14,18 @@ pub struct MaskingConfig {
     /// `none`: everything counts. `threshold`: power up to `threshold` counts as zero. `learned`:
     /// in addition, a network weights each cell.
     pub kind: MaskKind,
-    /// Power up to which a return counts as zero, 0 to 255, before any network. Rasters hold the
-    /// power less the threshold.
+    /// Highest power that counts as zero, 0 to 255, before any network. Rasters hold the power less
+    /// the threshold.
     pub threshold: u8,
     /// Model card of the network, as `models/NAME.toml`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// SHA-256 of the network, to refuse another one. Default: the one of its card.
+    /// SHA-256 of the network, to refuse a different one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// The library that computes the network, and that of moving objects: `onnxruntime`; `rten`,
-    /// which is built in and slower, and leaves networks of one scan in 8 bits to Gyre itself; or
-    /// `auto`: ONNX Runtime where it is found, else rten.
+    /// The library that computes the network, and the network of moving objects: `onnxruntime`;
+    /// `rten`, which is built in and slower, and leaves networks of one scan in 8 bits to Gyre
+    /// itself; or `auto`: ONNX Runtime where it is found, else rten.
     #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
@@ -61,20 +61,17 @@ pub enum MaskKind {
     None,
     /// Weak returns count as zero.
     Threshold,
-    /// A network weights what is above the threshold.
+    /// A network weights the power above the threshold.
     Learned,
 }
 
 /// A setting out of its bounds.
 #[derive(Debug, Error, PartialEq)]
 pub enum MaskingConfigError {
-    /// The number of threads.
     #[error("threads is {0}, but must be 1 to 64")]
     Threads(usize),
-    /// The exponent of the mask.
     #[error("point_exponent is {0}, but must be 0 to 4")]
     PointExponent(f32),
-    /// rten with a setting of ONNX Runtime.
     #[error(
         "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
     )]
@@ -105,9 +102,6 @@ impl Default for MaskingConfig {
 
 impl MaskingConfig {
     /// Checks the bounds of all settings, without reading any file.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
             () if !(1..=64).contains(&self.threads) => {
@@ -127,7 +121,7 @@ impl MaskingConfig {
         }
     }
 
-    /// Returns the power up to which returns are set to zero.
+    /// Returns the highest power that is set to zero.
     pub fn floor(&self) -> u8 {
         match self.kind {
             MaskKind::None => 0,

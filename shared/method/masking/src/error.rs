@@ -8,16 +8,12 @@ use crate::{MaskingConfigError, network::NetworkError};
 /// An invalid configuration of a masker.
 #[derive(Debug, Error)]
 pub enum MaskerError {
-    /// The mask's.
     #[error("masking.{0}")]
     Masking(#[from] MaskingConfigError),
-    /// Of the rasters.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// Of the points.
     #[error(transparent)]
     Points(#[from] PointsError),
-    /// Of the network.
     #[error(transparent)]
     Network(#[from] NetworkError),
 }
@@ -25,16 +21,12 @@ pub enum MaskerError {
 /// An error in masking a scan.
 #[derive(Debug, Error)]
 pub enum MaskError {
-    /// The scan cannot be rasterised.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// The scan is inconsistent.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// The network failed.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// A mask of your own failed.
     #[error("{0}")]
     Function(String),
     /// The mask takes two scans, but the previous one or the output for it is missing.

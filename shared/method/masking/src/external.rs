@@ -1,7 +1,7 @@
 //! The files that an ONNX file keeps tensors in, beside itself.
 //!
-//! Walks the protobuf messages in which ONNX has tensors. The parser of the built-in runtime leaves
-//! some of them out (functions, sparse weights), and ONNX Runtime reads them all.
+//! Walks the protobuf messages that contain tensors in ONNX. The parser of the built-in runtime
+//! leaves some of them out (functions, sparse weights), and ONNX Runtime reads them all.
 
 /// A tensor's value of `data_location` when it is in another file.
 const EXTERNAL: u32 = 1;
@@ -89,7 +89,7 @@ enum Value<'a> {
     Bytes(&'a [u8]),
 }
 
-/// The fields of a protobuf message, up to its end or to what is not protobuf.
+/// The fields of a protobuf message, up to its end or to the first invalid field.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Iterator for Fields<'a> {

@@ -17,7 +17,7 @@ use crate::{MaskError, Sweep, compensation::CompensatedRaster};
 /// use gyre_radar::{PointsConfig, PolarScan, RasterConfig};
 /// use ndarray::{Array2, ArrayView2, s};
 ///
-/// /// Masks what is nearer than the bumper.
+/// /// Masks everything nearer than the bumper.
 /// #[derive(Debug)]
 /// struct WithoutBumper;
 ///
@@ -48,9 +48,6 @@ pub trait MaskFunction: fmt::Debug + Send + Sync {
     /// Returns factors from 0 to 1 for a scan. `raster` shows it with motion compensation, above
     /// the threshold: n x n, row 0 far ahead, column 0 far left. The same scan must give the same
     /// factors, after a restart too.
-    ///
-    /// # Errors
-    /// The scan cannot be masked.
     fn factors(
         &mut self,
         scan: &PolarScan<'_>,
@@ -61,14 +58,14 @@ pub trait MaskFunction: fmt::Debug + Send + Sync {
 /// Factors from 0 to 1.
 #[derive(Debug)]
 pub enum Factors {
-    /// Of the powers, azimuth x range bin: raster and points are made of what is left.
+    /// Of the powers, azimuth x range bin: raster and points are made from the masked powers.
     OfPower(Array2<f32>),
-    /// Of the cells of the raster, n x n. The weights of points are multiplied as those of a
-    /// network's mask are.
+    /// Of the cells of the raster, n x n. The weights of points are multiplied as with a network's
+    /// mask.
     OfRaster(Array2<f32>),
 }
 
-/// A function, and what it said of the last scan.
+/// A function, and its result for the last scan.
 #[derive(Debug)]
 pub(crate) struct AppliedFunction {
     function: Box<dyn MaskFunction>,

@@ -15,6 +15,7 @@ mod learned;
 mod library;
 pub mod model;
 pub mod network;
+pub mod networks;
 mod points;
 mod resolve;
 mod sweep;
@@ -53,7 +54,6 @@ pub struct Masker {
 /// The origin of the factors.
 #[derive(Debug)]
 enum Weights {
-    /// The threshold alone counts.
     None,
     Network(LearnedMask),
     Function(AppliedFunction),
@@ -61,9 +61,6 @@ enum Weights {
 
 impl Masker {
     /// Allocates all buffers and loads the network, if there is one.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(
         raster: &RasterConfig,
         points: &PointsConfig,
@@ -78,9 +75,6 @@ impl Masker {
     }
 
     /// Allocates all buffers for a mask of your own, in the place of a network: no other is loaded.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds.
     pub fn with_function(
         raster: &RasterConfig,
         points: &PointsConfig,
@@ -121,9 +115,6 @@ impl Masker {
     }
 
     /// Rasterises a scan as the previous one of the next, to resume after a restart.
-    ///
-    /// # Errors
-    /// As [`Masker::mask`].
     pub fn set_previous(&mut self, sweep: &Sweep<'_>) -> Result<(), MaskError> {
         match &mut self.weights {
             Weights::Network(network) => network.set_previous(&mut self.rasters, sweep),
@@ -132,13 +123,10 @@ impl Masker {
     }
 
     /// Masks a scan into `later` (n x n, row 0 far ahead). If the mask takes two scans, the
-    /// previous scan that this one `follows`, masked for this pair, goes into `earlier`; a scan
-    /// that follows none is its own previous scan. Returns the velocity that was used for motion
-    /// compensation.
-    ///
-    /// # Errors
-    /// An inconsistent scan, rasters of another shape, a network or a function that fails, or a
-    /// previous scan that this one [cannot follow](Masker::can_follow).
+    /// previous scan that this one `follows`, masked for this pair, is written to `earlier`; a scan
+    /// without a predecessor is its own previous scan. Returns the velocity that was used for
+    /// motion compensation. Fails if the scan [cannot follow](Masker::can_follow) the previous
+    /// scan.
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -157,9 +145,6 @@ impl Masker {
     /// Writes the scan's points to the start of `out` and returns their number: see
     /// [`PointExtractor::extract`]. The scan is the one that was masked last, with compensation by
     /// `twist`. Factors of its raster are applied with [`MaskingConfig::point_exponent`].
-    ///
-    /// # Errors
-    /// An inconsistent scan.
     pub fn points(
         &mut self,
         scan: &PolarScan<'_>,

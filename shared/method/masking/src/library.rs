@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_networks::runtime::{self, RuntimeError};
+use crate::networks::runtime::{self, RuntimeError};
 
 use crate::{Backend, MaskingConfig, Provider};
 
@@ -11,17 +11,13 @@ use crate::{Backend, MaskingConfig, Provider};
 pub enum Library {
     /// ONNX Runtime, with the path of its library.
     OnnxRuntime(PathBuf),
-    /// rten.
     Rten,
 }
 
 impl Library {
-    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
-    /// named is required: only where none is named or installed, rten stands in for it, and only on
-    /// the processor.
-    ///
-    /// # Errors
-    /// ONNX Runtime is required and missing.
+    /// Returns the library that computes the networks of a configuration. ONNX Runtime is required
+    /// if it is named. If it is neither named nor installed, rten replaces it, but only on the
+    /// processor.
     pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
         if config.backend == Backend::Rten {
             return Ok(Self::Rten);
@@ -42,7 +38,6 @@ impl Library {
         }
     }
 
-    /// Returns the backend.
     pub fn backend(&self) -> Backend {
         match self {
             Self::OnnxRuntime(_) => Backend::OnnxRuntime,

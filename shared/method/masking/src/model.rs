@@ -13,13 +13,12 @@ use thiserror::Error;
 
 use crate::{MaskingConfig, external::external_file};
 
-/// The largest model: hundreds of times that of a mask.
+/// The size limit of models: hundreds of times a mask's.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// The card of a model (`NAME.toml`). It may have other sections, on the provenance of the model.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Card {
-    /// The network.
     pub model: NetworkFacts,
     /// The rasters that it was trained on.
     pub raster: RasterFacts,
@@ -59,7 +58,7 @@ pub struct RasterFacts {
 /// The section `[masking]` of a card: the processing of a raster before the network.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct MaskingFacts {
-    /// Power up to which returns were set to zero.
+    /// The highest power that was set to zero.
     pub floor: Option<u8>,
     /// True if rasters were motion-compensated.
     pub compensate: Option<bool>,
@@ -70,9 +69,7 @@ pub struct MaskingFacts {
 /// A model with a verified checksum and a card that fits the run.
 #[derive(Debug)]
 pub struct Model {
-    /// The card.
     pub card: Card,
-    /// The path of the file.
     pub file: PathBuf,
     /// The content of the file.
     pub bytes: Vec<u8>,
@@ -81,30 +78,19 @@ pub struct Model {
 /// An error in reading a model.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// No model is named.
     #[error(
         "masking.kind is `learned`, but masking.model does not name a model: set it to the card of one, as in models/NAME.toml"
     )]
     NotNamed,
-    /// A file cannot be read.
     #[error("cannot read the model's {what} {path}: {source}")]
     Unreadable {
         /// `card` or `file`.
         what: &'static str,
-        /// The file.
         path: PathBuf,
-        /// The system error.
         source: io::Error,
     },
-    /// The file is not a card.
     #[error("masking.model is {path}, which is not the card of a model: {reason}")]
-    NotACard {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        reason: String,
-    },
-    /// The checksum of the file differs from that of the card.
+    NotACard { path: PathBuf, reason: String },
     #[error(
         "{path} has the SHA-256 {actual}, but its card says {expected}: it is damaged or another model's, so get it again together with its card"
     )]
@@ -113,10 +99,9 @@ pub enum ModelError {
         path: PathBuf,
         /// The value of the card.
         expected: String,
-        /// The actual checksum.
         actual: String,
     },
-    /// The file has weights that are in another one, which no checksum covers.
+    /// The file keeps weights in another file, which no checksum covers.
     #[error(
         "{path} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
          `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",
@@ -128,12 +113,10 @@ pub enum ModelError {
         /// The name of the other file.
         file: String,
     },
-    /// The card's checksum differs from that of the configuration.
     #[error(
         "masking.sha256 is {expected}, but {path} is the card of a model with {actual}: name the other model, or leave masking.sha256 out"
     )]
     OtherModel {
-        /// The card.
         path: PathBuf,
         /// The value of the configuration.
         expected: String,
@@ -147,7 +130,6 @@ pub enum ModelError {
     Raster {
         /// The key of the section `[raster]`.
         key: &'static str,
-        /// The card.
         path: PathBuf,
         /// The value of the card.
         expected: f64,
@@ -158,10 +140,6 @@ pub enum ModelError {
 
 impl Card {
     /// Reads the card that `masking.model` names.
-    ///
-    /// # Errors
-    /// No card is named, the file cannot be read or is not a card, or `masking.sha256` is that of
-    /// another model.
     pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         let not_a_card = |reason: String| ModelError::NotACard {
@@ -273,10 +251,6 @@ fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T)
 
 impl Model {
     /// Reads the model that `masking.model` names and checks that it fits these rasters.
-    ///
-    /// # Errors
-    /// As [`Card::read`]; rasters of another size; a file with another checksum than its card
-    /// states, or with weights in another file.
     pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
         let card = Card::read(config)?;
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;

@@ -13,11 +13,11 @@ use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
+use crate::networks::runtime::RuntimeError;
 use crate::{
     Backend, Library, MaskingConfig, Provider,
     model::{Model, ModelError},
 };
-use gyre_networks::runtime::RuntimeError;
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
@@ -28,13 +28,10 @@ const OUTPUT: &str = "masks";
 /// An error in loading or running a network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
-    /// The model cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// ONNX Runtime cannot be used.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// This build does not have the execution provider.
     #[error(
         "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
     )]
@@ -44,22 +41,18 @@ pub enum NetworkError {
         "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
     )]
     Provider {
-        /// The execution provider.
         provider: Provider,
         /// ONNX Runtime's error.
         reason: String,
     },
-    /// The backend rejects the model.
     #[error("{} cannot load {path}: {reason}", .by.name())]
     Load {
-        /// The backend.
         by: Backend,
         /// The model's file.
         path: PathBuf,
         /// The backend's error.
         reason: String,
     },
-    /// The backend does not know the model's operators.
     #[error(
         "{path} has operators of version {opset}, and this {} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime",
         .by.name()
@@ -69,22 +62,17 @@ pub enum NetworkError {
         path: PathBuf,
         /// The version of its operators.
         opset: i64,
-        /// The backend.
         by: Backend,
         /// The newest version that the backend supports.
         known: String,
     },
-    /// The inputs or outputs of the model do not fit its card.
     #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
     Interface {
         /// The model's file.
         path: PathBuf,
-        /// The actual tensors.
         has: String,
-        /// The expected tensor.
         expected: String,
     },
-    /// The network fails.
     #[error("the learned mask cannot be computed: {0}")]
     Run(String),
 }
@@ -106,9 +94,6 @@ enum Engine {
 
 impl Network {
     /// Loads the configured model and checks that it fits these rasters.
-    ///
-    /// # Errors
-    /// A model that does not fit, or a backend that is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
         let (mut engine, inputs, outputs) = match Library::find(config)? {
@@ -138,9 +123,6 @@ impl Network {
 
     /// Computes the masks (scans x n x n) of rasters (scans x n x n). A mask is a factor from 0 to
     /// 1; the network's values are clamped to that range.
-    ///
-    /// # Errors
-    /// Rasters of the wrong shape, an error of the backend, or factors that are NaN.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
@@ -162,7 +144,8 @@ impl Network {
     }
 }
 
-/// Loads a model without ONNX Runtime. Returns the engine, and what the model takes and gives.
+/// Loads a model without ONNX Runtime. Returns the engine, and the names of the model's inputs and
+/// outputs.
 fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
     let file = rten::parse(model)?;
     let (inputs, outputs) = (rten::inputs(&file), rten::outputs(&file));

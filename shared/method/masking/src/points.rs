@@ -4,7 +4,7 @@ use gyre_geometry::{Pose, SparsePoint, Twist};
 use nalgebra::Point2;
 use ndarray::ArrayView2;
 
-/// The properties of a raster that determine in which cell a point lies.
+/// The properties of a raster that determine a point's cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterFrame {
     /// Cells per side.

@@ -1,6 +1,6 @@
 //! Resolves the inputs of a network.
 
-use gyre_networks::runtime::RuntimeError;
+use crate::networks::runtime::RuntimeError;
 
 use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};
 
@@ -8,9 +8,6 @@ impl MaskingConfig {
     /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from
     /// any folder or is rejected: the absolute paths of model card and runtime, the checksum of the
     /// model, and the backend.
-    ///
-    /// # Errors
-    /// A card that cannot be read, ONNX Runtime missing where it is required.
     pub fn resolve(&mut self) -> Result<(), NetworkError> {
         if self.kind == MaskKind::Learned {
             self.sha256 = Some(Card::read(self)?.model.sha256);
@@ -24,9 +21,6 @@ impl MaskingConfig {
     }
 
     /// Resolves the library alone: its absolute path, and the backend.
-    ///
-    /// # Errors
-    /// ONNX Runtime missing where it is required.
     pub fn resolve_library(&mut self) -> Result<(), RuntimeError> {
         let library = Library::find(self)?;
         self.backend = library.backend();

@@ -8,7 +8,6 @@ use gyre_radar::PolarScan;
 pub struct Sweep<'a> {
     /// The number that identifies the scan in later calls.
     pub number: u64,
-    /// The scan.
     pub scan: PolarScan<'a>,
     /// The velocity of the sensor; `None` if it is unknown.
     pub twist: Option<Twist>,

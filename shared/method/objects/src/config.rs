@@ -1,9 +1,10 @@
 //! The section `[objects]` of a configuration.
 
-use gyre_networks::PlanesError;
+use gyre_masking::networks::PlanesError;
 use serde::{Deserialize, Serialize};
 
-use crate::track::MAX_SCORE;
+/// The largest score, so that an object that has gone ends soon.
+pub(crate) const MAX_SCORE: f64 = 4.0;
 
 /// The kind of the tracking.
 #[derive(
@@ -28,8 +29,8 @@ pub struct ObjectsConfig {
     /// Likelihood at which the network is as often wrong as right. Default 0.35: it was trained to
     /// miss rather than to invent. Less finds more, and more that is false.
     pub even_likely: f64,
-    /// The score from which on a track is an object: the sum of the logarithms of how much likelier
-    /// an object is than none. More finds less, and less that is false. Default 1.
+    /// Least score of a track that becomes an object: the sum of the log-likelihood ratios of an
+    /// object to no object. More finds less, and less that is false. Default 1.
     pub confirm_score: f64,
 }
 
@@ -46,17 +47,12 @@ impl Default for ObjectsConfig {
 /// An error of the tracking of objects.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObjectsError {
-    /// A setting is out of bounds.
     #[error("objects.{key} is {value}, but must be {bounds}")]
     Setting {
-        /// The setting.
         key: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: &'static str,
     },
-    /// The network cannot be loaded or computed.
     #[error("{0}")]
     Network(String),
 }
@@ -74,9 +70,6 @@ impl ObjectsConfig {
     }
 
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), ObjectsError> {
         let require = |key, value, (low, high), bounds| match (low..=high).contains(&value) {
             true => Ok(()),

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use gyre_geometry::{Pose, SparsePoint};
-use gyre_networks::PlanesNetwork;
+use gyre_masking::networks::PlanesNetwork;
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::raster::{Memory, PLANES, SIDE};
@@ -65,7 +65,6 @@ impl Detector {
         })
     }
 
-    /// Forgets all scans.
     pub fn clear(&mut self) {
         self.memory.clear();
     }
@@ -123,7 +122,7 @@ impl Output {
         found
     }
 
-    /// Reads what it says of a cell, in the frame of the sensor.
+    /// Reads the network's output for a cell, in the frame of the sensor.
     fn read(&self, cell: [usize; 2]) -> Detection {
         let value = |plane: usize| f64::from(self.value(plane, cell));
         let centre = cell.map(|at| (at as f64 + 0.5 - (OUT / 2) as f64) * OUT_M);
@@ -145,7 +144,7 @@ impl Output {
 }
 
 impl Detection {
-    /// Takes it from the frame of the sensor into that of the odometry, at the time of the azimuth
+    /// Transforms it from the frame of the sensor to the odometry frame, at the time of the azimuth
     /// that shows it.
     fn place(&mut self, pose: &Pose, azimuths: &[Azimuth]) {
         let here_rad = bearing_rad(&self.at);
@@ -225,7 +224,7 @@ mod tests {
         assert_eq!(found.heading, Vector2::y());
         assert_eq!((found.size_m, found.sigma_m), (SIZE_M, 1.0));
         assert!((found.likely - 0.881).abs() < 1e-3);
-        // The network is not believed beyond what it was trained for.
+        // The output is clamped to the range of the training.
         assert!((found.sigma_mps - (-3f64).exp()).abs() < 1e-12);
     }
 

@@ -4,8 +4,8 @@
 //!
 //! With a known turn rate the motion is linear in position and velocity (Bar-Shalom, Li and
 //! Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, Sec. 11.7.1): no
-//! model is linearised, and a vehicle that stops has no heading to lose. Which turn rate it is
-//! follows from how well each predicts, and what is not known of it is in the covariance.
+//! model is linearised, and a vehicle that stops has no heading to lose. The prediction errors
+//! determine the turn rate, and the covariance contains its uncertainty.
 
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
 
@@ -22,11 +22,11 @@ const TURN_LASTS_S: f64 = 0.5;
 /// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
 /// accelerate with 1 to 3.
 const ACCELERATION_MPS2: f64 = 1.5;
-/// Standard deviation of its acceleration across its way beyond that of a turn, m/s²: a lane is
-/// changed with about 1.
+/// Standard deviation of its lateral acceleration beyond the acceleration of a turn, m/s²: a lane
+/// change has about 1.
 const LATERAL_ACCELERATION_MPS2: f64 = 1.0;
 
-/// Distance by which an object that stood may be seen behind its place, m: less than its length.
+/// An object that stood may be detected this far behind its place, m: less than its length.
 const BEHIND_M: f64 = 4.0;
 
 /// Position and velocity with their covariance, by models of different turn rates.
@@ -37,7 +37,6 @@ pub(crate) struct Filter {
     mean: Estimate,
 }
 
-/// A Kalman filter.
 #[derive(Clone, Copy, Debug)]
 struct Model {
     probability: f64,
@@ -63,7 +62,7 @@ pub(crate) struct Sighting {
     pub by_velocity: Matrix2<f64>,
 }
 
-/// The difference of a measurement to what was predicted.
+/// The difference between a measurement and its prediction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
@@ -163,7 +162,7 @@ impl Filter {
         let kept = (-dt_s / TURN_LASTS_S).exp();
         let noise = acceleration_noise(dt_s, heading);
         for (index, model) in self.models.iter_mut().enumerate() {
-            // A model stays what it is, or any of them begins.
+            // A model continues, or any of them begins.
             let from = |other: usize| {
                 let stays = if other == index { kept } else { 0.0 };
                 before[other].probability * (stays + (1.0 - kept) * SHARES[index])
@@ -227,9 +226,9 @@ impl Filter {
         })
     }
 
-    /// Returns the squared Mahalanobis distance of the place at which another one began to drive
-    /// from that of this one, which stood: it came so fast with the usual acceleration. It is
-    /// infinite for one that has yet to come to that place.
+    /// Returns the squared Mahalanobis distance between this object, which stood, and the place
+    /// where the other object began to drive, if that object reached its speed with the usual
+    /// acceleration. It is infinite for one that has yet to come to that place.
     pub fn apart_from_start(&self, started: &Self) -> f64 {
         let velocity = started.velocity();
         let ahead = started.position() - self.position();

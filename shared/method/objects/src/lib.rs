@@ -8,11 +8,11 @@
 //! - `filter`: the filter of a track, Kalman filters of several turn rates with the time of each
 //!   azimuth,
 //! - `track`: birth, confirmation, coasting and death,
-//! - `assignment`: which detection belongs to which track.
+//! - `assignment`: assigns detections to tracks.
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s. Objects are in
-//! the frame of the odometry, that of the first scan.
+//! As in [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s. Objects are in the
+//! odometry frame: the frame of the first scan.
 
 mod assignment;
 mod config;

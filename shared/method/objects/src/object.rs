@@ -10,8 +10,8 @@ pub struct PlacedScan {
     pub stamp_ns: i64,
     /// The pose of the sensor at that time, in the frame of the odometry.
     pub pose: Pose,
-    /// The velocity of the sensor during the sweep, by which the points are deskewed: that of the
-    /// motion from the scan before, by [`Twist::from_chord`].
+    /// The velocity of the sensor during the sweep, for deskewing the points: from the motion since
+    /// the scan before, by [`Twist::from_chord`].
     pub twist: Twist,
 }
 
@@ -24,13 +24,13 @@ pub struct Object {
     pub position: Point2<f64>,
     /// The velocity over ground, m/s.
     pub velocity: Vector2<f64>,
-    /// The heading, rad: the direction of the velocity, and of what is slow that by the network.
+    /// The heading, rad: the direction of the velocity, or the network's heading for a slow object.
     pub yaw_rad: f64,
     /// The length along the heading, m.
     pub length_m: f64,
     /// The width across it, m.
     pub width_m: f64,
-    /// False if its speed is not significantly above that of what stands.
+    /// False if its speed is not significantly above a standing object's.
     pub moving: bool,
     /// Scans since it was first seen, that one included.
     pub age: u32,
@@ -51,8 +51,8 @@ pub(crate) struct Outline {
 }
 
 impl Outline {
-    /// Returns whether it overlaps another one: whether no line along a side of one of them is
-    /// between them (the theorem of separating axes).
+    /// Returns whether two boxes overlap: whether no line along a side of one of them separates
+    /// them (the theorem of separating axes).
     pub fn overlaps(&self, other: &Self) -> bool {
         let apart = other.centre - self.centre;
         let is_between =

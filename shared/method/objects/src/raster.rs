@@ -18,7 +18,7 @@ pub(crate) const PLANES: usize = RECENT + 2;
 const RECENT: usize = 6;
 /// Scans that are remembered: those without a plane of their own show what stands.
 const REMEMBERED: usize = 20;
-/// The time from one plane to the next, ns: that of a turn of the radars of the training.
+/// The time between planes, ns: one turn of the radars of the training.
 const TURN_NS: i64 = 250_000_000;
 /// A weight that the network takes for the least.
 const LEAST_WEIGHT: f32 = 1.0 / 255.0;
@@ -39,7 +39,6 @@ struct Seen {
     returns: Vec<Return>,
 }
 
-/// The last scans.
 pub(crate) struct Memory {
     /// The newest first.
     scans: VecDeque<Seen>,
@@ -78,7 +77,6 @@ impl Memory {
         self.scans.truncate(REMEMBERED);
     }
 
-    /// Forgets all scans.
     pub fn clear(&mut self) {
         self.scans.clear();
     }
@@ -125,7 +123,7 @@ impl Memory {
 fn cell(x_m: f32, y_m: f32) -> Option<usize> {
     let at = |metres: f32| {
         let at = metres / CELL_M as f32 + (SIDE / 2) as f32;
-        // The whole part is that below, since none is negative.
+        // The whole part equals the floor, since no value is negative.
         (0.0..SIDE as f32).contains(&at).then_some(at as usize)
     };
     Some(at(x_m)? * SIDE + at(y_m)?)

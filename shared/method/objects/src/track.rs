@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::config::MAX_SCORE;
 use crate::detector::Detection;
 use crate::filter::{Filter, Sighting};
 use crate::object::Outline;
@@ -9,7 +10,7 @@ use crate::{Object, ObjectsConfig};
 
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
-/// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
+/// Standard deviation of an unmeasured velocity, m/s: the speed of any vehicle.
 const UNKNOWN_MPS: f64 = 30.0;
 
 /// Factor of the standard deviation that the network gives of a velocity: five of six scans that it
@@ -17,12 +18,10 @@ const UNKNOWN_MPS: f64 = 30.0;
 const VELOCITY_SIGMAS: f64 = 2.0;
 /// Standard deviation of the heading that the network gives, rad.
 const HEADING_SIGMA_RAD: f64 = 0.2;
-/// Squared Mahalanobis distance, by place and velocity, between a detection and a prediction, up to
-/// which the two can be one object: more than its own noise, so that an object that brakes hard or
-/// turns off is within it.
+/// Gate on the squared Mahalanobis distance, by place and velocity, between a detection and a
+/// prediction of the same object: wider than its own noise, so that it contains an object that
+/// brakes hard or turns off.
 const GATE: f64 = 50.0;
-/// The largest score, so that an object that has gone ends soon.
-pub(crate) const MAX_SCORE: f64 = 4.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
 /// The score below which a track ends.
@@ -40,12 +39,11 @@ const LOST_S: f64 = 8.0;
 const STOPPED_S: f64 = 60.0;
 /// Speed below which an object that is lost has stopped, m/s.
 const STOPPING_MPS: f64 = 2.0;
-/// Speed up to which an object counts as standing, m/s: the odometry's own error, and what wind
-/// moves.
+/// A slower object counts as standing, m/s: odometry has errors, and wind moves things.
 const STANDING_MPS: f64 = 0.8;
 /// Speed above which its direction is the heading, m/s: below, noise turns it.
 const HEADING_MPS: f64 = 1.0;
-/// Standard deviations by which the speed must exceed that of standing for an object to be moving.
+/// A moving object must exceed the standing speed by this many standard deviations.
 const MOVING_SIGMAS: f64 = 1.0;
 
 /// A vehicle that may be there: its filter, score and identity.
@@ -53,7 +51,7 @@ const MOVING_SIGMAS: f64 = 1.0;
 pub(crate) struct Track {
     filter: Filter,
     heading: Vector2<f64>,
-    /// Length and width, m: the mean of what was seen, weighed by how likely it was.
+    /// Length and width, m: the mean over detections, weighted by their likelihood.
     size_m: [f64; 2],
     weight: f64,
     /// Identity of an object that was moving once; before it has none.
@@ -65,16 +63,15 @@ pub(crate) struct Track {
     known_s: f64,
     unseen_s: f64,
     moving: bool,
-    /// True if it is neither seen nor expected any more, or has given way to another one, and if it
-    /// was about to stand then: the network finds what moves.
+    /// True if the object is neither seen nor expected any more, or a different track has replaced
+    /// it, and if it was about to stand then: the network finds moving objects only.
     lost: bool,
     stopped: bool,
-    /// Logarithm of the likelihood of an object over that of clutter.
+    /// Logarithm of the likelihood ratio of an object to clutter.
     score: f64,
 }
 
 impl Track {
-    /// Begins a track.
     pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
         let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
         measure_velocity(&mut filter, detection);
@@ -107,7 +104,7 @@ impl Track {
         self.moving = false;
     }
 
-    /// Returns what it costs that a scan shows it there; `None` outside of its gate.
+    /// Returns the cost of assigning a detection to the track; `None` outside of its gate.
     pub fn cost(&self, detection: &Detection) -> Option<f64> {
         let place = self.filter.innovation(&sighting(detection));
         let variance = (detection.sigma_mps * VELOCITY_SIGMAS).powi(2);
@@ -119,7 +116,7 @@ impl Track {
         (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
-    /// Updates it by what a scan shows.
+    /// Updates the track with a detection.
     pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
         self.filter.update(&sighting(detection));
         measure_velocity(&mut self.filter, detection);
@@ -186,8 +183,8 @@ impl Track {
     }
 
     /// Returns how far from where a lost object would be now a track is that has become an object,
-    /// or from where one that stopped would have begun to drive; `None` if it is another one, as
-    /// what was seen before this one was lost.
+    /// or from where one that stopped would have begun to drive; `None` if it is a different
+    /// object, for example one that was detected before this one was lost.
     pub fn distance(&self, found: &Self) -> Option<f64> {
         let is_along = !self.stopped || self.heading.dot(&found.heading) > 0.0;
         let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s && is_along;
@@ -198,7 +195,7 @@ impl Track {
         (may_be && chi_square <= GATE).then_some(chi_square)
     }
 
-    /// Decides whether it moves: whether its speed is above that of what stands by more than its
+    /// Decides whether it moves: whether its speed exceeds a standing object's by more than its
     /// uncertainty explains. Returns whether it becomes an object by that.
     pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
@@ -268,7 +265,7 @@ impl Track {
     }
 }
 
-/// Returns where a detection says that an object is.
+/// Returns the position that a detection reports.
 fn sighting(detection: &Detection) -> Sighting {
     Sighting {
         at: detection.at,
@@ -285,7 +282,7 @@ fn measure_velocity(filter: &mut Filter, detection: &Detection) {
     }
 }
 
-/// Returns the logarithm of how much likelier an object is than none, by what a scan shows.
+/// Returns the log-likelihood ratio of an object to no object, given a detection.
 fn evidence(detection: &Detection, config: &ObjectsConfig) -> f64 {
     let odds = |likely: f64| {
         let likely = likely.clamp(1e-3, 1.0 - 1e-3);

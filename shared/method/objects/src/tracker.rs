@@ -9,8 +9,8 @@ use crate::detector::{Detection, Detector};
 use crate::track::Track;
 use crate::{Object, ObjectsConfig, ObjectsError, PlacedScan};
 
-/// Likelihood, by the network, from which on a place counts as one of a vehicle that moves: what is
-/// less likely keeps no track alive.
+/// A place counts as part of a moving vehicle from this likelihood of the network on: a less likely
+/// place keeps no track alive.
 const LEAST_LIKELY: f64 = 0.1;
 /// Time between two scans beyond which all tracks end, s: by then a car at walking pace is
 /// elsewhere.
@@ -29,9 +29,6 @@ pub struct ObjectTracker {
 impl ObjectTracker {
     /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
     /// rten, which takes several times as long.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be loaded.
     pub fn new(config: &ObjectsConfig, runtime: Option<&Path>) -> Result<Self, ObjectsError> {
         config.validate()?;
         Ok(Self {
@@ -49,9 +46,6 @@ impl ObjectTracker {
     ///
     /// A scan that is not later than the one before, or later by more than 2 s, ends all
     /// tracks.
-    ///
-    /// # Errors
-    /// A network that cannot be computed.
     pub fn update(
         &mut self,
         scan: &PlacedScan,
@@ -88,7 +82,8 @@ impl ObjectTracker {
         self.stamp_ns = Some(stamp_ns);
     }
 
-    /// Updates the tracks by what the scan shows, objects first. Returns what is left.
+    /// Updates the tracks with the detections of the scan, objects first. Returns the remaining
+    /// detections.
     fn assign(&mut self, found: Vec<Detection>) -> Vec<Detection> {
         let (objects, others): (Vec<usize>, Vec<usize>) = (0..self.tracks.len())
             .filter(|index| !self.tracks[*index].is_lost())
@@ -129,8 +124,8 @@ impl ObjectTracker {
         self.tracks.extend(tracks);
     }
 
-    /// Ends tracks, also those of one vehicle but the first, and decides which move. What was an
-    /// object keeps its identity: two vehicles that are close may have been taken for one.
+    /// Ends tracks, including later tracks of the same vehicle, and decides which move. An object
+    /// keeps its identity: two close vehicles may have been confused.
     fn judge(&mut self) {
         // Objects first, then the older ones.
         self.tracks.sort_by_key(|track| !track.is_object());

@@ -53,7 +53,7 @@ impl Car {
     }
 }
 
-/// A vehicle that drives ahead at 8 m/s between two walls, and what is around it.
+/// A vehicle that drives ahead at 8 m/s between two walls, and the objects around it.
 struct Scene {
     sensor_mps: f64,
     tracker: ObjectTracker,
@@ -131,7 +131,8 @@ impl Scene {
         pose(self.sensor_mps * (self.time_s() + after_s), 0.0, 0.0)
     }
 
-    /// A return of what is `at` a place at the scan's time, seen when the beam passes it.
+    /// A return of an object that is `at` a place at the scan's time, measured when the beam passes
+    /// it.
     fn measured(&mut self, at: &Point2<f64>, velocity: &Vector2<f64>) -> Option<SparsePoint> {
         let mut time_s = 0.0;
         let mut seen = Point2::origin();

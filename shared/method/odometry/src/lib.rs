@@ -5,7 +5,7 @@
 //! [`gyre_scan_matching`], so their motions are the same bits.
 //!
 //! Reading order: [`Odometry`]; [`Pair`], the two scans; [`Parts`], the mask, the search and the
-//! refinement, each of which can be one of your own; [`DecoupledSearch`].
+//! refinement, which are all replaceable; [`DecoupledSearch`].
 //!
 //! # Frames and units
 //! As in [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s.

@@ -16,9 +16,7 @@ pub trait Mask: Send + Sync {
     }
 
     /// Rasterises and masks a scan. Returns the velocity that was used for motion compensation.
-    ///
-    /// # Errors
-    /// A scan that cannot be masked; it is left out.
+    /// On an error the scan is left out.
     fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -27,9 +25,7 @@ pub trait Mask: Send + Sync {
 
     /// Writes the scan's points to the start of `out` and returns their number. `twist` is what
     /// [`Mask::mask`] returned.
-    ///
-    /// # Errors
-    /// A scan that cannot be used; it is left out.
+    /// On an error the scan is left out.
     fn points(
         &mut self,
         scan: &PolarScan<'_>,
@@ -38,7 +34,7 @@ pub trait Mask: Send + Sync {
     ) -> Result<usize, OdometryError>;
 
     /// Returns the factors from 0 to 1, n x n, of the last masked scan (0) or of the one before
-    /// (1). `None` if there are none.
+    /// (1). `None` without factors.
     fn factors(&self, _scan: usize) -> Option<ArrayView2<'_, f32>> {
         None
     }

@@ -22,7 +22,6 @@ pub struct Odometry {
     gyro: Gyro,
     wheels: Wheels,
     doppler: Option<DopplerEstimator>,
-    /// By the last scan.
     velocity: Option<Result<DopplerVelocity, NoDoppler>>,
     min_range_m: f32,
     finder: LostAzimuthFinder,
@@ -34,12 +33,8 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Allocates all buffers. After the first scan, registering one allocates nothing but what a
-    /// network does, and what finding lost azimuths does where a scan has more echoes than any
-    /// before.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be used.
+    /// Allocates all buffers. After the first scan, registering a scan allocates nothing, except
+    /// for a network, and for finding lost azimuths in a scan with more echoes than any before.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self::with_parts(config, Parts::new(config)?))
     }
@@ -70,12 +65,9 @@ impl Odometry {
     /// that is not later than the previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`],
     /// starts a new chain as after [`Odometry::restart`].
     ///
-    /// `samples` are those of a gyro and of wheels that come with the scan
-    /// ([`gyre_samples::interval_of`]), in the order of [`Sample::order`]; none, for radar alone.
-    ///
-    /// # Errors
-    /// A scan that cannot be used. It is skipped: the next scan is registered against the one
-    /// before the error.
+    /// `samples` are the gyro's and the wheels' samples that come with the scan
+    /// ([`gyre_samples::interval_of`]), in the order of [`Sample::order`]; empty for radar alone. A
+    /// scan that fails is skipped: the next scan is registered against the scan before it.
     pub fn register(
         &mut self,
         scan: &PolarScan<'_>,
@@ -108,9 +100,6 @@ impl Odometry {
 
     /// Places the scan's azimuths if some were lost, rasterises it with motion compensation, masks
     /// it (Weston et al., Sec. III-E) and extracts its points.
-    ///
-    /// # Errors
-    /// An inconsistent scan, or a network that fails.
     pub fn mask(
         &mut self,
         scan: &PolarScan<'_>,
@@ -132,9 +121,7 @@ impl Odometry {
     /// Searches for the rotation (Weston et al., Eq. 7), then for the translation (Eq. 8) between
     /// the last two masked scans, or for both together by trying every angle; `None` where the
     /// chain starts.
-    ///
-    /// # Errors
-    /// With rasters of [`Odometry::mask`] none but those of a search of your own.
+    /// With rasters of [`Odometry::mask`], only a search of your own can fail.
     pub fn search(&mut self) -> Result<Option<JointMatch>, OdometryError> {
         self.search.search(&self.pair)
     }
@@ -166,7 +153,7 @@ impl Odometry {
         }
     }
 
-    /// Makes the registered scan the previous one, and its velocity that of the motion compensation
+    /// Makes the registered scan the previous one, and its velocity the one for motion compensation
     /// of a later scan.
     pub fn advance(&mut self, registered: &Registered) {
         self.twists.push(registered.searched_twist());
@@ -212,8 +199,8 @@ impl Odometry {
         self.pair.earlier_points()
     }
 
-    /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason why
-    /// there is none; `None` before the first one, and without `[doppler]`.
+    /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason for
+    /// its absence; `None` before the first one, and without `[doppler]`.
     pub fn doppler(&self) -> Option<&Result<DopplerVelocity, NoDoppler>> {
         self.velocity.as_ref()
     }
@@ -224,7 +211,7 @@ impl Odometry {
         self.lost
     }
 
-    /// Returns the velocity with which the last registered scan was motion-compensated.
+    /// Returns the velocity for the motion compensation of the last registered scan.
     pub fn twist(&self) -> Option<Twist> {
         self.pair.earlier_twist()
     }

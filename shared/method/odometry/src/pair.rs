@@ -51,8 +51,8 @@ impl Pair {
         (self.seq > 0).then(|| raster.view())
     }
 
-    /// Returns whether the earlier raster is another one than the later raster of the pair before:
-    /// the mask took two scans.
+    /// Returns whether the earlier raster differs from the later raster of the pair before: the
+    /// mask took two scans.
     pub fn earlier_changed(&self) -> bool {
         self.earlier_for_pair.is_some()
     }
@@ -67,8 +67,8 @@ impl Pair {
         self.earlier.points()
     }
 
-    /// Returns the times of the earlier and of the later scan, ns; twice that of the later one
-    /// where the chain of motions starts.
+    /// Returns the times of the earlier and of the later scan, ns; twice the later time where the
+    /// chain of motions starts.
     pub fn stamps_ns(&self) -> [i64; 2] {
         let [earlier, later] = [&self.earlier, &self.later].map(|frame| frame.stamp_ns);
         match self.seq {
@@ -83,8 +83,8 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
-    /// Returns the variance of the turn from the earlier scan to the later one by that of the mean
-    /// azimuths of both, rad²: not zero where azimuths were lost at places that are not known.
+    /// Returns the variance of the turn from the earlier scan to the later one due to the mean
+    /// azimuths of both, rad²: not zero if azimuths were lost at unknown places.
     pub fn azimuth_variance_rad2(&self) -> f32 {
         self.earlier.azimuth_variance_rad2 + self.later.azimuth_variance_rad2
     }
@@ -104,8 +104,8 @@ impl Pair {
         self.distance
     }
 
-    /// Returns the velocities by Doppler of the earlier scan and of the later one; `None` where a
-    /// scan does not say it.
+    /// Returns the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
+    /// does not determine it.
     pub fn velocities(&self) -> [Option<DopplerVelocity>; 2] {
         [self.earlier.velocity, self.later.velocity]
     }
@@ -191,7 +191,7 @@ impl Pair {
         self.earlier_for_pair.as_ref().map(|raster| raster.view())
     }
 
-    /// Returns the velocity with which the earlier scan was motion-compensated.
+    /// Returns the velocity for the motion compensation of the earlier scan.
     pub(crate) fn earlier_twist(&self) -> Option<Twist> {
         self.earlier.twist
     }

@@ -6,7 +6,6 @@ use gyre_scan_matching::{ExhaustiveSearch, Refined, RefinementKind, Refiner};
 
 use crate::{DecoupledSearch, Mask, OdometryConfig, Pair, Search, SearchKind, SetupError};
 
-/// Refines searched motions.
 pub trait Refine: Send + Sync {
     /// Refines the motion between two scans that the search found.
     fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined;
@@ -15,8 +14,8 @@ pub trait Refine: Send + Sync {
     fn reset(&mut self);
 }
 
-/// The parts that an [`Odometry`](crate::Odometry) is composed of. Those of a configuration, of
-/// which each can be replaced:
+/// The parts that an [`Odometry`](crate::Odometry) is composed of. Each part comes from the
+/// configuration and can be replaced:
 ///
 /// ```
 /// use gyre_geometry::{SparsePoint, Twist};
@@ -25,7 +24,7 @@ pub trait Refine: Send + Sync {
 /// use gyre_radar::PolarScan;
 /// use ndarray::s;
 ///
-/// /// Masks what is behind the vehicle, where it pulls a trailer.
+/// /// Masks the sector behind the vehicle, which contains its trailer.
 /// struct WithoutTrailer(Box<dyn Mask>);
 ///
 /// impl Mask for WithoutTrailer {
@@ -84,9 +83,6 @@ pub struct Parts {
 
 impl Parts {
     /// Makes the parts of a configuration, with all their buffers.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             masker: Box::new(Masker::new(

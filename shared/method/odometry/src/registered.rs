@@ -8,7 +8,6 @@ use gyre_radar::ScanError;
 use gyre_scan_matching::{ConfigError, JointMatch, Refined, ShapeError};
 use thiserror::Error;
 
-/// A registered scan.
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
     /// Sequence number in the chain of motions, from 0.
@@ -54,18 +53,14 @@ pub enum Outcome {
     Predicted,
 }
 
-/// An invalid configuration.
 #[derive(Debug, Error)]
 pub enum SetupError {
-    /// Of the rasters, the points or the mask.
     #[error(transparent)]
     Masker(#[from] MaskerError),
-    /// A refinement without points.
     #[error(
         "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more"
     )]
     NoPoints,
-    /// Of the search or the refinement.
     #[error(transparent)]
     Search(#[from] ConfigError),
 }
@@ -73,16 +68,13 @@ pub enum SetupError {
 /// An error in registering a scan.
 #[derive(Debug, Error)]
 pub enum OdometryError {
-    /// The scan cannot be rasterised or masked.
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// The scan is inconsistent, or its times are not those of one sweep.
+    /// The scan is inconsistent, or its times do not form one sweep.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// The raster cannot be searched.
     #[error(transparent)]
     Search(#[from] ShapeError),
-    /// Of a part that is not Gyre's.
     #[error(transparent)]
     Own(#[from] Box<dyn StdError + Send + Sync>),
 }

@@ -11,9 +11,7 @@ use crate::{OdometryError, Pair};
 pub trait Search: Send + Sync {
     /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
     /// motions starts.
-    ///
-    /// # Errors
-    /// A pair that cannot be searched; its later scan is left out.
+    /// On an error the later scan of the pair is left out.
     fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError>;
 }
 
@@ -26,9 +24,6 @@ pub struct DecoupledSearch {
 
 impl DecoupledSearch {
     /// Plans both searches for rasters of `n` x `n` cells.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds.
     pub fn new(
         n: usize,
         cell_m: f64,

@@ -9,4 +9,3 @@ mod lost_azimuths;
 mod sample_faults;
 mod standing_pair;
 mod stop_and_go;
-mod tunnel;

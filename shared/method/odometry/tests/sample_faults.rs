@@ -1,5 +1,5 @@
-//! Faults in the samples of a gyro and of wheels: each leaves the motions as they were, or is
-//! counted and named in what a run says of its samples and motions. One kind of faults lasts for a
+//! Faults in the samples of a gyro and of wheels: each leaves the motions unchanged, or a run
+//! counts and names it in its report about samples and motions. One kind of faults lasts for a
 //! sweep or more, the other for less: a third for one sample, a third for up to five.
 
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ struct Scan {
     searched: Pose,
 }
 
-/// The motions, and all that a run says of its samples and of them.
+/// The motions, and the whole report of a run about its samples and motions.
 #[derive(Debug, PartialEq)]
 struct Ran {
     motions: Vec<[u64; 3]>,
@@ -75,7 +75,7 @@ impl Drive {
         }
     }
 
-    /// Reads both logs and refines all motions; what is refused is named by its message alone.
+    /// Reads both logs and refines all motions; rejected samples are named only by the message.
     fn run(&self, gyro: &[Row], wheels: &[Row]) -> Ran {
         match self.read(gyro, wheels) {
             Ok(samples) => self.refine(&samples),
@@ -300,13 +300,13 @@ fn no_fault_of_samples_changes_a_motion_silently() {
 }
 
 #[test]
-#[ignore = "nightly: 300 faults, each with the refinement of 40 scans"]
+#[ignore = ".ci/nightly: 300 faults, each with the refinement of 40 scans"]
 fn no_fault_of_many_changes_a_motion_silently() {
     faults(308, 40, Length::Long);
 }
 
 #[test]
-#[ignore = "nightly: 308 faults, each with the refinement of 40 scans"]
+#[ignore = ".ci/nightly: 308 faults, each with the refinement of 40 scans"]
 fn no_short_fault_of_many_changes_a_motion_silently() {
     faults(308, 40, Length::Short);
 }

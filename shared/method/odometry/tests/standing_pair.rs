@@ -1,4 +1,4 @@
-//! Two scans of a standing vehicle, in both forms in which MulRan has them.
+//! Two scans of a standing vehicle, in both forms of MulRan.
 
 use std::{env, fs, path::Path};
 

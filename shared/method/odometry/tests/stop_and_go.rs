@@ -1,12 +1,13 @@
 //! Odometry of a simulated vehicle that stands in traffic, creeps and drives off:
-//! `configs/stop-and-go.toml`.
+//! `configs/stop-and-go.toml`. Several radars, in traffic, are in
+//! `research/worlds/tests/method/stop_and_go.rs`.
 
 use std::{fs, path::Path};
 
 use gyre_datasets::open_source;
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
-use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
+use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use serde::Deserialize;
 
 const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../..");
@@ -21,7 +22,7 @@ struct Configuration {
     odometry: OdometryConfig,
 }
 
-/// Length of the path and number of scans by true speed, with what odometry says of both.
+/// Length of the path and number of scans by true speed, with the estimates of odometry for both.
 #[derive(Debug, Default)]
 struct Part {
     scans: usize,
@@ -73,12 +74,11 @@ impl Report {
     }
 }
 
-fn configuration(profile: Profile) -> Configuration {
+fn configuration() -> Configuration {
     let text = fs::read_to_string(Path::new(PROJECT).join("configs/stop-and-go.toml")).unwrap();
     let mut config: Configuration = toml::from_str(&text).unwrap();
     let file = config.simulation.drive.file.as_mut().unwrap();
     *file = Path::new(PROJECT).join("configs").join(&*file);
-    config.simulation.sensor.profile = profile;
     config
 }
 
@@ -116,39 +116,8 @@ fn drive(config: &Configuration) -> Report {
 
 #[test]
 fn a_vehicle_that_stands_creeps_and_drives_off_is_followed() {
-    let mut config = configuration(Profile::Cts350xOxford);
+    let mut config = configuration();
     config.simulation.drive.from_s = 70.0;
     config.simulation.drive.for_s = Some(38.0);
     drive(&config).holds();
-}
-
-/// The table of `docs/results.md`: with `--ignored --nocapture`, in a release build.
-#[test]
-#[ignore = "renders 680 scans of each radar, twice"]
-fn stop_and_go_of_several_radars() {
-    println!(
-        "| radar | held | path | while standing | while creeping | `stationary` standing, moving |"
-    );
-    for profile in [Profile::Cts350xOxford, Profile::Cir204h, Profile::Ras6] {
-        for held in [false, true] {
-            let mut config = configuration(profile);
-            config.odometry.refinement.hold_standstill = held;
-            let report = drive(&config);
-            let [path_m, true_m] = report.path_m();
-            let (standing, creeping) = (&report.standing, &report.creeping);
-            println!(
-                "| {profile:?} | {held} | {path_m:.1} m of {true_m:.1} m | {:.2} m | {:.2} m of {:.2} m | {} of {}, {} of {} |",
-                standing.path_m,
-                creeping.path_m,
-                creeping.true_m,
-                standing.stationary,
-                standing.scans,
-                report.moving.stationary,
-                report.moving.scans,
-            );
-            if held {
-                report.holds();
-            }
-        }
-    }
 }

@@ -1,8 +1,8 @@
 //! Breaks in the time of a recording.
 
 /// The longest time between consecutive scans of a chain of motions, ns. After that a moving
-/// vehicle has left the reach of every search, and a prediction from its last velocity says
-/// nothing.
+/// vehicle has left the reach of every search, and a prediction from its last velocity is
+/// worthless.
 pub const MAX_INTERVAL_NS: i64 = 10_000_000_000;
 
 /// Returns whether the scan at `later_ns` continues the chain of motions of the scan at

@@ -33,9 +33,9 @@ const MIN_CORRELATION: f64 = 0.6;
 /// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// Delay, s: the motion of the reference at `t` is that of the other trajectory at
-    /// `t + late_s`.
-    pub late_s: f64,
+    /// Delay, s: the motion of the reference at `t` equals the motion of the other trajectory at `t
+    /// + delay_s`.
+    pub delay_s: f64,
     /// Correlation of the speeds at that offset.
     pub speed_correlation: f64,
     /// Correlation of the yaw rates at that offset; `None` if a trajectory has no headings.
@@ -53,14 +53,14 @@ impl ClockOffset {
 
     /// Returns whether the clocks agree.
     pub fn agrees(&self) -> bool {
-        self.is_reliable() && self.late_s.abs() <= MAX_AGREEING_S
+        self.is_reliable() && self.delay_s.abs() <= MAX_AGREEING_S
     }
 }
 
 impl fmt::Display for ClockOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = if self.late_s > 0.0 { "late" } else { "early" };
-        write!(f, "{:.2} s {word}", self.late_s.abs())
+        let word = if self.delay_s > 0.0 { "late" } else { "early" };
+        write!(f, "{:.2} s {word}", self.delay_s.abs())
     }
 }
 
@@ -106,7 +106,7 @@ pub fn clock_offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockO
     let best = (0..fine.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
     let found = &fine[best];
     Some(ClockOffset {
-        late_s: found.late_ns as f64 * 1e-9 + peak(&scores, best) * STEP_NS as f64 * 1e-9,
+        delay_s: found.late_ns as f64 * 1e-9 + peak(&scores, best) * STEP_NS as f64 * 1e-9,
         speed_correlation: found.speed,
         turn_correlation: found.turn,
         mirrored: found.turn.is_some_and(|t| t < -MIN_CORRELATION),
@@ -148,7 +148,6 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
     starts.map_while(over_baseline).collect()
 }
 
-/// Correlation at one offset.
 struct Fit {
     late_ns: i64,
     count: usize,
@@ -249,7 +248,7 @@ mod tests {
         for late_ms in [-3_210, -20, 0, 777, 1_600, 18_000, -37_000] {
             let found = clock_offset(&drive(0, 1.0), &drive(late_ms * 1_000_000, 1.0)).unwrap();
             assert!(
-                (found.late_s - late_ms as f64 * 1e-3).abs() < 0.01,
+                (found.delay_s - late_ms as f64 * 1e-3).abs() < 0.01,
                 "{late_ms} ms: {found:?}"
             );
             assert!(found.is_reliable() && !found.mirrored);
@@ -261,7 +260,7 @@ mod tests {
     fn a_mirrored_ground_truth_is_detected() {
         let found = clock_offset(&drive(0, 1.0), &drive(500_000_000, -1.0)).unwrap();
         assert!(
-            found.mirrored && (found.late_s - 0.5).abs() < 0.01,
+            found.mirrored && (found.delay_s - 0.5).abs() < 0.01,
             "{found:?}"
         );
     }

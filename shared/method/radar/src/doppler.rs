@@ -1,16 +1,12 @@
 //! The velocity of the radar from the Doppler shift of one scan, without another scan to match.
 //!
-//! An FMCW radar measures an echo that it approaches too near with a rising chirp, and too far with
-//! a falling one: [`SweepGeometry::doppler_s`](crate::SweepGeometry::doppler_s). Where both
-//! alternate from azimuth to azimuth, the echoes of an azimuth are shifted against those of its two
-//! neighbours by twice that. The mean of both neighbours is the row at its bearing, so that walls
-//! whose range changes from bearing to bearing shift nothing. The shift says at which speed the
-//! radar approaches the echoes of the bearing, and the speeds of all bearings say its velocity:
-//! approach = vx cos(bearing) + vy sin(bearing), after Le Gentil et al., "DRO: Doppler-aware direct
-//! radar odometry" (2025). What moves is not of that form and loses its weight.
+//! The shift is proportional to the radar's speed towards the echoes of the bearing, and the speeds
+//! of all bearings determine its velocity: approach = vx cos(bearing) + vy sin(bearing), after Le
+//! Gentil et al., "DRO: Doppler-aware direct radar odometry" (2025). Moving objects do not fit this
+//! form and lose their weight.
 //!
-//! A rotation of the radar about itself shifts no range. With the radar ahead of the centre of the
-//! rotation the velocity is that of the radar, which moves to the side there.
+//! A rotation of the radar about itself shifts no range. If the radar is ahead of the centre of the
+//! rotation, the velocity is the radar's, which moves to the side there.
 //!
 //! Steps: `rows` sums bins to cells, `shifts` correlates each row with its neighbours, `fit` finds
 //! the velocity on which most bearings agree.
@@ -36,55 +32,43 @@ use shifts::Shifts;
 /// bin.
 const MIN_DOPPLER_S: f32 = 1e-3;
 
-/// The reason why a scan does not say the velocity.
+/// The reason why a scan does not determine the velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NoDoppler {
-    /// The radar does not report chirps.
     #[error(
         "the radar does not say which azimuths it measures with rising chirps and which with falling ones"
     )]
     UnknownChirps,
-    /// All chirps are alike, or neighbours are.
     #[error(
         "rising and falling chirps do not alternate from azimuth to azimuth: at {alternating} of {azimuths} azimuths they do"
     )]
     NotAlternating {
         /// Azimuths between two of the other chirp.
         alternating: usize,
-        /// All.
         azimuths: usize,
     },
-    /// The coefficient is not known.
     #[error(
         "the Doppler coefficient of the radar is not known: set dataset.doppler_s, the metres by which a closing speed of 1 m/s shifts a range (about 0.05 for a RAS6)"
     )]
     NoCoefficient,
-    /// Too few bearings have echoes.
     #[error("{bearings} bearings have echoes that both chirps see, but {needed} are needed")]
     TooFewBearings {
-        /// Bearings.
         bearings: usize,
         /// The least number.
         needed: usize,
     },
-    /// There is no velocity that explains the shifts.
     #[error("{agreeing} of {bearings} bearings agree on a velocity, which is too few")]
     NoAgreement {
         /// Bearings that agree on the best one.
         agreeing: usize,
-        /// Bearings with echoes.
         bearings: usize,
     },
-    /// An inconsistent scan.
     #[error(transparent)]
     Scan(#[from] ScanError),
 }
 
-/// Checks that the chirps of a scan alternate and that its Doppler coefficient is known: what its
-/// radar needs to say the velocity.
-///
-/// # Errors
-/// The one of these that is missing.
+/// Checks that the chirps of a scan alternate and that its Doppler coefficient is known, since both
+/// are needed to determine the velocity.
 pub fn check_chirps(scan: &PolarScan<'_>) -> Result<(), NoDoppler> {
     scan.check()?;
     let azimuths = scan.geometry.azimuths;
@@ -137,12 +121,9 @@ pub struct DopplerEstimator {
 
 impl DopplerEstimator {
     /// Returns the velocity of the radar in the middle of the sweep, along its own axes, with the
-    /// covariance that the scatter of the bearings says.
+    /// covariance from the scatter of the bearings.
     ///
     /// Echoes nearer than `min_range_m` are left out: they are of the vehicle itself.
-    ///
-    /// # Errors
-    /// The reason why the scan does not say it.
     pub fn estimate(
         &mut self,
         scan: &PolarScan<'_>,

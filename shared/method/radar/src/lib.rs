@@ -11,6 +11,7 @@
 mod chain;
 mod clock;
 pub mod doppler;
+pub mod fourier;
 pub mod lost;
 mod median;
 pub mod points;

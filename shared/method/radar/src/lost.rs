@@ -1,13 +1,12 @@
 //! Lost azimuths: where the host of a radar lost azimuths of a turn.
 //!
 //! The rows behind a lost azimuth have moved up by one. The last rows of the image are *stale*:
-//! they hold what the turn before had there ([`flag::STALE`]). So it is known how many azimuths
-//! were lost, but not where. [`LostAzimuthFinder`] finds that by aligning a scan with the one
-//! before it.
+//! they hold the powers of the turn before ([`flag::STALE`]). So it is known how many azimuths were
+//! lost, but not where. [`LostAzimuthFinder`] finds that by aligning a scan with the one before it.
 //!
-//! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (what is aligned); `prediction`
-//! (the scan before as the sensor would see it now); `alignment` (how likely each place is);
-//! [`repair`].
+//! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (the data for alignment);
+//! `prediction` (the scan before as the sensor would see it now); `alignment` (how likely each
+//! place is); [`repair`].
 
 mod alignment;
 mod echoes;
@@ -40,7 +39,7 @@ pub const MAX_GAPS: usize = 8;
 /// The largest number of lost azimuths that are placed one by one. More are lost in bursts.
 const MAX_SINGLE: usize = 7;
 
-/// The least azimuths of a turn in which places are found.
+/// The least azimuths of a turn for finding places.
 const MIN_AZIMUTHS: usize = 64;
 
 /// By how much faster the vehicle may have become since the motion that predicts: it brakes or
@@ -83,7 +82,6 @@ impl LostAzimuths {
         }
     }
 
-    /// Returns the number of lost azimuths.
     pub fn count(&self) -> usize {
         self.gaps.iter().map(|gap| usize::from(gap[2])).sum()
     }
@@ -103,12 +101,12 @@ impl LostAzimuths {
         unknown.map(|gap| usize::from(gap[2])).sum()
     }
 
-    /// Returns the variance of the mean of the rows' azimuths by what is not known of the places,
-    /// rad², in a turn of `azimuths`.
+    /// Returns the variance of the mean of the rows' azimuths due to unknown places, rad², in a
+    /// turn of `azimuths`.
     pub fn variance_of_mean_rad2(&self, azimuths: usize) -> f32 {
         let measured = azimuths.saturating_sub(self.count()).max(1) as f32;
-        // The mean falls back by the gap for each row behind the place: its variance is that of one
-        // of n places, (n² - 1) / 12.
+        // The mean falls back by the gap for each row behind the place: its variance is the
+        // variance of one of n places, (n² - 1) / 12.
         let of_gaps = self.gaps().iter().map(|[first, last, azimuths]| {
             let places = f32::from(last - first) + 1.0;
             f32::from(*azimuths).powi(2) * (places * places - 1.0) / 12.0
@@ -117,7 +115,7 @@ impl LostAzimuths {
         of_gaps.sum::<f32>() * (step_rad / measured).powi(2)
     }
 
-    /// Returns the azimuth at which a row is expected to have been measured, in steps of the turn.
+    /// Returns the expected azimuth of a row, in steps of the turn.
     fn azimuth_of(&self, row: f32) -> f32 {
         let lost = self.gaps().iter().map(|gap| {
             let [first, last, azimuths] = gap.map(f32::from);
@@ -132,7 +130,6 @@ impl LostAzimuths {
 pub struct LostAzimuthFinder {
     /// The echoes of the rows as they follow each other.
     rows: Echoes,
-    /// The scan before.
     previous: Option<Previous>,
     /// The echoes of that scan, each at its azimuth: only where the next scan has lost some.
     placed: Echoes,
@@ -211,7 +208,6 @@ impl LostAzimuthFinder {
         swap(&mut previous.rows, &mut self.rows);
     }
 
-    /// Forgets the scan before.
     pub fn reset(&mut self) {
         self.previous = None;
     }

@@ -21,7 +21,7 @@ use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use serde::{Deserialize, Serialize};
 
-/// Power above the floor at which the weight of a point reaches 1.
+/// The weight of a point is 1 from this power above the floor on.
 pub const WEIGHT_CAP: f32 = 60.0;
 /// The largest [`PointsConfig::capacity`].
 pub const MAX_POINTS: usize = 65_536;
@@ -61,19 +61,13 @@ impl Default for PointsConfig {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("points.{key} is {value}, but must be {bounds}")]
 pub struct PointsError {
-    /// The setting.
     pub key: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: &'static str,
 }
 
 impl PointsConfig {
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), PointsError> {
         let setting = |fits: bool, key, value: f32, bounds| match fits {
             true => Ok(()),
@@ -108,10 +102,6 @@ pub struct PointExtractor {
 }
 
 impl PointExtractor {
-    /// Returns an extractor.
-    ///
-    /// # Errors
-    /// See [`PointsConfig::validate`].
     pub fn new(config: &PointsConfig) -> Result<Self, PointsError> {
         config.validate()?;
         Ok(Self {
@@ -127,9 +117,7 @@ impl PointExtractor {
     /// [`WEIGHT_CAP`], at most 1. Returns the number of points, at most
     /// [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured give no points
     /// and suppress none.
-    ///
-    /// # Errors
-    /// An inconsistent scan; `out` is unchanged then.
+    /// On an error `out` is unchanged.
     pub fn extract(
         &mut self,
         scan: &PolarScan<'_>,

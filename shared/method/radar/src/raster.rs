@@ -94,9 +94,6 @@ impl Default for RasterConfig {
 
 impl RasterConfig {
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// [`RasterError::Setting`] names the first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), RasterError> {
         let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
         if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
@@ -118,14 +115,10 @@ impl RasterConfig {
 /// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
-    /// A setting is out of bounds.
     #[error("raster.{key} is {value}, but must be {bounds}")]
     Setting {
-        /// The setting.
         key: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: &'static str,
     },
     /// The array for the raster is not `n x n`, or not contiguous and row-major.
@@ -136,7 +129,6 @@ pub enum RasterError {
         /// Rows and columns of the array.
         actual: [usize; 2],
     },
-    /// The scan is inconsistent.
     #[error(transparent)]
     Scan(#[from] ScanError),
     /// The motion to compensate is not finite, or exceeds [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
@@ -144,7 +136,6 @@ pub enum RasterError {
         "a turn of {turn_rad} rad and a travel of {travel_m} m within half a sweep are out of bounds (twist {twist:?})"
     )]
     Twist {
-        /// The twist.
         twist: Twist,
         /// The turn between the scan's stamp and the azimuth furthest from it in time, rad.
         turn_rad: f64,
@@ -166,9 +157,6 @@ pub struct Rasteriser {
 
 impl Rasteriser {
     /// Allocates memory and computes the positions of the cells.
-    ///
-    /// # Errors
-    /// See [`RasterConfig::validate`].
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {
@@ -185,7 +173,6 @@ impl Rasteriser {
         })
     }
 
-    /// Returns the configuration.
     pub fn config(&self) -> &RasterConfig {
         &self.config
     }
@@ -197,10 +184,7 @@ impl Rasteriser {
     /// of the ranges is compensated where the scan's Doppler coefficient is known. Cells that no
     /// azimuth or bin covers are zero; a scan without azimuths or bins gives zeros. Powers are
     /// interpolated between neighbouring azimuths, also between the last and the first.
-    ///
-    /// # Errors
-    /// A wrong shape or layout of `raster`, an inconsistent scan, a twist that is not finite or too
-    /// large. `raster` is unchanged then.
+    /// On an error `raster` is unchanged.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,

@@ -12,7 +12,7 @@ use ndarray::{ArrayView2, ShapeBuilder};
 /// The largest number of azimuths in a sweep. Navtech radars measure 400, some 800.
 pub const MAX_AZIMUTHS: usize = 1024;
 
-/// The direction in which azimuths increase, seen from above.
+/// The direction of increasing azimuths, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sense {
     /// Ahead, right, behind, left: Navtech sensors.
@@ -29,11 +29,10 @@ pub mod flag {
     pub const CHIRP_UP: u8 = 2;
     /// The sensor reports the chirp of each azimuth in [`CHIRP_UP`].
     pub const CHIRP_KNOWN: u8 = 4;
-    /// The row still holds what the turn before had there, since that many azimuths of this one
-    /// were lost before it, at places that are not known: see [`crate::lost`]. It is not
-    /// [`MEASURED`].
+    /// The row still holds the powers of the turn before, since that many azimuths of this turn
+    /// were lost before it, at unknown places: see [`crate::lost`]. It is not [`MEASURED`].
     pub const STALE: u8 = 8;
-    /// The angle is that of a uniform turn in which no azimuth was lost; it was not measured.
+    /// The angle assumes a uniform turn without lost azimuths; it was not measured.
     pub const ASSUMED: u8 = 16;
 }
 
@@ -62,7 +61,7 @@ pub struct SweepGeometry {
     /// positive, and with a falling chirp negative. Where the chirp of an azimuth is known, it
     /// determines the sign.
     pub doppler_s: f32,
-    /// The direction in which azimuths increase.
+    /// The direction of increasing azimuths.
     pub sense: Sense,
     /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the
     /// reader documents otherwise.
@@ -211,7 +210,6 @@ impl OwnedScan {
         }
     }
 
-    /// Returns a view of the scan.
     pub fn view(&self) -> PolarScan<'_> {
         let azimuths = self.geometry.azimuths;
         PolarScan {

@@ -16,7 +16,6 @@ impl Trajectory {
     /// Files round stamps by less than this: see [`Trajectory::near`].
     pub const ROUNDING_NS: u64 = 1_000_000;
 
-    /// Number of poses.
     pub fn len(&self) -> usize {
         self.poses.len()
     }

@@ -1,4 +1,4 @@
-//! Bounds of what sections about sensors beside the radar can say.
+//! Bounds of the settings of sensors beside the radar.
 
 use thiserror::Error;
 
@@ -6,11 +6,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{section}.{key} is {value}, but must be {expected}")]
 pub struct SampleConfigError {
-    /// The section.
     pub section: &'static str,
-    /// The key.
     pub key: &'static str,
-    /// The value.
     pub value: f64,
     /// The values that it may have.
     pub expected: &'static str,
@@ -38,9 +35,9 @@ impl Bounds {
         }
     }
 
-    pub fn late_s(&self, value: f64) -> Result<(), SampleConfigError> {
+    pub fn delay_s(&self, value: f64) -> Result<(), SampleConfigError> {
         let expected = "seconds, at most a million";
-        self.within("late_s", value, [-1e6, 1e6], expected)
+        self.within("delay_s", value, [-1e6, 1e6], expected)
     }
 
     pub fn max_wait_ms(&self, value: f64) -> Result<(), SampleConfigError> {

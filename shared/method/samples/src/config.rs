@@ -14,7 +14,7 @@ const LEANING: f64 = 0.01;
 
 /// Configuration of the gyro: section `[gyro]`.
 ///
-/// The noise is that of a data sheet. The defaults are those of a gyro that cars have.
+/// The noise is as in a data sheet. The defaults suit a gyro of a car.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GyroConfig {
@@ -27,26 +27,26 @@ pub struct GyroConfig {
     /// of a bag; `/imu/data` of a live radar.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of a live gyro are received: lines of a stamp (ns
-    /// since 1970) and the rates about x, y and z (rad/s), with commas between.
+    /// The address and port for receiving datagrams of a live gyro: lines of a stamp (ns since
+    /// 1970) and the rates about x, y and z (rad/s), with commas between.
     pub listen: String,
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
-    /// Time by which the stamps of the gyro are late against the radar's, s: it is taken off them.
-    pub late_s: f64,
+    /// Delay of the stamps of the gyro against the radar's, s: it is subtracted from them.
+    pub delay_s: f64,
     /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`. Default: the axis
-    /// along which the log measures gravity, or that of its format; else `z`.
+    /// where the log measures gravity, or the axis of its format; else `z`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub up: Option<UpAxis>,
     /// True yaw rate over the measured one.
     pub scale: f64,
     /// Standard deviation of that scale.
     pub scale_sigma: f64,
-    /// Bias with which a run begins, rad/s: it is taken off the measured rate.
+    /// Bias at the start of a run, rad/s: it is subtracted from the measured rate.
     pub bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub bias_sigma_radps: f64,
-    /// Angle random walk, rad/√s: that of one degree per square root of an hour is 2.9e-4.
+    /// Angle random walk, rad/√s: one degree per square root of an hour is 2.9e-4.
     pub noise_rad_per_sqrt_s: f64,
     /// Random walk of the bias, rad/s/√s.
     pub bias_walk_radps_per_sqrt_s: f64,
@@ -65,7 +65,7 @@ pub enum GyroKind {
     /// None: by the radar alone.
     #[default]
     None,
-    /// The log that lies beside the scans, or what comes with them; without one it is an error.
+    /// The log beside the scans, or the samples that come with them; without either it is an error.
     Auto,
     /// The log that `file` names.
     Log,
@@ -102,9 +102,9 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// Returns a vector along the axes of the gyro in right-handed axes of which the third points
-    /// up. The axis that points ahead is not known: z down is taken for x ahead and y right, z up
-    /// for x ahead and y left; other axes are named in their order.
+    /// Returns a vector along the axes of the gyro in right-handed axes whose third points up. The
+    /// axis that points ahead is unknown: z down implies x ahead and y right, z up implies x ahead
+    /// and y left; other axes are named in their order.
     pub fn in_vehicle(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Z => [x, y, z],
@@ -137,7 +137,7 @@ impl Default for GyroConfig {
             topic: None,
             listen: "127.0.0.1:6321".to_owned(),
             max_wait_ms: 20.0,
-            late_s: 0.0,
+            delay_s: 0.0,
             up: None,
             scale: 1.0,
             scale_sigma: 0.01,
@@ -165,7 +165,7 @@ impl GyroConfig {
     /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
     /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
     pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.late_s * 1e9).round() as i64;
+        let late_ns = (self.delay_s * 1e9).round() as i64;
         let [x, y, z, along_x, along_y, along_z] = sample.values;
         let up = self.up.unwrap_or_default();
         let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
@@ -182,14 +182,10 @@ impl GyroConfig {
         (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         bounds.max_wait_ms(self.max_wait_ms)?;
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;

@@ -1,5 +1,5 @@
-//! The velocity of the radar by the Doppler shift of one scan, and the way between two scans by
-//! those of both.
+//! The velocity of the radar by the Doppler shift of one scan, and the displacement between two
+//! scans by both velocities.
 
 use std::f64::consts::PI;
 
@@ -25,12 +25,13 @@ pub struct DopplerVelocity {
     pub bearings: u64,
 }
 
-/// The way of the radar from one scan to the next by Doppler, along the heading half-way.
+/// The displacement of the radar from one scan to the next by Doppler, along the heading in the
+/// middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DopplerWay {
-    /// The way ahead, with the variances of both parts.
+pub struct DopplerDisplacement {
+    /// The displacement ahead, with the variances of both parts.
     pub ahead: WheelDistance,
-    /// The way to the left, m.
+    /// The displacement to the left, m.
     pub left_m: f64,
 }
 
@@ -41,8 +42,8 @@ pub struct DopplerWay {
 pub struct DopplerConfig {
     /// Use of the velocity.
     pub kind: DopplerKind,
-    /// Standard deviation of the true velocity over the measured one: how well
-    /// `dataset.doppler_s` is known. The drive itself tells it better.
+    /// Standard deviation of the true velocity over the measured one: how well `dataset.doppler_s`
+    /// is known. The drive itself determines it better.
     pub scale_sigma: f64,
 }
 
@@ -52,10 +53,10 @@ pub struct DopplerConfig {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum DopplerKind {
-    /// None: the motion is that of the matches alone.
+    /// None: only the matches determine the motion.
     #[default]
     None,
-    /// That of each scan; with a radar whose chirps do not alternate, or without
+    /// The velocity of each scan; with a radar whose chirps do not alternate, or without
     /// `dataset.doppler_s`, it is an error.
     Auto,
 }
@@ -80,7 +81,7 @@ impl DopplerConfig {
     }
 
     /// Returns wheels right below the radar that know their scale as well: what weighs the
-    /// distance by wheels against the radar weighs the way by Doppler too.
+    /// distance by wheels against the radar weighs the displacement by Doppler too.
     pub fn as_wheels(&self) -> WheelsConfig {
         WheelsConfig {
             radar_ahead_m: 0.0,
@@ -89,21 +90,25 @@ impl DopplerConfig {
         }
     }
 
-    /// Returns the way between two scans whose velocities are known, over the time between them:
-    /// at the mean of both.
+    /// Returns the displacement between two scans whose velocities are known, over the time between
+    /// them: at the mean of both.
     ///
-    /// Each velocity counts half in two ways, so that the errors of these do not cancel and their
-    /// variances are such that they add up. A velocity that changes evenly moves that of a sweep to
-    /// the side by 1 / (4 pi) of the change in a turn, and as much along the path where the echoes
-    /// are uneven: that is added.
-    pub fn way(&self, [earlier, later]: [&DopplerVelocity; 2], interval_s: f64) -> DopplerWay {
+    /// Each velocity counts half in two displacements, so that the errors of these do not cancel
+    /// and their variances are such that they add up. A velocity that changes evenly shifts a
+    /// sweep's velocity to the side by 1 / (4 pi) of the change in a turn, and by as much along the
+    /// path if the echoes are uneven: that is added.
+    pub fn displacement(
+        &self,
+        [earlier, later]: [&DopplerVelocity; 2],
+        interval_s: f64,
+    ) -> DopplerDisplacement {
         let mean = |of: fn(&DopplerVelocity) -> f64| 0.5 * (of(earlier) + of(later));
         let [ahead, left] = [mean(|it| it.velocity_mps[0]), mean(|it| it.velocity_mps[1])];
         let [dx, dy] = [0, 1].map(|axis| later.velocity_mps[axis] - earlier.velocity_mps[axis]);
         let by_change = (dx * dx + dy * dy) / (4.0 * PI).powi(2);
         let variance =
             |of_scans: f64| (of_scans + by_change + Self::NOISE_MPS.powi(2)) * interval_s.powi(2);
-        DopplerWay {
+        DopplerDisplacement {
             ahead: WheelDistance {
                 distance_m: ahead * interval_s,
                 variance_m2: variance(mean(|it| it.covariance[0])),
@@ -114,10 +119,6 @@ impl DopplerConfig {
         }
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("doppler");
         bounds.within(
@@ -144,25 +145,26 @@ mod tests {
     }
 
     proptest! {
-        /// The way of a velocity that changes evenly is exact, and the sum of ways whose velocities
-        /// have independent errors has at most the sum of the variances that are said.
+        /// The displacement of a velocity that changes evenly is exact, and the sum of
+        /// displacements whose velocities have independent errors has at most the sum of the stated
+        /// variances.
         #[test]
-        fn ways_add_up_and_so_do_their_variances(
+        fn displacements_add_up_and_so_do_their_variances(
             start in -30.0..30.0f64, change in -1.0..1.0f64, sigma in 0.01..0.3f64, scans in 2usize..20,
         ) {
             let config = DopplerConfig::default();
             let at = |k: usize| velocity([start + change * k as f64, 0.1], sigma);
-            let ways: Vec<_> = (1..scans).map(|k| config.way([&at(k - 1), &at(k)], 0.25)).collect();
+            let displacements: Vec<_> = (1..scans).map(|k| config.displacement([&at(k - 1), &at(k)], 0.25)).collect();
             let time_s = 0.25 * (scans - 1) as f64;
-            let driven: f64 = ways.iter().map(|it| it.ahead.distance_m).sum();
+            let driven: f64 = displacements.iter().map(|it| it.ahead.distance_m).sum();
             let expected = time_s * (start + 0.5 * change * (scans - 1) as f64);
             prop_assert!((driven - expected).abs() < 1e-9);
-            let left: f64 = ways.iter().map(|it| it.left_m).sum();
+            let left: f64 = displacements.iter().map(|it| it.left_m).sum();
             prop_assert!((left - 0.1 * time_s).abs() < 1e-9);
-            let said: f64 = ways.iter().map(|it| it.ahead.variance_m2).sum();
+            let said: f64 = displacements.iter().map(|it| it.ahead.variance_m2).sum();
             // Errors of the ends count half, of those between whole.
             let of_errors = (sigma * 0.25).powi(2) * ((scans - 2) as f64 + 0.5);
-            prop_assert!(said >= of_errors && ways.iter().all(|it| it.ahead.side_variance_m2 > 0.0));
+            prop_assert!(said >= of_errors && displacements.iter().all(|it| it.ahead.side_variance_m2 > 0.0));
         }
     }
 

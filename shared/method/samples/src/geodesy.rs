@@ -6,7 +6,6 @@
 
 /// Semi-major axis of the ellipsoid WGS 84, m.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
-/// Flattening of the ellipsoid.
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
 /// Square of the first eccentricity.
 const ECCENTRICITY_2: f64 = FLATTENING * (2.0 - FLATTENING);

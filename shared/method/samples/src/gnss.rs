@@ -22,13 +22,13 @@ pub struct GnssConfig {
     /// `kind = "auto"` (default: the only one), or for `kind = "ros2"` (default: `/fix`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of a live receiver arrive, for `kind = "udp"`: lines
+    /// The address and port for receiving datagrams of a live receiver, for `kind = "udp"`: lines
     /// of a stamp (ns since 1970), latitude and longitude (degrees) and, if it is known, the
     /// standard deviation along each axis (m), with commas between. For `kind = "ros2"` those that
     /// the source passes on.
     pub listen: String,
-    /// Time by which the stamps of the fixes are late against the radar's, s: it is taken off them.
-    pub late_s: f64,
+    /// Delay of the stamps of the fixes against the radar's, s: it is subtracted from them.
+    pub delay_s: f64,
     /// The antenna in the frame of the radar: x forward, y left, m.
     pub lever_m: [f64; 2],
     /// Standard deviation of a fix along east and along north, m, where the log has none.
@@ -58,15 +58,15 @@ pub enum GnssKind {
 }
 
 impl Default for GnssConfig {
-    /// A receiver without corrections: 2.5 m circular error probable, which its data sheet says,
-    /// are 2.1 m along each axis.
+    /// A receiver without corrections: 2.5 m circular error probable, as in its data sheet, are 2.1
+    /// m along each axis.
     fn default() -> Self {
         Self {
             kind: GnssKind::None,
             file: None,
             topic: None,
             listen: "127.0.0.1:6323".to_owned(),
-            late_s: 0.0,
+            delay_s: 0.0,
             lever_m: [0.0, 0.0],
             sigma_m: 2.0,
             correlation_s: 10.0,
@@ -85,13 +85,9 @@ impl GnssConfig {
         matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gnss");
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         for metres in self.lever_m {
             bounds.within("lever_m", metres, [-100.0, 100.0], "metres, at most 100")?;
         }
@@ -115,7 +111,7 @@ pub struct GnssFix {
     pub sigma_m: f64,
 }
 
-/// A fix as it was logged, whatever it says.
+/// A fix as it was logged, even if it is invalid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RawFix {
     /// Time on the receiver's clock, ns since 1970.
@@ -156,6 +152,6 @@ pub struct BagFixes {
     pub topic: String,
     /// The fixes in the order of the bag.
     pub fixes: Vec<RawFix>,
-    /// Messages in which the receiver had no fix.
+    /// Messages without a fix.
     pub without_fix: usize,
 }

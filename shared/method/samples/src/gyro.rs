@@ -9,7 +9,7 @@ use crate::{GyroConfig, Sample, SampleKind, integral::Integrator};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GyroTurn {
-    /// From the stamp of the scan before to that of the scan, rad, with the bias.
+    /// From the stamp of the scan before to the stamp of the scan, rad, with the bias.
     pub yaw_rad: f64,
     /// Variance but for the bias and the scale, rad².
     pub variance_rad2: f64,
@@ -21,8 +21,8 @@ pub struct GyroTurn {
 
 /// Integrates the yaw rate between scans.
 ///
-/// The result for a scan depends on the samples that came with it and with the scan before, and on
-/// nothing else: so a process that is restarted at the scan before says the same.
+/// The result for a scan depends only on the samples that came with it and with the scan before, so
+/// a process that is restarted at the scan before returns the same result.
 #[derive(Clone, Debug)]
 pub struct Gyro {
     config: GyroConfig,
@@ -44,18 +44,17 @@ impl Gyro {
         self.yaw.push(samples, stamp_ns, span_ns);
     }
 
-    /// Takes the samples of a scan that is dropped: they count as those of the next one.
+    /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
         self.yaw.drop_scan(samples);
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.yaw.clear();
     }
 
-    /// Returns the turn from the stamp of the scan before to that of the scan; `None` where samples
-    /// are missing.
+    /// Returns the turn from the stamp of the scan before to the stamp of the scan; `None` where
+    /// samples are missing.
     pub fn turn(&self) -> Option<GyroTurn> {
         let integral = self.yaw.integral()?;
         let [_, sweep] = self.yaw.means();

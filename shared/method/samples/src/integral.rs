@@ -2,13 +2,13 @@
 
 use crate::{Sample, SampleKind};
 
-/// Turn of the radar that is taken for a scan whose azimuths all have the same time, ns.
+/// Turn of the radar assumed for a scan whose azimuths all have the same time, ns.
 const MIN_TURN_NS: i64 = 250_000_000;
 
 /// Integrates a rate between scans: a value of the samples of one kind.
 ///
-/// The result for a scan depends on the samples that came with it and with the scan before, and on
-/// nothing else: so a process that is restarted at the scan before says the same.
+/// The result for a scan depends only on the samples that came with it and with the scan before, so
+/// a process that is restarted at the scan before returns the same result.
 #[derive(Clone, Debug)]
 pub(crate) struct Integrator {
     kind: SampleKind,
@@ -23,7 +23,7 @@ pub(crate) struct Integrator {
     integral: Option<Integral>,
 }
 
-/// The integral of a rate from the stamp of one scan to that of the next.
+/// The integral of a rate from the stamp of one scan to the stamp of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Integral {
     pub sum: f64,
@@ -36,7 +36,7 @@ pub(crate) struct Integral {
 /// A stamp, ns, and the rate.
 type Rate = (i64, f64);
 
-/// A scan with what came with it.
+/// A scan with its samples.
 #[derive(Clone, Debug, Default)]
 struct Sweep {
     stamp_ns: i64,
@@ -74,21 +74,20 @@ impl Integrator {
         self.dropped.clear();
     }
 
-    /// Takes the samples of a scan that is dropped: they count as those of the next one.
+    /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
         let mut dropped = std::mem::take(&mut self.dropped);
         dropped.extend(self.rates(samples));
         self.dropped = dropped;
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.dropped.clear();
         (self.earlier, self.later, self.integral) = (None, None, None);
     }
 
-    /// Returns the integral from the stamp of the scan before to that of the scan; `None` where
-    /// samples are missing.
+    /// Returns the integral from the stamp of the scan before to the stamp of the scan; `None`
+    /// where samples are missing.
     pub fn integral(&self) -> Option<Integral> {
         self.integral
     }
@@ -177,8 +176,8 @@ fn integral(rates: &[Rate], [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Opti
     (is_dense && covers).then_some(sum)
 }
 
-/// The rate at a time, interpolated linearly; before the first sample and after the last, that of
-/// the nearest.
+/// The rate at a time, interpolated linearly; before the first sample and after the last, the
+/// nearest rate.
 fn rate_at(rates: &[Rate], stamp_ns: i64) -> Option<f64> {
     let next = rates.partition_point(|(at_ns, _)| *at_ns < stamp_ns);
     let after = rates.get(next).or(rates.last())?;

@@ -11,9 +11,7 @@ const MAX_WAITING: usize = 16 * MAX_SAMPLES;
 /// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
 #[derive(Clone, Debug)]
 pub enum LiveSensor {
-    /// A gyro.
     Gyro(GyroConfig),
-    /// The wheels.
     Wheels(WheelsConfig),
 }
 
@@ -38,7 +36,6 @@ pub struct LiveSamples {
 }
 
 impl LiveSamples {
-    /// Creates an empty queue.
     pub fn new(sensor: LiveSensor) -> Self {
         Self {
             sensor,
@@ -202,7 +199,7 @@ mod tests {
     #[test]
     fn samples_are_put_on_the_radars_clock_and_axes() {
         let mut live = of_gyro(GyroConfig {
-            late_s: 0.1,
+            delay_s: 0.1,
             up: Some(crate::UpAxis::MinusZ),
             ..GyroConfig::default()
         });
@@ -214,7 +211,7 @@ mod tests {
     #[test]
     fn speeds_are_put_on_the_radars_clock_and_scaled() {
         let mut live = LiveSamples::new(LiveSensor::Wheels(WheelsConfig {
-            late_s: 0.1,
+            delay_s: 0.1,
             scale: 1.02,
             ..WheelsConfig::default()
         }));

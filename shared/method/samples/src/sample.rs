@@ -16,7 +16,7 @@ pub struct Sample {
     pub values: [f64; 6],
 }
 
-/// The most samples that travel with one scan: those of a second at 1000 Hz.
+/// The most samples that travel with one scan: a second at 1000 Hz.
 pub const MAX_SAMPLES: usize = 1024;
 
 /// The largest speed of a sample, m/s: no vehicle on wheels with a radar drives faster.
@@ -77,7 +77,7 @@ impl Sample {
         are_finite && is_measured
     }
 
-    /// Returns the place in the order in which samples travel: by their stamps, and of one stamp by
+    /// Returns the key of the order of samples on the way: by their stamps, and for one stamp by
     /// their kinds. No two have the same.
     pub fn order(&self) -> (i64, u32) {
         (self.stamp_ns, self.kind)

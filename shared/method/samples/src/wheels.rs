@@ -4,16 +4,14 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
 
-/// Standard deviation of a speed by the step to which it is rounded, m/s.
+/// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
-/// Standard deviation of the time of a sample against the radar's clock, s.
-const TIME_SIGMA_S: f64 = 0.01;
 
 /// The distance from one scan to the next by the wheels, along the vehicle's path.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct WheelDistance {
-    /// From the stamp of the scan before to that of the scan, m; negative backwards.
+    /// From the stamp of the scan before to the stamp of the scan, m; negative backwards.
     pub distance_m: f64,
     /// Variance but for the scale, m².
     pub variance_m2: f64,
@@ -25,8 +23,8 @@ pub struct WheelDistance {
 
 /// Integrates the speed of the wheels between scans.
 ///
-/// The result for a scan depends on the samples that came with it and with the scan before, and on
-/// nothing else: so a process that is restarted at the scan before says the same.
+/// The result for a scan depends only on the samples that came with it and with the scan before, so
+/// a process that is restarted at the scan before returns the same result.
 #[derive(Clone, Debug)]
 pub struct Wheels {
     config: WheelsConfig,
@@ -48,24 +46,23 @@ impl Wheels {
         self.speed.push(samples, stamp_ns, span_ns);
     }
 
-    /// Takes the samples of a scan that is dropped: they count as those of the next one.
+    /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
         self.speed.drop_scan(samples);
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.speed.clear();
     }
 
-    /// Returns the distance from the stamp of the scan before to that of the scan; `None` where
-    /// samples are missing.
+    /// Returns the distance from the stamp of the scan before to the stamp of the scan; `None`
+    /// where samples are missing.
     pub fn distance(&self) -> Option<WheelDistance> {
         let integral = self.speed.integral()?;
         let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
-        // What a speed is rounded by stays while the speed does.
+        // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
-        let by_time = TIME_SIGMA_S * integral.change;
+        let by_time = self.config.time_sigma_s * integral.change;
         // Both ends are anywhere within a tick.
         let by_ticks_m2 = self.config.m_per_tick.unwrap_or_default().powi(2) / 6.0;
         Some(WheelDistance {

@@ -11,7 +11,7 @@ use crate::{
 
 /// Configuration of the wheels' speed: section `[wheels]`.
 ///
-/// The defaults are those of a car, whose speed is of its own bus.
+/// The defaults suit a car whose speed comes from its own bus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WheelsConfig {
@@ -24,16 +24,16 @@ pub struct WheelsConfig {
     /// `geometry_msgs/msg/TwistStamped`. Default: `/odom` of a live radar, none of a bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of live wheels are received: lines of a stamp (ns
-    /// since 1970) and the speed (m/s), with a comma between.
+    /// The address and port for receiving datagrams of live wheels: lines of a stamp (ns since
+    /// 1970) and the speed (m/s), with a comma between.
     pub listen: String,
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
-    /// Time by which the stamps of the speed are late against the radar's, s: it is taken off them.
-    pub late_s: f64,
-    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    /// Delay of the stamps of the speed against the radar's, s: it is subtracted from them.
+    pub delay_s: f64,
+    /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
-    /// Distance of one tick of a log that counts them, or to which an odometer rounds, m.
+    /// Distance of one tick of a log that counts ticks, or the rounding step of an odometer, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m_per_tick: Option<f64>,
     /// True speed over the measured one.
@@ -42,6 +42,8 @@ pub struct WheelsConfig {
     pub scale_sigma: f64,
     /// Noise of the distance and of the place across the path, m/√m.
     pub noise_m_per_sqrt_m: f64,
+    /// Standard deviation of the time of a sample against the radar's clock, s.
+    pub time_sigma_s: f64,
     /// Longest time between two samples over which the speed is interpolated, s.
     pub max_gap_s: f64,
 }
@@ -52,10 +54,10 @@ pub struct WheelsConfig {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum WheelsKind {
-    /// None's: the radar alone says how far the vehicle drives.
+    /// No wheels: only the radar determines the distance.
     #[default]
     None,
-    /// The log that lies beside the scans, or what comes with them; without one it is an error.
+    /// The log beside the scans, or the samples that come with them; without either it is an error.
     Auto,
     /// The log that `file` names.
     Log,
@@ -73,12 +75,13 @@ impl Default for WheelsConfig {
             topic: None,
             listen: "127.0.0.1:6322".to_owned(),
             max_wait_ms: 20.0,
-            late_s: 0.0,
+            delay_s: 0.0,
             radar_ahead_m: 0.0,
             m_per_tick: None,
             scale: 1.0,
             scale_sigma: 0.02,
             noise_m_per_sqrt_m: 0.01,
+            time_sigma_s: 0.01,
             max_gap_s: 0.25,
         }
     }
@@ -98,18 +101,14 @@ impl WheelsConfig {
     /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
     /// applied.
     pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.late_s * 1e9).round() as i64;
+        let late_ns = (self.delay_s * 1e9).round() as i64;
         let speed_mps = sample.values[0] * self.scale;
         Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         bounds.max_wait_ms(self.max_wait_ms)?;
         let expected = "metres, -10 to 10";
         bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;
@@ -119,6 +118,7 @@ impl WheelsConfig {
         }
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;
+        bounds.noise("time_sigma_s", self.time_sigma_s)?;
         bounds.max_gap_s(self.max_gap_s)
     }
 }

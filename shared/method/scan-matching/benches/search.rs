@@ -9,7 +9,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use common::{Motion, pair};
-use gyre_fourier::{Complex32, FftDirection};
+use gyre_radar::fourier::{Complex32, FftDirection};
 use gyre_scan_matching::{
     ExhaustiveConfig, ExhaustiveSearch, Overlap, RotationConfig, RotationSearch, TranslationConfig,
     TranslationSearch, fast_size,
@@ -42,7 +42,7 @@ fn median_ms(mut work: impl FnMut()) -> f64 {
 
 /// `count` complex transforms of `size`.
 fn complex_ms(size: usize, count: usize) -> f64 {
-    let fft = gyre_fourier::complex(size, FftDirection::Forward);
+    let fft = gyre_radar::fourier::complex(size, FftDirection::Forward);
     let data: Vec<Complex32> = (0..size).map(|k| Complex32::new(k as f32, 1.0)).collect();
     let mut work = data.clone();
     let mut scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
@@ -56,7 +56,7 @@ fn complex_ms(size: usize, count: usize) -> f64 {
 
 /// `count` real transforms of `size`.
 fn real_ms(size: usize, count: usize) -> f64 {
-    let fft = gyre_fourier::real(size);
+    let fft = gyre_radar::fourier::real(size);
     let (mut work, mut out, mut scratch) = (
         fft.make_input_vec(),
         fft.make_output_vec(),

@@ -12,11 +12,8 @@ pub struct ConfigError {
     /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or
     /// `raster`.
     pub section: &'static str,
-    /// Key within the section.
     pub key: &'static str,
-    /// The rejected value.
     pub actual: String,
-    /// The accepted values.
     pub expected: &'static str,
 }
 
@@ -199,10 +196,6 @@ impl RotationConfig {
         }
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("rotation");
         section.require(
@@ -241,10 +234,6 @@ impl TranslationConfig {
         }
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("translation");
         let fits = positive(self.reach_m);
@@ -302,7 +291,7 @@ impl Section {
         self.require(bounds.contains(&value), key, &value, expected)
     }
 
-    /// Rejects what is not a positive number.
+    /// Rejects a number that is not positive.
     pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
         self.require(positive(value), key, &value, "a positive number")
     }

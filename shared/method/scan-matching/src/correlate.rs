@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, FftDirection};
+use gyre_radar::fourier::{Complex32, FftDirection};
 
 use crate::fft::{BLOCK, Columns, RowPass, Transform};
 use crate::kernels;
 
 /// Correlates real images, two at a time, with a kept one.
 ///
-/// With Z the spectrum of g + i h, the inverse transform of Z conj(F) is the correlation of f with
-/// g as its real part and that of f with h as its imaginary part: one complex transform computes
-/// both without separating them.
+/// With Z the spectrum of g + i h, the inverse transform of Z conj(F) has the correlation of f with
+/// g as its real part and the correlation of f with h as its imaginary part: one complex transform
+/// computes both without separating them.
 pub(crate) struct KeptCorrelation {
     n: usize,
     size: usize,

@@ -26,8 +26,8 @@ pub(crate) fn shift_covariance(
     }
 }
 
-/// The covariance of (x, y, yaw) from that of the shift along the later scan's axes at a known
-/// angle, the variance of the angle, and the derivative of (x, y) by the angle, m/rad.
+/// The covariance of (x, y, yaw) from the covariance of the shift along the later scan's axes at a
+/// known angle, the variance of the angle, and the derivative of (x, y) by the angle, m/rad.
 pub(crate) fn motion_covariance(
     turn: &Rotation2<f64>,
     shift: Matrix2<f64>,

@@ -106,9 +106,7 @@ struct JointPeak {
 
 impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    ///
-    /// # Errors
-    /// A configuration value out of its bounds, or a reach of more than half the raster.
+    /// The reach must be at most half the raster.
     pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
@@ -143,9 +141,7 @@ impl ExhaustiveSearch {
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -156,9 +152,6 @@ impl ExhaustiveSearch {
 
     /// Finds the motion between two rasters whose angle is near `prior_rad`, the middle of the
     /// grid.
-    ///
-    /// # Errors
-    /// Those of [`search`](Self::search).
     pub fn search_around(
         &mut self,
         later: ArrayView2<'_, f32>,

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal, Fft, FftDirection};
+use gyre_radar::fourier::{Complex32, ComplexToReal, Fft, FftDirection};
 
 use crate::kernels;
 
@@ -112,7 +112,7 @@ pub(crate) struct Transform {
 
 impl Transform {
     pub fn new(size: usize, direction: FftDirection) -> Self {
-        let fft = gyre_fourier::complex(size, direction);
+        let fft = gyre_radar::fourier::complex(size, direction);
         let scratch = fft
             .get_inplace_scratch_len()
             .max(fft.get_immutable_scratch_len());
@@ -122,7 +122,7 @@ impl Transform {
         }
     }
 
-    /// Transforms a line into another one.
+    /// Transforms a line into a second line.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
         self.fft
             .process_immutable_with_scratch(line, out, &mut self.scratch);
@@ -178,7 +178,7 @@ impl RowPass {
     }
 }
 
-/// Transform of two real lines at once: that of g + i h, whose halves are then separated.
+/// Transform of two real lines at once: of g + i h, whose halves are then separated.
 ///
 /// Faster than `realfft`, which separates the halves of a single line without vector instructions.
 pub(crate) struct RealLines {
@@ -278,7 +278,7 @@ pub(crate) struct PairSpectrum {
 impl PairSpectrum {
     /// Transforms of `size` (even) a side.
     pub fn new(size: usize) -> Self {
-        let inverse_row = gyre_fourier::real_inverse(size);
+        let inverse_row = gyre_radar::fourier::real_inverse(size);
         Self {
             size,
             rows: RowPass::new(size),

@@ -5,7 +5,7 @@
 // position is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
-use gyre_fourier::Complex32;
+use gyre_radar::fourier::Complex32;
 use gyre_simd::simd;
 
 /// Number of partial sums, so that a sum can be vectorised.
@@ -29,7 +29,7 @@ pub(crate) struct Bilinear {
 /// Samples that are looked up together.
 const CHUNK: usize = 64;
 
-/// The four neighbours of a chunk of samples, pair by pair: those of the first row, and those a row
+/// The four neighbours of a chunk of samples, pair by pair: first in the first row, then a row
 /// behind.
 struct Neighbours([[[f32; 2]; CHUNK]; 2]);
 
@@ -196,7 +196,7 @@ pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
     }
 }
 
-/// The first values of the spectra of g and h from that of g + i h, by G(k) = conj(G(-k)).
+/// The first values of the spectra of g and h from the spectrum of g + i h, by G(k) = conj(G(-k)).
 #[simd]
 pub(crate) fn separate(both: &[Complex32], g: &mut [Complex32], h: &mut [Complex32]) {
     let (z, m) = (&both[1..], both[1..].iter().rev());

@@ -6,7 +6,7 @@
 //!
 //! # Layout, in the order of the data
 //! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
-//! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the
+//! - `spectrum`: [`PolarSpectrum`], the kept part of a scan; `rotation`: [`RotationSearch`], the
 //!   angle; `sequential`: [`SequentialRotation`], the angles along a stream of scans;
 //! - `warp`: the earlier raster turned by that angle;
 //! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a
@@ -94,22 +94,16 @@ pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 /// A raster or a spectrum that does not fit the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ShapeError {
-    /// The search was planned for another shape.
     #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
     Shape {
-        /// The input.
         what: &'static str,
         /// Rows and columns of the input.
         actual: [usize; 2],
         /// The rows and columns that the search was planned for.
         expected: [usize; 2],
     },
-    /// The values are not in standard (row-major, contiguous) layout.
     #[error("{what} is not in row-major, contiguous layout")]
-    Layout {
-        /// The input.
-        what: &'static str,
-    },
+    Layout { what: &'static str },
 }
 
 fn by([rows, columns]: &[usize; 2]) -> String {
@@ -133,9 +127,6 @@ fn expect_shape(
 }
 
 /// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
-///
-/// # Errors
-/// If the slice has another number of cells.
 pub fn square<'a>(
     what: &'static str,
     cells: &'a [f32],

@@ -36,10 +36,7 @@ type Sums = [f32; 3];
 impl MaskedCorrelation {
     /// Plans correlations of rasters of `n` x `n` cells of `cell_m` metres within `range_m` of both
     /// sensors.
-    ///
-    /// # Errors
-    /// Rasters of fewer than 16 or more than 8192 cells a side, or a size of cells that is not
-    /// positive.
+    /// `n` must be from 16 to 8192.
     pub fn new(n: usize, cell_m: f64, range_m: f64) -> Result<Self, ConfigError> {
         check_raster(n, cell_m)?;
         Ok(Self {
@@ -53,9 +50,7 @@ impl MaskedCorrelation {
     /// Returns the sum of f(x) g(R x + t) over the root of the product of the sums of the squares,
     /// where (R, t) is the `motion` from the earlier raster g to the later one f, and both x and R
     /// x + t are within range; 0 without energy there.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn at(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -67,9 +62,7 @@ impl MaskedCorrelation {
 
     /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see:
     /// `seen` is 1 there, and 0 elsewhere.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn at_seen(
         &mut self,
         later: ArrayView2<'_, f32>,

@@ -1,4 +1,4 @@
-//! The energy of a raster within its overlap with another one that is shifted.
+//! The energy of a raster within its overlap with a shifted raster.
 
 use nalgebra::Vector2;
 
@@ -61,7 +61,6 @@ impl OverlapEnergy {
         }
     }
 
-    /// Measures a raster.
     pub fn measure(&mut self, raster: &[f32]) {
         self.columns.fill(0.0);
         for (row, sum) in raster.chunks_exact(self.n).zip(&mut self.rows) {

@@ -19,23 +19,19 @@ const MAX_OFFSET: f64 = 0.75;
 /// exists.
 const PEDESTAL_MARGIN: f64 = 0.05;
 
-/// Maximum along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinePeak {
     /// Position, in samples from the highest one.
     pub offset: f64,
-    /// Fitted height.
     pub value: f64,
     /// Second derivative there, per squared sample.
     pub curvature: f64,
 }
 
-/// Maximum in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlanePeak {
     /// Position (row, column), in samples from the highest one.
     pub offset: Vector2<f64>,
-    /// Fitted height.
     pub value: f64,
     /// Second derivatives there, per squared sample.
     pub hessian: Matrix2<f64>,

@@ -1,8 +1,8 @@
 //! Refinement of (x, y, yaw) by aligning sparse points with a local map of the last keyframes.
 //!
-//! The map is the mean of what the last keyframes saw, each drawn once from its own points at its
-//! own pose, blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a
-//! coarse map and then on the fine one, and is deskewed with the very motion that is sought.
+//! The map is the mean of the last keyframes, each drawn once from its own points at its own pose,
+//! blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map
+//! and then on the fine one, and is deskewed with the very motion that is sought.
 //!
 //! Reading order:
 //! - [`Refiner::refine`]: the method;
@@ -10,19 +10,20 @@
 //! - `points`: a scan's points, deskewed;
 //! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
-//! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
+//! - `tracker`: the last poses, predictions from them, and the poses that a vehicle can have
 //!   reached;
-//! - `witnesses`: what gyro, wheels and Doppler say of a motion, against what the radar says;
+//! - `aiding`: the motion by gyro, wheels and Doppler, against the radar's;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
 //! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
-//! - `along_walls`: the way where nothing but other sensors tells how far it is; `structure`: where
-//!   that is so;
+//! - `along_walls`: the displacement where only other sensors determine the distance; `structure`:
+//!   where that is so;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
 //! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in
 //!   time.
 
+mod aiding;
 mod alignment;
 mod along_walls;
 mod config;
@@ -40,12 +41,12 @@ mod submap;
 mod tracker;
 mod uncertainty;
 mod wheels;
-mod witnesses;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_samples::{
-    DopplerConfig, DopplerVelocity, DopplerWay, GyroConfig, GyroTurn, WheelDistance, WheelsConfig,
+    DopplerConfig, DopplerDisplacement, DopplerVelocity, GyroConfig, GyroTurn, WheelDistance,
+    WheelsConfig,
 };
 pub use heading::{GyroBias, Heading, Verdict};
 pub use initial_guess::InitialGuess;
@@ -79,7 +80,6 @@ const SEARCH_AGREES_DEG: f64 = 6.0;
 /// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Aligned with the map.
     Refined,
     /// Aligned, but doubtful; kept out of the map.
     Weak,
@@ -87,18 +87,17 @@ pub enum Outcome {
     Predicted,
 }
 
-/// A refined motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Refined {
     /// Pose of the later scan's frame in the earlier one's, with its covariance.
     pub motion: OdometryMotion,
     /// Mean of the map under the points, 0 to 1.
     pub overlap: f64,
-    /// Weight of the points as a share of its running mean; 1 if there is none yet.
+    /// Weight of the points as a share of its running mean; 1 without a mean yet.
     pub support: f64,
     /// The reliability of the motion.
     pub outcome: Outcome,
-    /// The initial guess of the accepted match; the prediction if there is none.
+    /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
     /// The vehicle stands: the motion is zero.
     pub stationary: bool,
@@ -106,7 +105,7 @@ pub struct Refined {
     pub gyro: Option<GyroBias>,
     /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
-    /// The scale of the velocity by Doppler; `None` where one of both scans does not say it.
+    /// The scale of the velocity by Doppler; `None` if one of both scans does not determine it.
     pub doppler: Option<WheelScale>,
 }
 
@@ -115,7 +114,7 @@ struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
     guess: InitialGuess,
-    /// Way by which the search leads beyond a place that is a guess, m.
+    /// Displacement by the search beyond a predicted place, m.
     ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
     leaves_map: bool,
@@ -135,21 +134,17 @@ pub struct Refiner {
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
-    /// Those of a match that may be taken instead.
+    /// The points of an alternative match.
     other_points: DeskewedPoints,
     azimuth_variance_rad2: f64,
     turn: Option<GyroTurn>,
     distance: Option<WheelDistance>,
     velocities: [Option<DopplerVelocity>; 2],
-    /// By these.
-    way: Option<DopplerWay>,
+    displacement: Option<DopplerDisplacement>,
 }
 
 impl Refiner {
     /// Plans the refinement of scans of at most `capacity` points.
-    ///
-    /// # Errors
-    /// The first key of `config` that is out of its bounds.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         config.validate()?;
         Ok(Self {
@@ -166,7 +161,7 @@ impl Refiner {
             turn: None,
             distance: None,
             velocities: [None; 2],
-            way: None,
+            displacement: None,
         })
     }
 
@@ -184,7 +179,7 @@ impl Refiner {
         self
     }
 
-    /// Uses the velocities by Doppler, if this says so: [`Refiner::expect_velocities`].
+    /// Uses the velocities by Doppler, if `doppler` enables them: [`Refiner::expect_velocities`].
     #[must_use]
     pub fn with_doppler(mut self, doppler: &DopplerConfig) -> Self {
         self.doppler = doppler.clone();
@@ -192,8 +187,8 @@ impl Refiner {
         self
     }
 
-    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` where a scan
-    /// does not say it.
+    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
+    /// does not determine it.
     pub fn expect_velocities(&mut self, velocities: [Option<DopplerVelocity>; 2]) {
         self.velocities = velocities;
     }
@@ -231,7 +226,7 @@ impl Refiner {
     ) -> Refined {
         // Stamps that do not advance give no velocity: a second is assumed.
         let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        self.way = self.way_by_doppler(interval_s);
+        self.displacement = self.displacement_by_doppler(interval_s);
         let mut scan = Scan {
             id: scan,
             points: later,
@@ -250,7 +245,7 @@ impl Refiner {
         let outcome = accepted.outcome;
         let gyro = self.turn.and(self.state.heading);
         let wheels = self.distance.and(self.state.wheels);
-        let doppler = self.way.and(self.state.doppler);
+        let doppler = self.displacement.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, &accepted);
         Refined {
@@ -266,8 +261,8 @@ impl Refiner {
             outcome,
             stationary: report.stationary,
             gyro: gyro.map(|it| it.bias()),
-            wheels: wheels.map(|it| it.known()),
-            doppler: doppler.map(|it| it.known()),
+            wheels: wheels.map(|it| it.estimate()),
+            doppler: doppler.map(|it| it.estimate()),
         }
     }
 
@@ -306,9 +301,9 @@ impl Refiner {
         self.map.keyframe_cells()
     }
 
-    /// Starts a map if there is none. Returns the number of predictions in a row whose error a
-    /// match takes back: none with a new map, which starts at the pose that they led to, with their
-    /// error.
+    /// Starts a map if the refiner has no map. Returns the number of predictions in a row whose
+    /// error a match takes back: none with a new map, which starts at the pose that they led to,
+    /// with their error.
     fn ensure_map(&mut self, scan: &Scan<'_>, earlier: &[SparsePoint]) -> u32 {
         if !self.map.is_empty() {
             return self.state.unmatched;
@@ -362,8 +357,8 @@ impl Refiner {
             ..found.registered
         };
         if best.guess == InitialGuess::AlongWalls {
-            self.slide(scan, &registered);
-        } else if self.weigh_distance(scan, &registered, is_certain) {
+            self.propagate_along_walls(scan, &registered);
+        } else if self.update_distance(scan, &registered, is_certain) {
             (self.state.along_walls, self.state.sliding) = (0, 0);
         } else {
             return self.predicted(scan, uncertainty);
@@ -394,13 +389,13 @@ impl Refiner {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction();
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
-            heading.guess(covariance[(2, 2)]);
+            heading.inflate(covariance[(2, 2)]);
         }
         let alone = UncertainMotion {
             motion: self.state.pose.inv_mul(&motion),
             covariance,
         };
-        self.carry(scan, &alone);
+        self.propagate_distances(scan, &alone);
         let ahead_m = match self.state.sliding > 0 && scan.step.distance.is_none() {
             true => scan.searched.translation.vector - motion.translation.vector,
             false => Vector2::zeros(),
@@ -415,7 +410,7 @@ impl Refiner {
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the
-    /// search, but for a direction in which neither can tell.
+    /// search, except in a direction that both leave undetermined.
     fn is_firm(
         &self,
         scan: &Scan<'_>,
@@ -431,8 +426,8 @@ impl Refiner {
             && best.support >= MIN_SUPPORT
     }
 
-    /// Returns whether the motion is about that of the search, but for a direction in which neither
-    /// can tell.
+    /// Returns whether the motion is near the search's, except in a direction that both leave
+    /// undetermined.
     fn agrees_with_search(
         &self,
         scan: &Scan<'_>,
@@ -449,8 +444,9 @@ impl Refiner {
             && apart.rotation.angle().abs() <= SEARCH_AGREES_DEG.to_radians()
     }
 
-    /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar
-    /// does not see the way it cannot tell, as little as a prediction.
+    /// Returns the motion to the estimated pose; none while the vehicle stands. Displacement along
+    /// a featureless corridor is unobservable, so standstill cannot be detected there, and a
+    /// prediction cannot detect it either.
     fn hold_standstill(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
         let estimate = Estimate {
             pose: accepted.pose,
@@ -472,7 +468,7 @@ impl Refiner {
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
         let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
-        // Along guessed ways keyframes lie as the search says, and are deskewed so.
+        // Along predicted displacements, keyframes are placed and deskewed by the search.
         let mut by_search = *pose;
         by_search.translation.vector += accepted.ahead_m;
         let twist = self.state.twist_to(&by_search, &scan.step);
@@ -486,7 +482,7 @@ impl Refiner {
         } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
             if let Some(heading) = &mut self.state.heading {
-                heading.follow(self.map.len());
+                heading.add_keyframe(self.map.len());
             }
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal, RealToComplex};
+use gyre_radar::fourier::{Complex32, ComplexToReal, RealToComplex};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
@@ -17,9 +17,9 @@ use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
 use crate::{ShapeError, cells, kernels, taper};
 
-/// Distance from the turn of a gyro beyond which a maximum is that of something else, rad.
+/// Distance from the turn of a gyro beyond which a maximum counts as spurious, rad.
 const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;
-/// Half width of the neighbourhood in which a second maximum counts as the same peak, rad.
+/// Half width of the neighbourhood where a second maximum counts as the same peak, rad.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 
 /// Factor of the variance: factor x (1 - score) / curvature of the peak. The curvature gives the
@@ -32,7 +32,6 @@ const VARIANCE_SCALE: f64 = 0.12;
 pub struct RotationRunnerUp {
     /// Angle, radians.
     pub angle_rad: f64,
-    /// Correlation coefficient.
     pub score: f64,
 }
 
@@ -42,8 +41,8 @@ pub struct RotationMatch {
     /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the
     /// reach.
     pub angle_rad: f64,
-    /// Variance, from the shape of the peak; that of a uniform distribution over the reach if there
-    /// is no peak.
+    /// Variance, from the shape of the peak; without a peak, the variance of a uniform distribution
+    /// over the reach.
     pub variance_rad2: f64,
     /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no
     /// match.
@@ -76,10 +75,7 @@ pub struct RotationSearch {
 
 impl RotationSearch {
     /// Plans a search over rasters of `n` x `n` cells.
-    ///
-    /// # Errors
-    /// A configuration value out of its bounds, or rasters of fewer than 16 or more than 8192 cells
-    /// a side.
+    /// `n` must be from 16 to 8192.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         check_side(n)?;
@@ -87,8 +83,8 @@ impl RotationSearch {
         let (angles, harmonics) = (config.angles, config.angles / 2 + 1);
         let grid = PolarGrid::new(n, size, config);
         let (forward, inverse) = (
-            gyre_fourier::real(angles),
-            gyre_fourier::real_inverse(angles),
+            gyre_radar::fourier::real(angles),
+            gyre_radar::fourier::real_inverse(angles),
         );
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         let step = PI / angles as f64;
@@ -123,9 +119,7 @@ impl RotationSearch {
     ///
     /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    ///
-    /// # Errors
-    /// If `raster` is not n x n in standard layout, or `out` is another search's.
+    /// `raster` must be n x n in standard layout, and `out` from this search.
     pub fn spectrum(
         &mut self,
         raster: ArrayView2<'_, f32>,
@@ -149,9 +143,6 @@ impl RotationSearch {
 
     /// Finds the angle between two scans from their spectra; near the turn that a gyro has
     /// measured, rad, if it is given.
-    ///
-    /// # Errors
-    /// If a spectrum is another search's.
     pub fn search(
         &mut self,
         later: &PolarSpectrum,
@@ -290,8 +281,8 @@ impl RotationSearch {
         }
     }
 
-    /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over
-    /// the reach.
+    /// (1 - score) over the peak's curvature, scaled; at most the variance of a uniform
+    /// distribution over the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = VARIANCE_SCALE * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;

@@ -9,7 +9,7 @@ use crate::kernels::{self, MIN_SHARE};
 use crate::overlap::OverlapEnergy;
 use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
 
-/// Half width of the neighbourhood in which a second maximum counts as the same peak, cells.
+/// Half width of the neighbourhood where a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
 
 /// A shift (down, right), cells.

@@ -18,9 +18,6 @@ pub struct SequentialRotation {
 
 impl SequentialRotation {
     /// Plans the search for rasters of `n` x `n` cells.
-    ///
-    /// # Errors
-    /// Those of [`RotationSearch::new`].
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         let search = RotationSearch::new(n, config)?;
         let (later, earlier) = (search.new_spectrum(), search.new_spectrum());
@@ -37,9 +34,7 @@ impl SequentialRotation {
     /// `earlier_changed`: the earlier raster is not the one that was given as the later one last
     /// time, as with a mask that looks at both scans of a pair. `turn_rad`: the rotation as a gyro
     /// has measured it, near which it is searched.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn next(
         &mut self,
         seq: u64,
@@ -51,7 +46,7 @@ impl SequentialRotation {
         self.search.spectrum(later, &mut self.later)?;
         let mut rotation = None;
         if let Some(earlier) = earlier {
-            // After a restart or a gap the kept spectrum is not that of the scan before.
+            // After a restart or a gap the kept spectrum does not belong to the scan before.
             let is_kept = self
                 .kept
                 .is_some_and(|kept| kept.checked_add(1) == Some(seq));

@@ -1,6 +1,6 @@
 //! The part of a scan that a rotation search keeps.
 
-use gyre_fourier::Complex32;
+use gyre_radar::fourier::Complex32;
 use ndarray::ArrayView2;
 
 use crate::{ShapeError, expect_shape, kernels};

@@ -23,7 +23,6 @@ pub struct MotionRunnerUp {
     pub x_m: f64,
     /// Left, m, in the earlier scan's frame.
     pub y_m: f64,
-    /// Correlation coefficient.
     pub score: f64,
 }
 
@@ -53,7 +52,7 @@ impl MotionMatch {
 }
 
 /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated like
-/// that of the angle.
+/// the factor of the angle.
 const VARIANCE_SCALE: f64 = 0.015;
 
 /// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to
@@ -70,15 +69,12 @@ pub struct TranslationSearch {
     turned: Vec<f32>,
     later_energy: OverlapEnergy,
     turned_energy: OverlapEnergy,
-    /// Correlation coefficients.
     scores: Scores,
 }
 
 impl TranslationSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    ///
-    /// # Errors
-    /// A configuration value out of its bounds, or a reach of more than half the raster.
+    /// The reach must be at most half the raster.
     pub fn new(n: usize, cell_m: f64, config: &TranslationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "translation", config.reach_m)?;
@@ -101,9 +97,7 @@ impl TranslationSearch {
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -116,9 +110,7 @@ impl TranslationSearch {
     /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`,
     /// in the directions of the later raster, is 1 where it could, and 0 elsewhere. The earlier
     /// raster counts only there, as seen from its own sensor.
-    ///
-    /// # Errors
-    /// If a raster is not n x n in standard layout.
+    /// Rasters must be n x n in standard layout.
     pub fn search_seen(
         &mut self,
         later: ArrayView2<'_, f32>,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, Fft, FftDirection};
+use gyre_radar::fourier::{Complex32, Fft, FftDirection};
 
 /// Sets the modulus to one and keeps the phase; zero stays zero.
 pub(crate) fn to_unit(z: &mut Complex32) {
@@ -26,7 +26,7 @@ pub(crate) struct Whitening {
 
 impl Whitening {
     pub fn new(radii: usize, harmonics: usize) -> Self {
-        let fft = gyre_fourier::complex(radii, FftDirection::Forward);
+        let fft = gyre_radar::fourier::complex(radii, FftDirection::Forward);
         let scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
         Self {
             harmonics,

@@ -1,12 +1,10 @@
 //! After construction the searches allocate nothing.
-#![allow(clippy::unwrap_used, unsafe_code)]
-
-mod common;
+#![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use common::{Motion, pair, scenes};
+use crate::common::{Motion, pair, scenes};
 use gyre_scan_matching::{
     ExhaustiveConfig, ExhaustiveSearch, RotationConfig, RotationSearch, TranslationConfig,
     TranslationSearch,

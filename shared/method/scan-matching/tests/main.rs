@@ -5,6 +5,7 @@
 
 mod common;
 
+mod allocations;
 mod conventions;
 mod exhaustive;
 mod hostile_input;

@@ -323,8 +323,8 @@ fn a_factor_on_all_weights_changes_neither_motions_nor_covariances() {
     }
 }
 
-/// A corridor of hedges a metre deep. Points on top of their own image, as those of walls without
-/// depth, have no gradient, so the information matrix of such a corridor would be wrong.
+/// A corridor of hedges a metre deep. Points on top of their own image, such as points of walls
+/// without depth, have no gradient, so the information matrix of such a corridor would be wrong.
 #[test]
 fn a_corridor_leaves_its_axis_uncertain() {
     let side = |y: f64| {

@@ -41,8 +41,8 @@ fn witnessed() -> Refiner {
     })
 }
 
-/// Refines the motions to these scans. Each says the true velocity times a factor, with noise;
-/// where there is none, nothing. From `INSIDE` on the search finds any way.
+/// Refines the motions to these scans. Each scan measures the true velocity times a factor, with
+/// noise; scans without a factor measure no velocity. From `INSIDE` on the search finds any way.
 fn refine_with(
     refiner: &mut Refiner,
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),
@@ -95,7 +95,7 @@ fn in_a_tunnel_doppler_says_how_far() {
     }
     let (off, sigma_m) = off(&drive, &refined, INSIDE..SCANS - 1);
     println!("{off}, sigma {sigma_m:.2} m");
-    // Two percent of 140 m, of which the scale was learnt before.
+    // Two percent of 140 m; the scale was estimated before.
     assert!(off.translation.x.abs() < 2.8, "{off}");
     assert!(off.translation.x.abs() < 3.0 * sigma_m && sigma_m < 3.0);
     let scale = refined[SCANS - 2].doppler.unwrap();

@@ -1,7 +1,7 @@
 //! Faults of a few scans do not corrupt the refined trajectory, and a restored refiner continues
 //! bit for bit.
 
-use crate::common::{Numbers, scenes::*};
+use crate::common::scenes::*;
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
 use gyre_scan_matching::{Outcome, Refined, Refiner};
 
@@ -12,21 +12,6 @@ fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
         drive,
         scans(&town([[-110.0, 250.0], [-110.0, 200.0]], 1), &drive, &NOISY),
     )
-}
-
-/// Points unrelated to the scene.
-fn noise(seed: u64) -> Vec<SparsePoint> {
-    let mut numbers = Numbers(seed);
-    let mut values = || {
-        [
-            numbers.within(65.0),
-            numbers.within(65.0),
-            numbers.within(0.125),
-            0.65,
-            0.0,
-        ]
-    };
-    (0..900).map(|_| point(values())).collect()
 }
 
 fn bits(refined: &[Refined]) -> Vec<u64> {
@@ -283,7 +268,7 @@ fn identical_input_gives_identical_bits() {
     );
 }
 
-/// A refiner with another state, restored to that of `from`.
+/// A refiner with a different state, restored to the state of `from`.
 fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
     into.restore(*from.state(), |to| {

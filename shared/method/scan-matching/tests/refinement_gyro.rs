@@ -8,7 +8,7 @@ use gyre_samples::{GyroConfig, GyroTurn};
 use gyre_scan_matching::{Outcome, Refined, Verdict};
 
 const SCANS: usize = 60;
-/// Scans at which the gyro is wrong.
+/// Scans with a wrong gyro.
 const WRONG: Range<usize> = 30..33;
 
 /// A bend, and its scans.
@@ -19,7 +19,7 @@ fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
 }
 
 /// Refines the motions to these scans with a gyro whose rate is off by so much. The search looks
-/// for rotations near that of the gyro, and finds one at the edge of what it looks for.
+/// for rotations near the gyro's rotation, and finds one at the edge of its range.
 fn refine_with(
     gyro: &GyroConfig,
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),

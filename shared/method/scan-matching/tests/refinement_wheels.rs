@@ -1,8 +1,8 @@
-//! A vehicle with a gyro and wheels goes on where the radar is blind.
+//! A vehicle with a gyro and wheels continues where the radar is blind.
 
 use std::ops::Range;
 
-use crate::common::{Numbers, scenes::*};
+use crate::common::scenes::*;
 use gyre_geometry::{Pose, SparsePoint, pose};
 use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
 use gyre_scan_matching::{Outcome, Refined, Refiner};
@@ -14,22 +14,8 @@ const BIAS_RADPS: f64 = 0.004;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-/// Points unrelated to the scene, as strong as those of it.
-fn noise(seed: u64) -> Vec<SparsePoint> {
-    let mut numbers = Numbers(seed);
-    let mut values = || {
-        [
-            numbers.within(65.0),
-            numbers.within(65.0),
-            numbers.within(0.125),
-            0.65,
-            0.0,
-        ]
-    };
-    (0..900).map(|_| point(values())).collect()
-}
-
-/// A vehicle that drives ever faster, so that its speed before tells little, and its scans.
+/// A vehicle that accelerates all the time, so that its earlier speed is a poor prediction, and its
+/// scans.
 fn faster() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive {
         acceleration_mps2: 0.4,

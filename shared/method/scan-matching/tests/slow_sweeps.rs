@@ -33,7 +33,7 @@ fn pose(time_s: f64) -> Pose {
         * arc((time_s - BEND_S[1]).max(0.0), 0.0)
 }
 
-/// The posts as scan `k` sees them, each at the time at which the clockwise beam passes it.
+/// The posts as scan `k` sees them, each at the time when the clockwise beam passes it.
 fn scan(posts: &[Point2<f64>], k: usize) -> Vec<SparsePoint> {
     let see = |post: &Point2<f64>| {
         let (mut time_s, mut place) = (0.0, Point2::origin());

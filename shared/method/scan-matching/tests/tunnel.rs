@@ -1,16 +1,13 @@
-//! A tunnel, whose walls look the same everywhere: no scan tells how far the vehicle has driven.
+//! A tunnel, whose walls look the same everywhere: displacement along it is unobservable.
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
 
-const NOISY: Sensor = Sensor {
+const LITTLE_NOISE: Sensor = Sensor {
     noise_m: 0.05,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
+    ..NOISY
 };
 const SCANS: usize = 100;
 /// The last houses are out of sight.
@@ -35,7 +32,7 @@ fn between_walls_and(more: Vec<Reflector>) -> (Drive, Vec<Vec<SparsePoint>>) {
     let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
     scene.extend(walls);
     scene.extend(more);
-    (drive, scans(&scene, &drive, &NOISY))
+    (drive, scans(&scene, &drive, &LITTLE_NOISE))
 }
 
 fn refine_with(
@@ -105,7 +102,7 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
     }
     let (off, sigma_m) = inside(&drive, &refined);
     println!("{off}, sigma {sigma_m:.2} m");
-    // One percent of 140 m, of which the scale was learnt before.
+    // One percent of 140 m; the scale was estimated before.
     assert!(
         off.translation.x.abs() < 1.4 && off.translation.y.abs() < 0.5,
         "{off}"
@@ -124,7 +121,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
     assert!(refined[INSIDE..].iter().all(slid));
     let (off, sigma_m) = inside(&drive, &refined);
     println!("{off}, sigma {sigma_m:.2} m");
-    // It goes on as fast as before, while the vehicle slows down.
+    // The estimate keeps its speed, while the vehicle slows down.
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
     assert!(
@@ -165,7 +162,7 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
     assert!(off.translation.x.abs() < 1.4, "{off}");
 }
 
-/// The map does not tell posts beside such walls from speckle, but the search finds them.
+/// The map does not distinguish posts beside such walls from speckle, but the search finds them.
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
@@ -194,7 +191,7 @@ fn behind_a_tunnel_the_way_is_seen_again() {
     let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
     scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [250.0, y], 1600)));
     scene.extend(town([[250.0, 400.0], [-60.0, 60.0]], 2));
-    let scans = scans(&scene, &drive, &NOISY);
+    let scans = scans(&scene, &drive, &LITTLE_NOISE);
     let mut numbers = Numbers(7);
     let is_inside = |k: usize| (85.0..155.0).contains(&drive.pose(k).translation.x);
     let search = |k: usize| match is_inside(k) {

@@ -5,8 +5,8 @@ use proc_macro::TokenStream;
 /// Compiles a function for AVX-512, for AVX2 and for NEON beside the baseline, and calls the best
 /// variant that the processor supports.
 ///
-/// The variants give the same bits as long as the function is plain Rust: the compiler fuses no
-/// multiplication with an addition by itself, and changes no order of operations. The crate that
+/// The variants give the same bits as long as the function is plain Rust: the compiler never fuses
+/// a multiplication with an addition unasked, and changes no order of operations. The crate that
 /// uses the attribute depends on `multiversion`, whose macro this one fills in.
 #[proc_macro_attribute]
 pub fn simd(_: TokenStream, function: TokenStream) -> TokenStream {

@@ -24,20 +24,17 @@ pub trait KeyframeSource {
     type Error;
 
     /// Reads a keyframe that was given to [`LoopCloser::push`].
-    ///
-    /// # Errors
-    /// The keyframe cannot be read.
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
 }
 
 /// Options of [`LoopCloser`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopOptions {
-    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
-    pub submap_reach_m: f64,
     /// Length of the path between a keyframe and the earlier ones that it is compared with, at
     /// least, m.
     pub gap_m: f64,
+    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
+    pub submap_reach_m: f64,
     /// Number of candidates that are verified.
     pub candidates: usize,
     /// Distance along the path between two of them, at least, m.
@@ -51,8 +48,8 @@ pub struct LoopOptions {
 impl Default for LoopOptions {
     fn default() -> Self {
         Self {
-            submap_reach_m: SUBMAP_REACH_M,
             gap_m: 100.0,
+            submap_reach_m: SUBMAP_REACH_M,
             candidates: 3,
             apart_m: 15.0,
             covariance_scale: 1.0,
@@ -64,18 +61,15 @@ impl Default for LoopOptions {
 /// Errors of [`LoopCloser`].
 #[derive(Debug, Error)]
 pub enum ClosingError<E> {
-    /// A keyframe cannot be read.
     #[error(transparent)]
     Source(E),
-    /// A keyframe does not continue the path.
     #[error(transparent)]
     Order(#[from] OrderError),
-    /// A motion cannot be used.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
 }
 
-/// Closes loops: a function of the sequence of keyframes, whatever the time at which they come.
+/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival.
 ///
 /// A keyframe is described and queried once its submap is complete, which lies as far ahead as
 /// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
@@ -93,16 +87,13 @@ pub struct LoopCloser {
     /// Number of the keyframe that is queried next.
     next_query: usize,
     cache: Cache,
-    /// The submap of a query and that of a candidate.
+    /// The submap of a query and the submap of a candidate.
     submaps: [Submap; 2],
 }
 
 impl LoopCloser {
     /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
-    /// that of the odometry.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds.
+    /// the odometry's.
     pub fn new(
         options: LoopOptions,
         refinement: &RefinementConfig,
@@ -127,10 +118,7 @@ impl LoopCloser {
         })
     }
 
-    /// Takes the next keyframe, of which it keeps the path and the motion.
-    ///
-    /// # Errors
-    /// A motion without a usable covariance.
+    /// Takes the next keyframe and keeps its path and motion.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         self.extend(keyframe.path_m, &keyframe.motion)
     }
@@ -142,9 +130,6 @@ impl LoopCloser {
 
     /// Takes the next keyframe from its place, as [`LoopCloser::describe`] has returned it. The
     /// keyframes themselves follow after the last of the places.
-    ///
-    /// # Errors
-    /// A place that does not continue the path.
     pub fn restore_place<E>(&mut self, place: &Place) -> Result<(), ClosingError<E>> {
         self.extend(place.path_m, &place.motion)?;
         self.insert(place)
@@ -165,10 +150,7 @@ impl LoopCloser {
         self.index.len()
     }
 
-    /// Describes the next keyframe whose submap is complete; `None` if there is none.
-    ///
-    /// # Errors
-    /// A keyframe that cannot be read, or does not continue the path.
+    /// Describes the next keyframe whose submap is complete; returns `None` without one.
     pub fn describe<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -190,11 +172,8 @@ impl LoopCloser {
         Ok(Some(place))
     }
 
-    /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is
-    /// none.
-    ///
-    /// # Errors
-    /// A keyframe that cannot be read.
+    /// Queries the next keyframe that is described, and verifies its candidates; returns `None`
+    /// without one.
     pub fn close<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -247,7 +226,7 @@ impl LoopCloser {
         neighbours(&self.path_m, middle, self.options.submap_reach_m)
     }
 
-    /// The places that look most like that of a keyframe.
+    /// The places that look most similar to a keyframe's place.
     fn candidates(&mut self, keyframe: usize) -> Vec<Candidate> {
         let eligible = self
             .index
@@ -261,7 +240,7 @@ impl LoopCloser {
         found[..found.len().min(self.options.candidates)].to_vec()
     }
 
-    /// Draws the submap around a keyframe as that of the query (0) or of the candidate (1).
+    /// Draws the submap around a keyframe as the query's (0) or as the candidate's (1).
     fn draw<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_estimation::places::SUBMAP_REACH_M;
 use serde::{Deserialize, Serialize};
+
+use gyre_estimation::places::SUBMAP_REACH_M;
 
 use crate::EstimatorKind;
 
@@ -19,15 +20,10 @@ pub struct SlamConfig {
     /// published on the topic `fix`.
     #[serde(skip_serializing_if = "is_empty")]
     pub map: PathBuf,
-    /// Length of the path to each side of a keyframe whose keyframes make its submap, m: more if
-    /// scans are far apart.
+    /// Length of the path to each side of a keyframe whose keyframes make the submap of a loop, m,
+    /// 0 to 50. A radar that turns slowly needs a longer path: three scans to each side.
     pub submap_reach_m: f64,
 }
-
-/// `slam.submap_reach_m` is out of its bounds.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("submap_reach_m = {0}: expected 0 to 50 m")]
-pub struct SlamConfigError(f64);
 
 impl Default for SlamConfig {
     fn default() -> Self {
@@ -78,16 +74,5 @@ impl SlamConfig {
     /// Returns whether keyframes are kept and loops closed.
     pub fn is_on(&self) -> bool {
         self.kind != SlamKind::None
-    }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The reach of submaps is out of its bounds.
-    pub fn validate(&self) -> Result<(), SlamConfigError> {
-        match (0.0..=50.0).contains(&self.submap_reach_m) {
-            true => Ok(()),
-            false => Err(SlamConfigError(self.submap_reach_m)),
-        }
     }
 }

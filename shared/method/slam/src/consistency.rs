@@ -19,8 +19,8 @@ const SPEAKERS: usize = 256;
 #[derive(Default)]
 pub struct DeadReckoning {
     poses: Vec<Pose>,
-    /// Covariances of the errors of the poses: true pose = exp(error) pose. Those of the motions
-    /// between add up.
+    /// Covariances of the errors of the poses: true pose = exp(error) pose. The covariances of the
+    /// motions between poses add up.
     covariances: Vec<Matrix3<f64>>,
 }
 

@@ -2,11 +2,11 @@
 
 use gyre_geometry::{Pose, interpolate};
 
-/// Corrects the poses of all scans as those of the keyframes around them were corrected.
+/// Corrects the poses of all scans like the keyframes around them.
 ///
-/// The pose of a scan continues that of the keyframe before it by odometry, and leads to that of
-/// the keyframe after it as evenly: the corrected trajectory does not jump where a keyframe was
-/// moved against the one before.
+/// The pose of a scan continues by odometry from the keyframe before it, and evenly leads to the
+/// keyframe after it: the corrected trajectory does not jump where a keyframe was moved against the
+/// one before.
 #[derive(Clone, Debug, Default)]
 pub struct Correction {
     keyframes: Vec<Anchor>,

@@ -12,12 +12,12 @@ use nalgebra::{Point2, Vector2};
 /// The acceleration of vehicles that brake, m/s²: between two keyframes a place is known as well as
 /// if they had moved evenly, but for this.
 const ACCELERATION_MPS2: f64 = 2.0;
-/// A place that is known worse than this and than the fix itself says nothing, m.
+/// A place that is less certain than this and than the fix itself gives no evidence, m.
 const FAR_M: f64 = 1.0;
 /// A clock is wrong if the vehicle moves within its offset by more than so many standard deviations
 /// of a fix.
 const CLOCK_SIGMAS: f64 = 3.0;
-/// A weight below this is that of a fix that is not used: it pulls less than a quarter as hard.
+/// A fix with a weight below this counts as unused: it pulls less than a quarter as hard.
 const LEAST_WEIGHT: f64 = 0.25;
 /// The share of the fixes that must agree with each other and with the rest.
 const LEAST_SHARE: f64 = 0.5;
@@ -27,16 +27,11 @@ const LEAST_SHARE: f64 = 0.5;
 pub enum FixRefusal {
     /// None was measured between two keyframes.
     Elsewhere,
-    /// Their clock is another one than the radar's by this.
+    /// Their clock differs from the radar's by this.
     Clock(ClockOffset),
     /// Most of them contradict the others, the odometry or the loops.
-    Contradictory {
-        /// Fixes that agree.
-        agreeing: usize,
-        /// All that were taken.
-        taken: usize,
-    },
-    /// They lie so near each other that they do not tell the heading.
+    Contradictory { agreeing: usize, taken: usize },
+    /// They are so close together that they do not determine the heading.
     Undetermined,
 }
 
@@ -44,15 +39,15 @@ impl std::fmt::Display for FixRefusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Elsewhere => f.write_str(
-                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.late_s is wrong",
+                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.delay_s is wrong",
             ),
             Self::Clock(offset) => write!(
                 f,
-                "by the speeds of both the fixes are {offset} against the radar: add that to gnss.late_s if it is their clock"
+                "by the speeds of both the fixes are {offset} against the radar: add that to gnss.delay_s if it is their clock"
             ),
             Self::Contradictory { agreeing, taken } => write!(
                 f,
-                "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.late_s is wrong, sigma_m is too small, or they are of another drive"
+                "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of another drive"
             ),
             Self::Undetermined => f.write_str(
                 "the fixes are too near each other for their uncertainty to tell the heading",
@@ -66,9 +61,9 @@ impl std::fmt::Display for FixRefusal {
 pub struct FixCounts {
     /// Before the first keyframe or after the last.
     pub outside: usize,
-    /// Another one is nearer to the same keyframe: its error is dependent.
+    /// A different fix is nearer to the same keyframe: its error is dependent.
     pub thinned: usize,
-    /// Too far from a keyframe for odometry to say where the vehicle was, as while it stood.
+    /// Too far from a keyframe for odometry to determine the vehicle's position, as while it stood.
     pub far: usize,
     /// Given to the graph, one for each keyframe.
     pub taken: usize,
@@ -116,8 +111,8 @@ impl Fixes {
         }
     }
 
-    /// Returns the offset of the clock of the fixes as of the last solution: by which they are
-    /// late; `None` if the drive does not tell it.
+    /// Returns the offset of the clock of the fixes as of the last solution: their delay; `None` if
+    /// the drive does not determine it.
     pub fn clock(&self) -> Option<ClockOffset> {
         self.clock
     }
@@ -186,8 +181,8 @@ impl Fixes {
     }
 
     /// Returns how much the next fix counts. Errors that are correlated by r = exp(-dt/T) from one
-    /// fix to the next, a Gauss-Markov process, tell a constant as well as (1 - r) / (1 + r) times
-    /// as many independent ones.
+    /// fix to the next, a Gauss-Markov process, determine a constant as well as (1 - r) / (1 + r)
+    /// times as many independent ones.
     fn share(&self, stamp_ns: i64) -> f64 {
         let Some((last_ns, _)) = self.taken.last() else {
             return 1.0;
@@ -197,7 +192,7 @@ impl Fixes {
         half.tanh().clamp(f64::MIN_POSITIVE, 1.0)
     }
 
-    /// Takes over what the last solution has found, which is made with the first of the same fixes.
+    /// Takes over the findings of the last solution, which used the first of the same fixes.
     pub(crate) fn go_on_from(&mut self, before: &Self) {
         self.clock = before.clock;
         self.refusal.clone_from(&before.refusal);
@@ -213,8 +208,8 @@ impl Fixes {
         new.try_for_each(|(_, position)| graph.measure(*position))
     }
 
-    /// Compares the clock of the fixes with that of the radar, by their speeds. Returns whether
-    /// they can be used.
+    /// Compares the clock of the fixes with the radar's, by their speeds. Returns whether they can
+    /// be used.
     pub(crate) fn compare_clocks(&mut self, keyframes: &[Stamped]) -> bool {
         self.clock = self.offset(keyframes);
         let wrong = self.clock.filter(|clock| self.is_wrong(clock, keyframes));
@@ -240,7 +235,7 @@ impl Fixes {
         };
     }
 
-    /// The time by which the fixes are late.
+    /// The delay of the fixes.
     fn offset(&self, keyframes: &[Stamped]) -> Option<ClockOffset> {
         let place = |fix: &GnssFix| Pose::translation(fix.east_m, fix.north_m);
         let fixes = Trajectory {
@@ -253,9 +248,9 @@ impl Fixes {
             poses: keyframes.iter().map(|it| it.odometry * lever).collect(),
         };
         let found = clock_offset(&fixes, &antenna)?;
-        // A motion of the fixes at t is that of the radar at t + late_s.
+        // A motion of the fixes at t equals the radar's motion at t + delay_s.
         Some(ClockOffset {
-            late_s: -found.late_s,
+            delay_s: -found.delay_s,
             ..found
         })
         .filter(ClockOffset::is_reliable)
@@ -273,7 +268,7 @@ impl Fixes {
         };
         let speed_mps = path.path_length_m() / seconds.max(f64::MIN_POSITIVE);
         let sigma_m = median(self.fixes.iter().map(|fix| fix.sigma_m)).unwrap_or_default();
-        !clock.agrees() && clock.late_s.abs() * speed_mps > CLOCK_SIGMAS * sigma_m
+        !clock.agrees() && clock.delay_s.abs() * speed_mps > CLOCK_SIGMAS * sigma_m
     }
 }
 

@@ -26,7 +26,6 @@ pub struct Keyframe {
     /// corrected pose, and in none of motions or loops. See
     /// [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
-    /// Velocity of the sensor.
     pub twist: Twist,
     /// Length of the path through all keyframes up to this one, m.
     pub path_m: f64,
@@ -116,11 +115,7 @@ impl Record for Keyframe {
 
 impl RecordReader<Keyframe> {
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
-    /// checked: the checksum is that of the whole record.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is damaged at the header of the record, or has something else
-    /// there.
+    /// checked: the checksum covers the whole record.
     ///
     /// # Panics
     /// There are no more than `index` keyframes.

@@ -20,6 +20,7 @@ mod exact;
 mod fixes;
 mod keyframe;
 mod keyframe_builder;
+pub mod localisation;
 mod loops;
 mod place;
 mod records;
@@ -28,7 +29,7 @@ mod variance;
 mod verdict;
 
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
-pub use config::{SlamConfig, SlamConfigError, SlamKind};
+pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
 pub use fixes::{FixCounts, FixRefusal, Fixes};
 pub use keyframe::Keyframe;

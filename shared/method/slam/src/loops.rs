@@ -23,7 +23,7 @@ pub enum LoopOutcome {
     ContradictsOdometry,
 }
 
-/// A place that looks like that of a queried keyframe.
+/// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
     /// The number of the found keyframe.
@@ -43,14 +43,12 @@ pub struct LoopCandidate {
     /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
     /// rejected before.
     pub chi_square: f64,
-    /// The verdict.
     pub outcome: LoopOutcome,
 }
 
 /// A queried keyframe with its candidates, the most similar one first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
-    /// The number of the keyframe.
     pub keyframe: usize,
     /// The candidates that were verified.
     pub candidates: Vec<LoopCandidate>,
@@ -122,7 +120,7 @@ impl Record for Query {
         }
     }
 
-    /// `None` for a length that none has, and for an unknown verdict.
+    /// `None` for an invalid length, and for an unknown verdict.
     fn decode(bytes: &[u8]) -> Option<Self> {
         let (keyframe, candidates) = bytes.split_at_checked(8)?;
         if candidates.len() % size_of::<Fixed>() != 0 {

@@ -1,9 +1,9 @@
-//! The files of keyframes, of places and of queries, from which SLAM continues.
+//! The files of keyframes, of places and of queries, for resuming SLAM.
 //!
 //! A keyframe is appended before its pose is journalled. So each pose of the journal that the
 //! selection of keyframes takes has its keyframe. Places and queries follow from the keyframes:
-//! they are made anew where they are missing, and what the keyframes lack is cut off. The end of
-//! the stream is a record without bytes.
+//! missing ones are computed again, and those beyond the last keyframe are cut off. The end of the
+//! stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
@@ -40,20 +40,13 @@ pub struct RecordLog<R> {
 }
 
 impl<R: Record> RecordLog<R> {
-    /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a
-    /// power failure has left of the last records.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is of another kind, is damaged, or to which another
-    /// process writes.
+    /// Opens or creates the file of the run that writes to `out`, and cuts off incomplete last
+    /// records, left by a death or a power failure.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
 
     /// As [`open`](Self::open), of a file that is not in the results of a run.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let log = Log::open(path, R::MAGIC)?;
         let mut buffer = Vec::new();
@@ -68,7 +61,6 @@ impl<R: Record> RecordLog<R> {
         })
     }
 
-    /// Returns the number of records.
     pub fn len(&self) -> usize {
         self.log.len() - usize::from(self.ended)
     }
@@ -78,17 +70,14 @@ impl<R: Record> RecordLog<R> {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records whose form in a file has up to so many bytes:
-    /// none is allocated for each.
+    /// Allocates the memory for appending records of up to `bytes` bytes in the file: later appends
+    /// allocate nothing.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes);
         self.log.reserve(bytes);
     }
 
     /// Reads a record.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is damaged there, or has something else there.
     ///
     /// # Panics
     /// There are no more than `index` records.
@@ -98,9 +87,6 @@ impl<R: Record> RecordLog<R> {
     }
 
     /// Appends a record. A reader sees it when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn append(&mut self, record: &R) -> Result<(), LogError> {
         self.buffer.clear();
         record.encode(&mut self.buffer);
@@ -109,17 +95,11 @@ impl<R: Record> RecordLog<R> {
 
     /// Counts a change of another file that is of use only with the records that were appended. See
     /// [`Log::rely`].
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
         self.log.rely()
     }
 
-    /// Says that no more records follow. All of them survive a power failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
+    /// Marks the end of the records. All of them survive a power failure when this returns.
     pub fn end(&mut self) -> Result<(), LogError> {
         if !self.ended {
             self.log.append(&[])?;
@@ -129,18 +109,12 @@ impl<R: Record> RecordLog<R> {
     }
 
     /// Makes all records survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), LogError> {
         self.log.sync()
     }
 
     /// Keeps the first `records` records, and cuts off those behind them and the end. The cut
     /// survives a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         self.log.cut(records.min(self.len()))?;
         self.ended = false;
@@ -148,7 +122,7 @@ impl<R: Record> RecordLog<R> {
     }
 }
 
-/// Reads a file of records to which another process may append.
+/// Reads a file of records while another process may append to it.
 #[derive(Debug)]
 pub struct RecordReader<R> {
     log: LogReader,
@@ -160,17 +134,11 @@ pub struct RecordReader<R> {
 impl<R: Record> RecordReader<R> {
     /// Opens the file of the run that writes to `out` and finds its complete records. One that does
     /// not exist yet is empty.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is of another kind or damaged.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
 
     /// As [`open`](Self::open), of a file that is not in the results of a run.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
             log: LogReader::open(path, R::MAGIC)?,
@@ -184,9 +152,6 @@ impl<R: Record> RecordReader<R> {
 
     /// Looks for records that were appended or cut off meanwhile; returns the number of complete
     /// ones now.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is of another kind or damaged.
     pub fn refresh(&mut self) -> Result<usize, LogError> {
         self.ended = match self.log.refresh()?.checked_sub(1) {
             Some(last) => {
@@ -220,9 +185,6 @@ impl<R: Record> RecordReader<R> {
     }
 
     /// Reads a record.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is damaged there, or has something else there.
     ///
     /// # Panics
     /// There are no more than `index` records.

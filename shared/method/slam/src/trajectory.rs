@@ -11,7 +11,7 @@ use crate::consistency::{DeadReckoning, Speakers};
 use crate::fixes::{Fixes, Stamped};
 use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 
-/// All loops are judged anew when their number has grown by this share of it: that takes time in
+/// All loops are judged again when their number has grown by this share of it: that takes time in
 /// proportion to it.
 const GROWTH: usize = 8;
 
@@ -28,7 +28,6 @@ pub enum EstimatorKind {
 /// Options of [`TrajectoryEstimator`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryOptions {
-    /// The estimator.
     pub kind: EstimatorKind,
     /// Loops between two stretches of the path of this length count as one: their errors are
     /// dependent, m.
@@ -126,7 +125,6 @@ impl Estimator {
 }
 
 impl TrajectoryEstimator {
-    /// Starts without a keyframe.
     pub fn new(options: TrajectoryOptions) -> Self {
         Self {
             estimator: Estimator::new(Pose::identity(), options.kind),
@@ -151,9 +149,9 @@ impl TrajectoryEstimator {
         self
     }
 
-    /// Uses these fixes in place of those before, as while a live receiver sends them: if keyframes
-    /// that have been solved have others now, the next solution takes all anew. Returns whether the
-    /// next solution has others.
+    /// Uses these fixes in place of the earlier ones, as while a live receiver sends them. If the
+    /// fixes of solved keyframes have changed, the next solution uses all fixes again. Returns
+    /// whether the next solution has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
             fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
@@ -175,9 +173,6 @@ impl TrajectoryEstimator {
 
     /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution,
     /// a keyframe continues from the one before by odometry.
-    ///
-    /// # Errors
-    /// A motion without a usable covariance, or too many keyframes for the filter.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         match self.keyframes.len().checked_sub(1) {
             None => {
@@ -206,9 +201,6 @@ impl TrajectoryEstimator {
 
     /// Takes the accepted loops of a keyframe, for the next solution. They were tested against the
     /// same odometry.
-    ///
-    /// # Errors
-    /// Keyframes that were not pushed.
     pub fn close(&mut self, query: &Query) -> Result<(), EstimationError> {
         query
             .loops()
@@ -217,9 +209,6 @@ impl TrajectoryEstimator {
 
     /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is
     /// decided by its keyframes.
-    ///
-    /// # Errors
-    /// Keyframes that were not pushed.
     pub fn close_loop(&mut self, closing: &Constraint) -> Result<(), EstimationError> {
         let chi_square = match &self.estimator {
             Estimator::Graph(graph) => graph.test(closing)?.chi_square,
@@ -228,10 +217,7 @@ impl TrajectoryEstimator {
         self.insert(closing, chi_square)
     }
 
-    /// Moves all poses to where they fit best, and judges all loops anew.
-    ///
-    /// # Errors
-    /// The equations have no solution.
+    /// Moves all poses to where they fit best, and judges all loops again.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
             EstimatorKind::Graph => {
@@ -244,11 +230,8 @@ impl TrajectoryEstimator {
     }
 
     /// Judges the loops that came since the last solution, and moves all poses from where they are
-    /// to where they fit best. All loops are judged anew from time to time, and if one was wrong
+    /// to where they fit best. All loops are judged again from time to time, and if one was wrong
     /// the poses begin at the odometry.
-    ///
-    /// # Errors
-    /// The equations have no solution.
     pub fn update(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
             EstimatorKind::Graph => self.update_graph(),
@@ -267,9 +250,6 @@ impl TrajectoryEstimator {
 
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the first
     /// scan.
-    ///
-    /// # Errors
-    /// There is no such keyframe, or the constraints do not determine the poses.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         let mut pose = match &mut self.estimator {
             Estimator::Graph(graph) => graph.pose(keyframe)?,
@@ -281,12 +261,9 @@ impl TrajectoryEstimator {
         Ok(pose)
     }
 
-    /// Scales the covariances of the poses from now on so that the residuals of odometry and loops
-    /// are as large as they say. Returns the scale, which is 1 without loops and in the filter. It
-    /// takes some 1,400 solutions of the equations.
-    ///
-    /// # Errors
-    /// The constraints do not determine the poses.
+    /// Scales the covariances of later poses so that they match the residuals of odometry and
+    /// loops. Returns the scale, which is 1 without loops and in the filter. It takes some 1,400
+    /// solutions of the equations.
     pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
         self.scale = match &mut self.estimator {
             Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
@@ -320,11 +297,8 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Returns the pose of the frame of the first scan in that of the fixes, east and north, with
-    /// its covariance; `None` without fixes that tell it.
-    ///
-    /// # Errors
-    /// The constraints do not determine the poses.
+    /// Returns the pose of the frame of the first scan in the frame of the fixes, east and north,
+    /// with its covariance; `None` without fixes that determine it.
     pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let frame = match &mut self.estimator {
             Estimator::Graph(graph) => graph.uncertain_frame()?,
@@ -396,7 +370,7 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Compares the clock of the fixes with that of the keyframes.
+    /// Compares the clock of the fixes with the keyframes' clock.
     fn compare_clocks(&mut self) {
         let stamped: Vec<Stamped> = self.keyframes.iter().map(Corrected::stamped).collect();
         self.fixes.compare_clocks(&stamped);

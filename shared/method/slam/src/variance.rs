@@ -11,7 +11,7 @@ use crate::consistency::DeadReckoning;
 const LENGTHS: [usize; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 /// Stretches of one length, at most.
 const STRETCHES: usize = 150;
-/// A number of residuals that say 1 before any is measured: a few loops change the scale little.
+/// The weight of the prior 1 in residuals: a few loops change the scale little.
 const PRIOR: f64 = 15.0;
 
 /// Squared normalised residuals, and their sum as the covariances expect it, both over three
@@ -30,9 +30,9 @@ impl Residuals {
 /// Returns the scale of the covariances of the poses of a solved graph with `loops`.
 ///
 /// The errors of odometry are not independent: over some lengths of the path they add up, over
-/// others they cancel. The scale is the largest of that of the whole graph and those of the
-/// odometry over stretches of some lengths, so that residuals of all lengths are as large as the
-/// covariances say, or smaller.
+/// others they cancel. The scale is the largest of the whole graph's scale and the odometry's
+/// scales over stretches of some lengths, so that residuals of all lengths match the covariances,
+/// or are smaller.
 pub fn scale(
     graph: &mut PoseGraph,
     odometry: &DeadReckoning,
@@ -61,8 +61,8 @@ fn whole(graph: &PoseGraph, loops: &[JudgedLoop]) -> Residuals {
 }
 
 /// The residuals of the odometry over stretches of `length` keyframes. With the covariance Q of the
-/// odometry and P of the corrected motion, that of their difference is Q - P, and its expected
-/// square, normalised by Q, the trace of 1 - P / Q.
+/// odometry and P of the corrected motion, their difference has the covariance Q - P, and its
+/// expected square, normalised by Q, is the trace of 1 - P / Q.
 fn stretches(
     graph: &mut PoseGraph,
     odometry: &DeadReckoning,

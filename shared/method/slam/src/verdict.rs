@@ -36,7 +36,6 @@ pub struct JudgedLoop {
     /// Chi-square against the odometry between its keyframes. The filter does not use it: it tests
     /// against the estimate.
     pub chi_square: f64,
-    /// The verdict.
     pub verdict: LoopVerdict,
     /// The kernel's weight in the graph, 0 to 1; 0 if the loop is not used.
     pub weight: f64,

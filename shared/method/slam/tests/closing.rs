@@ -32,7 +32,7 @@ impl Logs {
         }
     }
 
-    /// Continues with the keyframes of the drive from what was left.
+    /// Continues with the remaining keyframes of the drive.
     fn complete(mut self, drive: &Drive) -> Self {
         let mut closer = closer();
         for place in &self.places {

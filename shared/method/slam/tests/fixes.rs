@@ -155,7 +155,7 @@ fn the_drive_lies_where_the_fixes_say_and_drifts_no_more() {
         estimator
             .fixes()
             .clock()
-            .is_some_and(|clock| clock.late_s.abs() < 0.15)
+            .is_some_and(|clock| clock.delay_s.abs() < 0.15)
     );
 }
 
@@ -242,24 +242,24 @@ fn single_wrong_fixes_are_refused() {
 fn a_clock_that_is_wrong_is_told_and_its_fixes_are_not_used() {
     let drive = Drive::new(900, 9);
     let without = drive.solved(Vec::new());
-    for late_s in [-60, -5, 1, 60] {
+    for delay_s in [-60, -5, 1, 60] {
         let mut fixes = drive.fixes(10);
         fixes
             .iter_mut()
-            .for_each(|fix| fix.stamp_ns += late_s * SECOND_NS);
+            .for_each(|fix| fix.stamp_ns += delay_s * SECOND_NS);
         let mut estimator = drive.solved(fixes);
         match estimator.fixes().refusal() {
             Some(FixRefusal::Clock(clock)) => {
                 assert!(
-                    (clock.late_s - late_s as f64).abs() < 0.1,
-                    "{late_s}: {clock}"
+                    (clock.delay_s - delay_s as f64).abs() < 0.1,
+                    "{delay_s}: {clock}"
                 );
             }
             // A second is within the noise of a fix.
-            None if late_s == 1 => continue,
-            other => panic!("{late_s}: {other:?}"),
+            None if delay_s == 1 => continue,
+            other => panic!("{delay_s}: {other:?}"),
         }
-        assert_eq!(estimator.poses(), without.poses(), "{late_s}");
+        assert_eq!(estimator.poses(), without.poses(), "{delay_s}");
         assert!(estimator.east_north_from_map().unwrap().is_none());
         assert_eq!(used(&estimator), 0);
     }

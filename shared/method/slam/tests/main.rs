@@ -6,4 +6,5 @@ mod common;
 
 mod closing;
 mod fixes;
+mod street;
 mod trajectory;

@@ -15,7 +15,7 @@ fn closing(from: usize, to: usize, motion: Pose) -> Constraint {
     Constraint::closing(from, to, UncertainMotion { motion, covariance })
 }
 
-/// Loops of every other keyframe with that of the round before.
+/// Loops between every other keyframe and its counterpart of the round before.
 fn right(drive: &Drive) -> Vec<Constraint> {
     let loops = (AROUND..KEYFRAMES).step_by(2).map(|to| {
         let from = to - AROUND;
@@ -223,7 +223,7 @@ fn covariances_are_scaled_to_the_residuals() {
     let scales = [0.25, 1.0, 4.0, 16.0].map(|factor| scale(factor, &right));
     println!("{scales:?}");
     for (scale, expected) in scales.into_iter().zip([4.0, 1.0, 0.25, 0.0625]) {
-        // A few residuals say 1 beforehand.
+        // The prior of 1 has the weight of a few residuals.
         let between = [0.6 * f64::min(expected, 1.0), 1.4 * f64::max(expected, 1.0)];
         assert!(
             (between[0]..between[1]).contains(&scale),

@@ -13,7 +13,6 @@ const LAST: usize = 8 * GroupSync::LIMIT as usize;
 /// The content of a journal.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
-    /// Number of poses.
     pub poses: u64,
     /// True if the end of the stream follows them.
     pub ended: bool,
@@ -26,13 +25,10 @@ pub struct Content {
 
 /// Reads a whole journal, in bounded memory, and finds out what of it is valid.
 ///
-/// A record that is not valid is one of two things. If no later record knows that it was on the
-/// disk, and there are no more of them than can have been in danger, it is what a death or a power
-/// failure leaves, and it is cut off with all that follows: those poses are computed anew. Else the
+/// A record that is not valid is one of two things. If no later record proves that it was on the
+/// disk, and there are no more of them than can have been in danger, it results from a death or a
+/// power failure, and it is cut off with all that follows: those poses are computed again. Else the
 /// file was damaged after it had been written.
-///
-/// # Errors
-/// [`JournalError::Damaged`], a file that cannot be read or is not a journal.
 pub fn check(path: &Path) -> Result<Content, JournalError> {
     let Some(mut places) = Places::open(path)? else {
         return Ok(Content::default());
@@ -86,9 +82,6 @@ fn damaged(path: &Path, pose: u64) -> JournalError {
 
 /// Cuts a journal after `records` records. The cut survives a power failure. Waits up to a second
 /// for a stage of a killed run that still writes it: that dies a moment after its supervisor.
-///
-/// # Errors
-/// A file that cannot be written, or that another process goes on writing.
 pub fn cut(path: &Path, records: u64) -> Result<(), JournalError> {
     let file = File::open_or_create(path)?;
     if !file.lock()? {

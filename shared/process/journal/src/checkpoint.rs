@@ -1,4 +1,4 @@
-//! The checkpoint: a file with the state of the refinement, from which a restarted process resumes.
+//! The checkpoint: a file with the state of the refinement, for resuming a restarted process.
 //!
 //! A local map has no finite look-back, since the keyframes of a stationary vehicle can be
 //! arbitrarily old. So the state after each item is written before its motion is published, and a
@@ -6,10 +6,10 @@
 //! slots, one of states and one of keyframes, long enough for any restart; it does not grow.
 //! Checksums detect slots that were cut short by a death; their items had not been published.
 //!
-//! A thread synchronises the file about once a second. After a power failure any part of what was
-//! written since may be there or not. So a state names its keyframes by their content, and the
-//! motion that it led to: [`Checkpoint::newest_known`] finds the last pose of a journal whose state
-//! is whole, and the run goes on from there.
+//! A thread synchronises the file about once a second. After a power failure, any part of later
+//! writes may be there or not. So a state names its keyframes by their content, and the motion that
+//! it led to: [`Checkpoint::newest_known`] finds the last pose of a journal whose state is whole,
+//! and the run continues from there.
 
 mod codec;
 #[cfg(test)]
@@ -33,7 +33,7 @@ use codec::{
 /// The start of the file, with the version of the slots.
 const MAGIC: [u8; 16] = *b"gyre map v9     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
-/// continued with another one.
+/// continued with a different window.
 const MAX_WINDOW: usize = 66;
 /// Number of states in the ring.
 const STATES: usize = look_back(MAX_WINDOW);
@@ -42,16 +42,14 @@ const STATES: usize = look_back(MAX_WINDOW);
 const HEADER_BYTES: usize = 16 + 4 * 8;
 
 /// Number of items that a restart can go back, from the newest state: by two windows after a death,
-/// and by what was not yet synchronised after a power failure.
+/// and by all unsynchronised items after a power failure.
 const fn look_back(window: usize) -> usize {
     const HEADROOM: usize = 8;
     2 * window + GroupSync::LIMIT as usize + HEADROOM
 }
 
-/// An error of a checkpoint.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// The file cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// The state is not in the file, which is of another version or configuration, or damaged.
@@ -59,17 +57,14 @@ pub enum CheckpointError {
         "{path} does not have the state of the refinement before item {item}: start again with --fresh"
     )]
     Missing {
-        /// The file.
         path: PathBuf,
         /// The item whose state is missing.
         item: u64,
     },
-    /// Another process writes to the file.
     #[error(transparent)]
     Busy(#[from] Busy),
 }
 
-/// An open checkpoint.
 #[derive(Debug)]
 pub struct Checkpoint {
     file: DurableFile,
@@ -78,8 +73,8 @@ pub struct Checkpoint {
     kept: usize,
     /// The keyframe in each slot; `None` for an empty slot.
     keyframes: Vec<Option<Name>>,
-    /// The keyframes of the last state that was written or restored, oldest first, and those of the
-    /// state before it.
+    /// The keyframes of the last state that was written or restored, oldest first, and the
+    /// keyframes of the state before it.
     map: Vec<Name>,
     earlier_map: Vec<Name>,
     buffers: Buffers,
@@ -109,7 +104,7 @@ pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("refinement.map")
 }
 
-/// Returns the checksum of a motion, by which a state is known to belong to a pose.
+/// Returns the checksum of a motion, which links a state to a pose.
 pub fn checksum(motion: &MotionEstimate) -> u64 {
     crc32fast::hash(bytemuck::bytes_of(motion)).into()
 }
@@ -146,7 +141,7 @@ impl Layout {
         header
     }
 
-    /// Begins a file of another layout anew.
+    /// Replaces a file of another layout by an empty one.
     fn require(&self, file: &File) -> Result<(), StorageError> {
         let mut header = [0; HEADER_BYTES];
         let matches = file.read_at(&mut header, 0)? && header == self.header();
@@ -161,9 +156,6 @@ impl Layout {
 impl Checkpoint {
     /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes`
     /// keyframes of `cells` cells.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or to which another process writes.
     pub fn open(
         path: &Path,
         window: usize,
@@ -208,9 +200,6 @@ impl Checkpoint {
     /// keyframes, then the state that names them. If the file has this state already, the process
     /// repeats items after a restart, and it is left: later states may still be needed. If it has
     /// another state, all later ones are obsolete.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn write(
         &mut self,
         item: u64,
@@ -282,7 +271,8 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Returns an empty slot, or that of the oldest keyframe if enough are kept for any restart.
+    /// Returns an empty slot, or the slot of the oldest keyframe if enough are kept for any
+    /// restart.
     fn free_slot(&self) -> usize {
         let used = self.keyframes.iter().flatten().count();
         let empty = self
@@ -311,9 +301,6 @@ impl Checkpoint {
     }
 
     /// Restores the state after `item`.
-    ///
-    /// # Errors
-    /// [`CheckpointError::Missing`].
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
             path: self.file.file().path().to_owned(),
@@ -353,11 +340,8 @@ impl Checkpoint {
         Ok(led_to_it && self.map.iter().all(|name| self.place_of(*name).is_some()))
     }
 
-    /// Returns the newest of these poses, given newest first, from which a run can go on: the one
+    /// Returns the newest of these poses, given newest first, that a run can continue from: the one
     /// whose whole state is in the file.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn newest_known<'a>(
         &mut self,
         poses: impl IntoIterator<Item = &'a PoseHeader>,

@@ -16,20 +16,12 @@ use crate::JournalError;
 /// An error of the keyframes of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
-    /// The log of keyframes.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The journal.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A pose of the journal should have a keyframe, and has none.
     #[error("{path} lacks the keyframe of pose {pose}: the same command computes it anew")]
-    Missing {
-        /// The log of keyframes.
-        path: PathBuf,
-        /// The number of the pose.
-        pose: u64,
-    },
+    Missing { path: PathBuf, pose: u64 },
 }
 
 /// The keyframes of a run, open for appending.
@@ -45,13 +37,10 @@ impl Keyframes {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
-    ///
-    /// # Errors
-    /// A file that cannot be used, or a pose without its keyframe.
     pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, KeyframesError> {
         let mut log = RecordLog::open(out)?;
         let found = find(log.len(), poses, |index| log.read(index))?;
-        // The end of the keyframes is before that of the journal.
+        // The end of the keyframes is before the end of the journal.
         if !ended {
             log.cut(found.keyframes)?;
         }
@@ -68,7 +57,7 @@ impl Keyframes {
         }
     }
 
-    /// Takes the memory for keyframes of up to so many points: none is allocated for each.
+    /// Allocates the memory for keyframes of up to `points` points: later appends allocate nothing.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
         self.log.reserve(Keyframe::encoded_len(points));
@@ -76,9 +65,6 @@ impl Keyframes {
 
     /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended
     /// with the scan's points. Returns whether it does.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn add(
         &mut self,
         pose: &PoseHeader,
@@ -96,19 +82,13 @@ impl Keyframes {
         Ok(true)
     }
 
-    /// Says that the stream has ended, before that is journalled. All keyframes survive a power
-    /// failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
+    /// Marks the end of the stream, before the journal does. All keyframes survive a power failure
+    /// when this returns.
     pub fn end(&mut self) -> Result<(), KeyframesError> {
         Ok(self.log.end()?)
     }
 
     /// Waits until all keyframes so far survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), KeyframesError> {
         Ok(self.log.sync()?)
     }
@@ -116,9 +96,6 @@ impl Keyframes {
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
     let mut reader = RecordReader::open(out)?;
     let found = find(reader.len(), poses, |index| reader.read(index))?;
@@ -128,7 +105,6 @@ pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
 
 /// The keyframes of a journal.
 struct Found {
-    /// Number of keyframes.
     keyframes: usize,
     last: Option<Keyframe>,
 }
@@ -164,13 +140,13 @@ fn recover(
     let mut builder = KeyframeBuilder::default();
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
-    // Behind them may be what a power failure has left of others, or the end of the stream.
+    // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;
         let seq = pose.item.seq;
         match &found.last {
-            // The pose of the journal: that of the keyframe has another rounding of its yaw.
+            // The pose of the journal, since the keyframe's yaw is rounded differently.
             Some(last) if last.seq == seq => builder.resume(&pose.pose(), last.path_m),
             _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
             _ => {}

@@ -1,17 +1,18 @@
-//! The files that a run goes on from after a death or a power failure: the journal of its poses;
-//! with SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
+//! The files for resuming a run after a death or a power failure: the journal of its poses; with
+//! SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
 //! [`checkpoint`] of its refinement.
 //!
-//! The journal is a file of poses, each with its motion and a checksum, from which all results of a
-//! run are made. Each record is one `write`, before its pose is published. A record that is cut
+//! The journal is a file of poses, each with its motion and a checksum. All results of a run are
+//! made from it. Each record is one `write`, before its pose is published. A record that is cut
 //! short by a death is found by its checksum; its pose had not been published. A thread
-//! synchronises the file about once a second, so a power failure takes the poses of the last
-//! second: what is left of them is found by [`check`] and cut off, and they are computed anew.
+//! synchronises the file about once a second, so a power failure destroys the poses of the last
+//! second: [`check`] finds their remains and cuts them off, and they are computed again.
 
 mod check;
 pub mod checkpoint;
 mod error;
 pub mod keyframes;
+pub mod loops;
 pub mod objects;
 mod record;
 mod records;
@@ -48,9 +49,6 @@ pub fn path(out: &Path) -> PathBuf {
 impl Journal {
     /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is
     /// read, however long it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is not a journal, or to which another process writes.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let mut records = 0;
         let file = DurableFile::open(path, |file| {
@@ -77,9 +75,6 @@ impl Journal {
 
     /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
     /// follows them.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or a damaged record.
     pub fn last(&self, count: usize) -> Result<(Vec<PoseHeader>, bool), JournalError> {
         let mut poses = Vec::with_capacity(count);
         let mut ended = false;
@@ -106,9 +101,6 @@ impl Journal {
     }
 
     /// Appends a pose, or the end of the stream.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised, or that another program has removed.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
         let safe = self.file.safe().map_or(0, |appended| self.found + appended);
         let record = Record {
@@ -123,9 +115,6 @@ impl Journal {
     }
 
     /// Waits until all that was appended survives a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), JournalError> {
         self.file.file().require_name()?;
         Ok(self.file.finish()?)

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 /// The objects at the time of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedObjects {
-    /// The scan's number in the run, from 0 without gaps: that of its record.
+    /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
     /// The sensor's own number of the scan.
     pub scan: u64,

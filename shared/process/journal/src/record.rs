@@ -18,7 +18,6 @@ pub(crate) const RECORDS: Slots = Slots {
     bytes: RECORD,
 };
 
-/// A valid record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record {
     pub pose: PoseHeader,

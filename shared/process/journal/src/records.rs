@@ -29,25 +29,18 @@ pub(crate) struct Places {
     path: PathBuf,
     reader: BufReader<File>,
     bytes: Box<[u8; RECORD]>,
-    /// Number of the next place.
     pub next: u64,
     /// True if the header is whole.
     pub has_header: bool,
 }
 
-/// Opens a journal to read it; `None` if there is none.
-///
-/// # Errors
-/// A file that cannot be read or is not a journal.
+/// Opens a journal to read it; `None` without a journal.
 pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
     let places = Places::open(path)?.filter(|places| places.has_header);
     Ok(places.map(|places| Records { places }))
 }
 
 /// As [`records`], from the pose number `first` on.
-///
-/// # Errors
-/// A file that cannot be read or is not a journal.
 pub fn records_from(path: &Path, first: u64) -> Result<Option<Records>, JournalError> {
     let Some(mut records) = records(path)? else {
         return Ok(None);
@@ -125,7 +118,7 @@ impl Places {
     }
 }
 
-/// Says why a file with such a header is none to go on with.
+/// Returns the reason why a file with such a header cannot be continued.
 pub(crate) fn refused(header: &[u8], path: &Path) -> JournalError {
     let path = path.to_owned();
     match header.starts_with(ANY_VERSION) {

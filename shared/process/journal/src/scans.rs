@@ -13,7 +13,7 @@ use thiserror::Error;
 /// A scan with its pose and its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
-    /// The scan's number in the run, from 0 without gaps: that of its record.
+    /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
     /// The sensor's own number of the scan.
     pub scan: u64,
@@ -21,7 +21,7 @@ pub struct LoggedScan {
     pub stamp_ns: i64,
     /// The pose by odometry, in the frame of the first scan.
     pub pose: Pose,
-    /// Velocity of the sensor: that of the motion into the scan; zero where the chain starts.
+    /// Velocity of the sensor, from the motion into the scan; zero where the chain starts.
     pub twist: Twist,
     /// The points as measured.
     pub points: Vec<SparsePoint>,
@@ -40,7 +40,6 @@ struct Fixed {
 }
 
 impl LoggedScan {
-    /// Returns the scan of a pose.
     pub fn of(header: &PoseHeader, points: Vec<SparsePoint>) -> Self {
         let interval_s = header.motion.interval_ns as f64 * 1e-9;
         Self {
@@ -105,15 +104,11 @@ impl Record for LoggedScan {
 /// An error of the scans of a run.
 #[derive(Debug, Error)]
 pub enum ScansError {
-    /// The log of scans.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Poses of the journal should have their scans, and have none.
     #[error("{path} has {scans} scans of {poses} poses: the same command computes them anew")]
     Missing {
-        /// The log of scans.
         path: PathBuf,
-        /// The scans in it.
         scans: u64,
         /// The poses of the journal.
         poses: u64,
@@ -131,9 +126,6 @@ pub struct Scans {
 impl Scans {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Scans beyond them are cut off.
-    ///
-    /// # Errors
-    /// A file that cannot be used, or poses without their scans.
     pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, ScansError> {
         let mut log = RecordLog::open(out)?;
         let scans = log.len() as u64;
@@ -141,7 +133,7 @@ impl Scans {
             let path = records_path::<LoggedScan>(out);
             return Err(ScansError::Missing { path, scans, poses });
         }
-        // The end of the scans is before that of the journal.
+        // The end of the scans is before the end of the journal.
         if !ended {
             log.cut(usize::try_from(poses).unwrap_or(usize::MAX))?;
         }
@@ -151,7 +143,7 @@ impl Scans {
         })
     }
 
-    /// Takes the memory for scans of up to so many points: none is allocated for each.
+    /// Allocates the memory for scans of up to `points` points: later appends allocate nothing.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
         self.log
@@ -159,9 +151,6 @@ impl Scans {
     }
 
     /// Appends the scan of the next pose, before that is journalled.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<(), ScansError> {
         let mut memory = std::mem::take(&mut self.points);
         memory.clear();
@@ -172,19 +161,13 @@ impl Scans {
         Ok(appended?)
     }
 
-    /// Says that the stream has ended, before that is journalled. All scans survive a power failure
-    /// when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
+    /// Marks the end of the stream, before the journal does. All scans survive a power failure when
+    /// this returns.
     pub fn end(&mut self) -> Result<(), ScansError> {
         Ok(self.log.end()?)
     }
 
     /// Waits until all scans so far survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), ScansError> {
         Ok(self.log.sync()?)
     }
@@ -192,9 +175,6 @@ impl Scans {
 
 /// Returns how many of the first `poses` poses of the journal have their scans. After a death all
 /// of them have; a power failure can take the last scans. Changes nothing.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 pub fn complete_scans(out: &Path, poses: u64) -> Result<u64, LogError> {
     let reader = RecordReader::<LoggedScan>::open(out)?;
     Ok(poses.min(reader.len() as u64))

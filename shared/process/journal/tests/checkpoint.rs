@@ -373,7 +373,7 @@ fn pose(item: u64, x_m: f64) -> PoseHeader {
     }
 }
 
-/// A checkpoint of a process of this many items whose motions are those of [`pose`] with one metre.
+/// A checkpoint of a process of this many items whose motions are [`pose`] with one metre.
 fn checkpoint_of_poses(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = checkpoint::path(folder.path());
@@ -428,8 +428,8 @@ fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_
     assert_eq!(restored(&path, 29).unwrap(), history[29]);
 }
 
-/// A map can start anew with a scan that is a keyframe of the map before. Killed after the first of
-/// its two writes, a process must find the earlier map whole.
+/// A map can start again with a scan that is a keyframe of the map before. Killed after the first
+/// of its two writes, a process must find the earlier map whole.
 #[test]
 fn a_keyframe_does_not_replace_another_one_of_the_same_scan() {
     let (_folder, path) = checkpoint_of(30);
@@ -468,7 +468,7 @@ fn the_file_stops_growing() {
     assert_eq!(first, length(200..330));
     let slots = (config().keyframes + 2 * WINDOW + 32 + 8) as u64;
     let keyframe = self::refinement().keyframe_cells() as u64 + 80;
-    // Those of the longest window, each of less than a kilobyte.
+    // The states of the longest window, each of less than a kilobyte.
     let states = (2 * 66 + 32 + 8) * 1024;
     assert!(first < states + slots * keyframe, "{first} bytes");
 }

@@ -13,7 +13,7 @@ pub enum Basis {
     RadarAndOthers,
     /// Walls without structure, and wheels or Doppler for the way along them.
     AlongWalls,
-    /// The same without these: the way is that of the motions before.
+    /// As above without these sensors: the displacement comes from the motions before.
     WayGuessed,
     /// Wheels or Doppler, since nothing matches: with the turn of a gyro, if there is one.
     DeadReckoning,
@@ -23,7 +23,6 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// All of them.
     pub const ALL: [Self; 7] = [
         Self::ScanToScan,
         Self::RadarOnly,
@@ -47,8 +46,8 @@ impl Basis {
         }
     }
 
-    /// Returns whether the radar does not tell the whole motion: all or part of it is that of other
-    /// sensors, or of the motions before.
+    /// Returns whether the radar leaves part of the motion undetermined, so that other sensors or
+    /// the motions before determine it.
     pub fn is_degraded(self) -> bool {
         match self {
             Self::ScanToScan | Self::RadarOnly | Self::RadarAndOthers => false,
@@ -63,7 +62,7 @@ impl RefinementRecord {
         [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
     }
 
-    /// Returns what the motion rests on.
+    /// Returns the basis of the motion.
     pub fn basis(&self) -> Basis {
         let by_distance = self.wheels == wheels::USED || self.doppler == doppler::USED;
         match self.outcome {
@@ -80,10 +79,10 @@ impl RefinementRecord {
     }
 }
 
-/// Counts of motions by what they rest on, and by the part of gyro, wheels and Doppler.
+/// Counts of motions by their basis, and by the part of gyro, wheels and Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct WitnessCounts {
-    /// Motions by what they rest on, in the order of [`Basis::ALL`].
+    /// Motions by their basis, in the order of [`Basis::ALL`].
     pub by_basis: [u64; Basis::ALL.len()],
     /// Those whose turn the gyro has measured, and which were made with it.
     pub gyro_used: u64,
@@ -93,14 +92,13 @@ pub struct WitnessCounts {
     pub wheels_used: u64,
     /// Those whose distance they have measured slipping.
     pub wheel_slips: u64,
-    /// Those whose velocity Doppler has said, and which do not contradict it.
+    /// Motions with a Doppler velocity that agrees with them.
     pub doppler_used: u64,
-    /// Those whose velocity it has said, and which contradict it.
+    /// Motions with a Doppler velocity that contradicts them.
     pub doppler_refused: u64,
 }
 
 impl WitnessCounts {
-    /// Counts a motion.
     pub fn add(&mut self, motion: &RefinementRecord) {
         self.by_basis[motion.basis() as usize] += 1;
         self.gyro_used += u64::from(motion.uses_gyro());
@@ -111,19 +109,17 @@ impl WitnessCounts {
         self.doppler_refused += u64::from(motion.doppler == doppler::REFUSED);
     }
 
-    /// Counts all of these.
     pub fn of<'a>(motions: impl IntoIterator<Item = &'a RefinementRecord>) -> Self {
         let mut counts = Self::default();
         motions.into_iter().for_each(|motion| counts.add(motion));
         counts
     }
 
-    /// Returns the number of motions.
     pub fn motions(&self) -> u64 {
         self.by_basis.iter().sum()
     }
 
-    /// Returns the share of the motions that the radar does not tell as a whole, %: see
+    /// Returns the share of the motions that the radar does not wholly determine, %: see
     /// [`Basis::is_degraded`]; `None` without motions.
     pub fn degraded_percent(&self) -> Option<f64> {
         let degraded = Basis::ALL.iter().filter(|basis| basis.is_degraded());
@@ -133,7 +129,7 @@ impl WitnessCounts {
     }
 
     /// Returns the part of gyro, wheels and Doppler in words, as `gyro 98 %, 1 refused, wheels 100
-    /// %`; `None` where none has measured anything.
+    /// %`; `None` without any measurement.
     pub fn in_words(&self) -> Option<String> {
         let of = |name, used: u64, (not, count): (&str, u64)| {
             let share = 100.0 * used as f64 / self.motions().max(1) as f64;

@@ -4,7 +4,7 @@ use std::{f64::consts::PI, fmt::Display, ops::RangeInclusive};
 
 use gyre_geometry::covariance;
 
-/// A violation of a message's contract: a sentence with the field, its value and what it must be.
+/// A violation of a message's contract: a sentence with the field, its value and its bounds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Violation(pub String);
@@ -44,7 +44,6 @@ pub(crate) fn within(
     }
 }
 
-/// Requires finite values.
 pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
     fields
         .into_iter()

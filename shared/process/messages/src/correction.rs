@@ -40,14 +40,12 @@ header!(CorrectionHeader, "gyre_correction_header_v4");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct CorrectionHeader {
-    /// `seq` counts what was read of the logs so far, from 0; their ends count as one. `scan` and
-    /// the times are the newest keyframe's.
+    /// `seq` counts the records read from the logs, from 0; their ends count as one. `scan` and the
+    /// times are the newest keyframe's.
     pub item: Item,
     /// Number of the newest keyframe's scan in the run.
     pub keyframe_seq: u64,
-    /// Keyframes in the correction.
     pub keyframes: u64,
-    /// Loops in the correction.
     pub loops: u64,
     /// Forward, m.
     pub x_m: f64,

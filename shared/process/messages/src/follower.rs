@@ -6,18 +6,16 @@ use crate::limits::Window;
 /// stream of scans, so they have no [`Hop`](crate::Hop) and give no credit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FollowerId {
-    /// Finds loops between keyframes.
     LoopClosure,
     /// Corrects the trajectory by the loops.
     Trajectory,
     /// Finds the keyframes in the map of an earlier drive, in a run that names one.
     Localisation,
-    /// Tracks moving objects.
     Objects,
 }
 
 impl FollowerId {
-    /// All followers, in the order in which they read each other's logs.
+    /// All followers, in the order of reading each other's logs.
     pub const ALL: [Self; 4] = [
         Self::LoopClosure,
         Self::Trajectory,

@@ -18,7 +18,6 @@ pub mod flag {
     /// On `pose`: the trajectory is empty, and the stream begins with the first scan.
     pub const BASE: u32 = 8;
 
-    /// All of them.
     pub(crate) const ALL: u32 = END | BREAK | SYNC | BASE;
 }
 
@@ -30,17 +29,12 @@ pub mod flag {
 pub enum StageId {
     /// Reads the sensor or a recording.
     RadarReplay = 0,
-    /// Rasterises and masks.
     Masking = 1,
-    /// Searches for the rotation.
     RotationSearch = 2,
-    /// Searches for the translation.
     TranslationSearch = 3,
-    /// Searches for both together.
     JointSearch = 4,
     /// Refines the motion against the local map.
     Refinement = 5,
-    /// Composes motions to poses.
     PoseIntegration = 6,
 }
 
@@ -85,20 +79,17 @@ pub struct Hop {
     pub started_ns: i64,
     /// `process` ended.
     pub finished_ns: i64,
-    /// The output was published.
     pub published_ns: i64,
 }
 
 /// The durations of one stage's work on a scan, ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HopTimes {
-    /// The stage.
     pub stage: StageId,
     /// From the publication by the stage before to the reception; `None` for the first stage.
     pub transport_ns: Option<i64>,
     /// From the reception to the start of the work.
     pub wait_ns: i64,
-    /// Of the work.
     pub work_ns: i64,
 }
 
@@ -123,8 +114,8 @@ pub struct Item {
     pub numbered_from: u64,
     /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
     pub stamp_ns: i64,
-    /// Time at which the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
-    /// ns. Latency is measured from here.
+    /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns.
+    /// Latency is measured from here.
     pub due_ns: i64,
     /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
     /// started, which may give a number again. 0 where the numbers follow from the recording.
@@ -151,10 +142,6 @@ impl Item {
         self.lost[..lost.gaps().len()].copy_from_slice(lost.gaps());
     }
 
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// The first violation.
     pub(crate) fn check(&self) -> Result<(), Violation> {
         require(
             self.flags & !flag::ALL == 0,

@@ -44,13 +44,10 @@ pub struct Window {
 /// A window out of its bounds.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum WindowError {
-    /// The number of scans is too small or too large.
     #[error("run.window is {0}, but must be 1 to 64 scans")]
     Scans(usize),
-    /// The lag is larger than the motions that are kept.
     #[error("masking.lag is {0}, but must be at most 16 scans")]
     Lag(usize),
-    /// The number of observers is too large.
     #[error("run.observers is {0}, but must be at most {MAX_OBSERVERS}")]
     Observers(usize),
 }
@@ -91,7 +88,6 @@ impl TopicSizes {
         self.history.max(self.buffer) + self.readers * self.borrowed + self.observers + self.loaned
     }
 
-    /// Maximum number of subscribers.
     pub fn subscribers(&self) -> usize {
         self.readers + self.observers
     }
@@ -103,10 +99,6 @@ impl TopicSizes {
 }
 
 impl Window {
-    /// Checks the bounds.
-    ///
-    /// # Errors
-    /// The first value out of its bounds.
     pub fn validate(&self) -> Result<(), WindowError> {
         if !(1..=64).contains(&self.scans) {
             return Err(WindowError::Scans(self.scans));

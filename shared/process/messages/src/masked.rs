@@ -60,7 +60,6 @@ header!(MaskedHeader, "gyre_masked_header_v9");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
-    /// No mask.
     pub const NONE: u32 = 0;
     /// Power up to a threshold is set to zero.
     pub const THRESHOLD: u32 = 1;
@@ -72,7 +71,6 @@ pub mod mask_kind {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MaskedHeader {
-    /// The scan.
     pub item: Item,
     /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
     pub n: u32,
@@ -94,15 +92,15 @@ pub struct MaskedHeader {
     pub azimuth_variance_rad2: f32,
     /// The turn since the previous scan by the gyro: see [`MaskedHeader::turn`].
     pub gyro: GyroTurn,
-    /// 1 if it says so.
+    /// 1 if the gyro measured the turn.
     pub has_gyro: u64,
     /// The distance since the previous scan by the wheels: see [`MaskedHeader::distance`].
     pub wheels: WheelDistance,
-    /// 1 if they say so.
+    /// 1 if the wheels measured the distance.
     pub has_wheels: u64,
     /// The velocity by Doppler during this scan: see [`MaskedHeader::velocity`].
     pub doppler: DopplerVelocity,
-    /// 1 if the scan says so.
+    /// 1 if the scan determines the velocity.
     pub has_doppler: u64,
 }
 
@@ -226,7 +224,6 @@ impl MaskedHeader {
         (self.has_gyro == 1).then_some(self.gyro)
     }
 
-    /// Sets it.
     pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
         self.gyro = turn.unwrap_or_default();
         self.has_gyro = turn.is_some().into();
@@ -238,18 +235,16 @@ impl MaskedHeader {
         (self.has_wheels == 1).then_some(self.wheels)
     }
 
-    /// Sets it.
     pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
         self.wheels = distance.unwrap_or_default();
         self.has_wheels = distance.is_some().into();
     }
 
-    /// Returns the velocity by Doppler during this scan; `None` where the scan does not say it.
+    /// Returns the velocity by Doppler during this scan; `None` if the scan does not determine it.
     pub fn velocity(&self) -> Option<DopplerVelocity> {
         (self.has_doppler == 1).then_some(self.doppler)
     }
 
-    /// Sets it.
     pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
         self.doppler = velocity.unwrap_or_default();
         self.has_doppler = velocity.is_some().into();
@@ -280,8 +275,8 @@ impl MaskedHeader {
         })
     }
 
-    /// Returns raster `index` of a payload, n x n; `None` if the payload is shorter than the header
-    /// says.
+    /// Returns raster `index` of a payload, n x n; `None` if the payload is too short for its
+    /// header.
     fn raster<'a>(&self, values: &'a [f32], index: usize) -> Option<ArrayView2<'a, f32>> {
         let n = self.n as usize;
         let first = index.checked_mul(Self::raster_values(n)?)?;
@@ -294,7 +289,7 @@ impl MaskedHeader {
         (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)
     }
 
-    /// Returns the scan's points; `None` if the payload is shorter than the header says.
+    /// Returns the scan's points; `None` if the payload is too short for its header.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [SparsePoint]> {
         let first = self.first_point()?;
         let floats = size_of::<SparsePoint>() / size_of::<f32>();
@@ -320,7 +315,7 @@ impl MaskedHeader {
 
     /// Returns the rasters to match. The earlier one is the second raster of this payload if the
     /// mask took both scans, else the first raster of the previous message. `None` if a payload is
-    /// shorter than its header says.
+    /// too short for its header.
     pub fn pair<'a>(
         &self,
         values: &'a [f32],

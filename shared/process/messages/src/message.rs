@@ -52,7 +52,6 @@ impl Sender {
     }
 }
 
-/// A message type.
 pub trait Message: 'static {
     /// The name of the topic.
     const TOPIC: &'static str;
@@ -62,7 +61,6 @@ pub trait Message: 'static {
     const READERS: usize;
     /// The reach of the publisher's history.
     const HISTORY: History;
-    /// The header of each message.
     type Header: Header;
     /// The element that the payload is a slice of.
     type Element: Element;
@@ -74,9 +72,6 @@ pub trait Message: 'static {
 
     /// Checks that a message keeps its contract, whatever program sent it. A receiver that has
     /// checked a message may rely on its numbers and on the length of its payload.
-    ///
-    /// # Errors
-    /// The first violation.
     fn check(
         header: &Self::Header,
         payload: &[Self::Element],
@@ -91,9 +86,6 @@ pub trait Message: 'static {
     }
 
     /// Checks all but the item; the end of the stream has no content.
-    ///
-    /// # Errors
-    /// The first violation.
     fn check_content(
         header: &Self::Header,
         payload: &[Self::Element],

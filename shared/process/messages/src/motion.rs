@@ -73,7 +73,6 @@ pub struct MotionEstimate {
 /// refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchedMotion {
-    /// The motion.
     pub motion: Pose,
     /// Time between the two scans, ns on the sensor's clock.
     pub interval_ns: i64,
@@ -173,7 +172,6 @@ impl MotionEstimate {
         }
     }
 
-    /// Returns the searched motion.
     pub fn searched(&self) -> SearchedMotion {
         let [x_m, y_m, yaw_rad] = self.searched;
         SearchedMotion {
@@ -187,7 +185,6 @@ impl MotionEstimate {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MotionHeader {
-    /// The scan.
     pub item: Item,
     /// The motion; all zero where the chain starts.
     pub motion: MotionEstimate,

@@ -1,4 +1,4 @@
-//! The numbers of items that are given anew.
+//! The numbers of items that are given again.
 
 use crate::{
     message::{Message, Sender},
@@ -14,7 +14,7 @@ pub enum NumberedBy {
     /// Masking in live mode, on the topics of the other stages; otherwise they have the numbers of
     /// the source.
     Masking,
-    /// A follower, whose numbers are those of its results.
+    /// A follower, whose results are numbered.
     Follower,
 }
 
@@ -45,7 +45,7 @@ impl NumberedBy {
     }
 }
 
-/// A generation of numbers: it gives those from `first` on anew.
+/// A generation of numbers: it gives the numbers from `first` on again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GivenAnew {
     /// See [`Item::generation`](crate::Item::generation).

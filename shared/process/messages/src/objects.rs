@@ -40,11 +40,11 @@ impl Message for Objects {
 }
 header!(ObjectsHeader, "gyre_objects_header_v3");
 
-/// The objects, in the frame of the odometry: that of the first scan.
+/// The objects, in the odometry frame: the frame of the first scan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ObjectsHeader {
-    /// That of the scan's pose.
+    /// The item of the scan's pose.
     pub item: Item,
     /// Pose of the sensor at the scan's time: forward, m.
     pub x_m: f64,
@@ -54,7 +54,6 @@ pub struct ObjectsHeader {
     pub yaw_rad: f64,
     /// Objects that move, or did and stand now.
     pub objects: u64,
-    /// Those that move.
     pub moving: u64,
     /// Number of objects in `list`.
     pub listed: u64,
@@ -86,13 +85,12 @@ pub struct ListedObject {
     pub position_covariance: [f64; 3],
     /// Covariance of the velocity: xx, xy and yy, (m/s)².
     pub velocity_covariance: [f64; 3],
-    /// 1 if it moves, 0 if its speed is not significantly above that of what stands.
+    /// 1 if it moves, 0 if its speed is not significantly above a standing object's.
     pub moving: u32,
     /// Scans since it was first seen, that one included.
     pub age: u32,
 }
 
-/// No objects.
 impl Default for ObjectsHeader {
     fn default() -> Self {
         Self::zeroed()
@@ -100,7 +98,6 @@ impl Default for ObjectsHeader {
 }
 
 impl ObjectsHeader {
-    /// Returns the listed objects.
     pub fn list(&self) -> &[ListedObject] {
         &self.list[..(self.listed as usize).min(MAX_LISTED)]
     }
@@ -122,7 +119,6 @@ impl ObjectsHeader {
 }
 
 impl ListedObject {
-    /// Returns whether it moves.
     pub fn is_moving(&self) -> bool {
         self.moving != 0
     }
@@ -164,7 +160,7 @@ mod tests {
         samples: 2,
     };
 
-    /// A header with two objects, of which one moves.
+    /// A header with two objects, one of them moving.
     fn header() -> ObjectsHeader {
         let car = ListedObject {
             id: 3,
@@ -210,7 +206,7 @@ mod tests {
             let names_it = refused.as_ref().is_err_and(|it| it.starts_with(field));
             assert!(names_it, "{field}: {refused:?}");
         }
-        // What is not listed is not looked at.
+        // Unlisted entries are not checked.
         let mut long = header();
         long.list[2].y_m = f64::NAN;
         assert_eq!(Objects::check(&long, &[], &LIMITS), Ok(()));

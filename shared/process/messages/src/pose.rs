@@ -39,7 +39,6 @@ header!(PoseHeader, "gyre_pose_header_v11");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct PoseHeader {
-    /// The scan.
     pub item: Item,
     /// The motion from the previous scan.
     pub motion: MotionEstimate,

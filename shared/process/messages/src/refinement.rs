@@ -9,7 +9,6 @@ use crate::check::{Violation, finite, require};
 pub mod outcome {
     /// The searched motion: there is no refinement, or the chain starts here.
     pub const SEARCHED: u32 = 0;
-    /// Refined.
     pub const REFINED: u32 = 1;
     /// Refined with little support: the motion is used, but the scan does not enter the map.
     pub const WEAK: u32 = 2;
@@ -19,16 +18,14 @@ pub mod outcome {
 
 /// Values of [`RefinementRecord::initial_guess`].
 pub mod initial_guess {
-    /// There was no refinement.
     pub const NONE: u32 = 0;
     /// The prediction at constant velocity.
     pub const PREDICTION: u32 = 1;
-    /// The searched motion.
     pub const SEARCH: u32 = 2;
     /// The prediction with a yaw offset, tried when no other guess matched.
     pub const YAW_OFFSET: u32 = 3;
-    /// The prediction, which says how far the vehicle has driven along walls without structure: the
-    /// radar does not see that.
+    /// The prediction, which determines the distance along walls without structure, since the radar
+    /// does not.
     pub const ALONG_WALLS: u32 = 4;
 }
 
@@ -57,7 +54,7 @@ pub mod wheels {
 
 /// Values of [`RefinementRecord::doppler`].
 pub mod doppler {
-    /// One of both scans does not say its velocity.
+    /// One of both scans does not determine its velocity.
     pub const NONE: u64 = 0;
     /// It agrees with the registered motion, or the motion is predicted by it.
     pub const USED: u64 = 1;
@@ -94,7 +91,7 @@ pub struct RefinementRecord {
     pub wheels: u64,
     /// Distance since the previous scan that the wheels measured, m; zero without wheels.
     pub wheel_distance_m: f64,
-    /// True distance over that of the wheels, after the scan; zero without wheels.
+    /// True distance over the wheels' distance, after the scan; zero without wheels.
     pub wheel_scale: f64,
     /// Standard deviation of that scale.
     pub wheel_scale_sigma: f64,

@@ -93,7 +93,6 @@ impl From<RotationEstimate> for RotationMatch {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RotationHeader {
-    /// The scan.
     pub item: Item,
     /// The rotation; all zero where the chain starts.
     pub rotation: RotationEstimate,

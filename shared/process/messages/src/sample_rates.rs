@@ -6,7 +6,7 @@ use gyre_samples::{Sample, SampleKind};
 
 use crate::scan::ScanHeader;
 
-/// Scans over which rates are measured: those of ten seconds at 4 Hz.
+/// Scans for measuring rates: ten seconds at 4 Hz.
 const SCANS: usize = 41;
 const KINDS: [SampleKind; 2] = [SampleKind::Gyro, SampleKind::Wheels];
 
@@ -24,14 +24,11 @@ pub struct SampleRates {
 /// Counts and rates of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SampleHealth {
-    /// Samples of the gyro.
     pub gyro: u64,
-    /// Samples of the wheels.
     pub wheels: u64,
     /// Samples that were left out, since they came late or were unusable.
     pub left_out: u64,
-    /// Samples of the gyro a second by the stamps of the last scans; `None` where there were none
-    /// so far.
+    /// Samples of the gyro a second by the stamps of the last scans; `None` without samples so far.
     pub gyro_hz: Option<f64>,
     /// Samples of the wheels a second, likewise.
     pub wheels_hz: Option<f64>,

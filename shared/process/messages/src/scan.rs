@@ -69,13 +69,12 @@ header!(ScanHeader, "gyre_scan_header_v7");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanHeader {
-    /// The scan.
     pub item: Item,
     /// Number of rows.
     pub azimuths: u32,
     /// Range bins per row.
     pub bins: u32,
-    /// Bytes from the first bin of a row to that of the next row.
+    /// Bytes from the first bin of a row to the first bin of the next row.
     pub stride: u32,
     /// Position of the first bin of the first row.
     pub first_byte: u32,
@@ -108,8 +107,8 @@ impl Default for ScanHeader {
 }
 
 impl ScanHeader {
-    /// Returns a view of the scan in this header and its payload; `None` if the payload is shorter
-    /// than the header says.
+    /// Returns a view of the scan in this header and its payload; `None` if the payload is too
+    /// short for its header.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
         let fits = geometry.azimuths <= MAX_AZIMUTHS && self.power_bytes()? <= bytes.len();
@@ -133,8 +132,8 @@ impl ScanHeader {
         last_row.checked_add(geometry.bins)
     }
 
-    /// Checks the geometry, the angles and the times, and that the payload is as long as the
-    /// geometry says.
+    /// Checks the geometry, the angles and the times, and that the length of the payload fits the
+    /// geometry.
     fn check(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
         let azimuths = self.azimuths as usize;
         let range = format_args!("1 to {MAX_AZIMUTHS}");
@@ -203,8 +202,8 @@ impl ScanHeader {
         self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)
     }
 
-    /// Views the samples, in the order of [`Sample::order`]; `None` if the payload is shorter than
-    /// the header says.
+    /// Views the samples, in the order of [`Sample::order`]; `None` if the payload is too short for
+    /// its header.
     pub fn samples<'a>(&self, bytes: &'a [u8]) -> Option<&'a [Sample]> {
         if self.samples == 0 {
             return Some(&[]);
@@ -268,8 +267,8 @@ impl ScanHeader {
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
-    /// Adds to the time of the scan, of its rows and of its samples, ns: a recording that is played
-    /// again goes on in time.
+    /// Adds to the time of the scan, of its rows and of its samples, ns, so that time advances when
+    /// a recording is played again.
     pub fn shift_times(&mut self, shift_ns: i64, bytes: &mut [u8]) {
         if shift_ns == 0 {
             return;

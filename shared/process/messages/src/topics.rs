@@ -46,7 +46,6 @@ impl WireType {
 /// The properties of a message type as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
-    /// The name of the topic.
     pub name: &'static str,
     /// The process that publishes it.
     pub sender: Sender,
@@ -54,7 +53,6 @@ pub struct Topic {
     pub sizes: fn(&Window) -> TopicSizes,
     /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
-    /// The type of its header.
     pub header: WireType,
     /// The type of the elements of its payload.
     pub element: WireType,
@@ -114,9 +112,9 @@ pub fn topic(name: &str) -> Option<&'static Topic> {
     TOPICS.iter().find(|topic| topic.name == name)
 }
 
-/// Returns an upper limit of the transport's bookkeeping, of which each file takes whole pages: a
-/// service has its description and state, a subscriber its queue, its events, and a process of its
-/// own. Measured without observers: 83 pages.
+/// Returns an upper limit of the transport's bookkeeping, with whole pages for each file: a service
+/// has its description and state, a subscriber its queue, its events, and a process of its own.
+/// Measured without observers: 83 pages.
 fn bookkeeping(window: &Window) -> usize {
     let subscribers: usize = topics(window)
         .map(|topic| (topic.sizes)(window).subscribers())

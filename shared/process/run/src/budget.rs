@@ -21,7 +21,7 @@ macro_rules! limits {
         }
 
         impl Limits {
-            /// Returns these limits, and those of `other` where there are none.
+            /// Returns these limits, completed by the limits of `other`.
             #[must_use]
             pub fn or(&self, other: &Self) -> Self {
                 Self {
@@ -47,16 +47,14 @@ limits! {
     p99_ms,
     /// Maximum of it, ms.
     max_ms,
-    /// Scans that were due and have no pose.
-    drops,
-    /// The same, % of those that were due.
+    /// Scans that were due and have no pose, % of those that were due.
     drops_percent,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has
     /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of
     /// a motion that is as before it.
     recovery_ms,
-    /// Motions that the radar does not tell as a whole (`along walls`, `way guessed`, `dead
-    /// reckoning`, `guessed`), % of those before the recording starts anew.
+    /// Motions that the radar does not wholly determine (`along walls`, `way guessed`, `dead
+    /// reckoning`, `guessed`), % of the motions before the recording repeats.
     degraded_percent,
     /// Processor time of all processes of the run, % of one processor.
     cpu_percent,
@@ -87,7 +85,6 @@ impl Budget {
         match scenario.judged() {
             Judged::ByBudget | Judged::ByItself => own.or(&self.all),
             Judged::ButDrops => own.or(&Limits {
-                drops: None,
                 drops_percent: None,
                 ..self.all.clone()
             }),
@@ -99,7 +96,6 @@ impl Budget {
                 recovery_ms: self.all.recovery_ms,
                 ..Limits::default()
             }),
-            Judged::Never => Limits::default(),
         }
     }
 }
@@ -149,7 +145,6 @@ mod tests {
         let blind = budget().of(Scenario::RadarBlind);
         assert_eq!((blind.p99_ms, blind.degraded_percent), (Some(100.0), None));
         assert_eq!(fast.degraded_percent, Some(1.0));
-        assert_eq!(budget().of(Scenario::Copying), Limits::default());
     }
 
     #[test]

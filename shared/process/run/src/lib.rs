@@ -1,14 +1,15 @@
-//! A run as data: the sections of its configuration that its processes read, and what it reports at
-//! its end.
+//! A run as data: the sections of its configuration that its processes read, and its report at the
+//! end.
 //!
 //! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and
 //!   [`Budget`] are sections;
-//! - [`Report`] is what the supervisor reports, with the [`StageCounters`] of each process.
+//! - [`Report`] is the supervisor's report, with the [`StageCounters`] of each process.
 //!
 //! It is light, so that a stage which reads its own section, and a program which only writes
 //! configurations, need neither the mathematics nor the transport.
 
 mod budget;
+pub mod latency;
 mod link;
 mod played_fault;
 mod played_from;
@@ -33,9 +34,10 @@ pub use scenario::{Judged, RADAR_HZ, Scenario};
 pub use scheduling::Scheduling;
 pub use source::{SourceConfig, SourceKind};
 
-/// The file in the folder of the results that says what the run was begun with, TOML.
+/// The file in the folder of the results with the configuration of the run's begin, TOML.
 pub const BEGUN_WITH: &str = "journal/run.toml";
-/// The file there that a run leaves when it has all its results. The next run begins anew.
+/// The file there that a run leaves when it has all its results. The next run starts from the first
+/// scan.
 pub const COMPLETE: &str = "journal/complete";
 /// The open files of the process of a run that has most of them, masking, without observers.
 /// Measured: 105.

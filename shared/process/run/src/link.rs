@@ -24,10 +24,10 @@ pub struct LinkConfig {
     /// `base`, with those after it. Default: the run is not split.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub side: Option<Side>,
-    /// Topic at which the run is split: `scan`, `masked`, `rotation`, `motion` or `refined`. The
-    /// stage that publishes it is the last one on the robot.
+    /// Topic that splits the run: `scan`, `masked`, `rotation`, `motion` or `refined`. The stage
+    /// that publishes it is the last one on the robot.
     pub cut: PlayedFrom,
-    /// Name of the link, the same on both sides, and another one for each robot.
+    /// Name of the link, equal on both sides, and different for each robot.
     pub name: String,
     /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses
     /// alone.
@@ -36,7 +36,7 @@ pub struct LinkConfig {
     /// Where this side reaches the other, or a router between them, as in `tls/base.internal:7447`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub connect: Vec<String>,
-    /// Certificate of the authority that has signed those of both sides, PEM.
+    /// Certificate of the authority that has signed the certificates of both sides, PEM.
     #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub ca: PathBuf,
     /// Certificate of this side, PEM.

@@ -1,4 +1,4 @@
-//! Faults that are put into what is played of a recording.
+//! Faults to inject into the playback of a recording.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,9 +20,9 @@ pub enum PlayedFaultKind {
 }
 
 impl PlayedFaultKind {
-    /// Share by which the wheels turn too fast while they slip.
+    /// Share of the excess turn of slipping wheels.
     pub const SLIP_SHARE: f64 = 0.3;
-    /// Time by which the stamps of samples jump, s.
+    /// Jump of the stamps of samples, s.
     pub const JUMP_S: f64 = 1.0;
 
     /// Returns its name in configurations.
@@ -36,7 +36,7 @@ impl PlayedFaultKind {
     }
 }
 
-/// A fault that is put into what is played of a recording, at the same place of each turn.
+/// A fault to inject into the playback of a recording, at the same place of each turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlayedFault {
@@ -56,8 +56,8 @@ impl PlayedFault {
         (self.from_s..self.from_s + self.for_s).contains(&time_s)
     }
 
-    /// Returns the time at which its last effect ends, s after the stamp of the first scan: a clock
-    /// that jumps back brings stamps that were there before.
+    /// Returns the time when its last effect ends, s after the stamp of the first scan: a clock
+    /// that jumps back repeats earlier stamps.
     pub fn ends_s(&self) -> f64 {
         let after_s = match self.kind {
             PlayedFaultKind::ClockJump => PlayedFaultKind::JUMP_S,

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The topic that a recording is played from: the stages that compute it and what is before it are
-/// absent.
+/// The first topic that is played from a recording: the stages that compute it, and all stages
+/// before, are absent.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]

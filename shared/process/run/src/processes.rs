@@ -28,9 +28,9 @@ pub struct RunConfig {
     pub observers: usize,
     /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0:
     /// no limit. Then stages are restarted: first the source if it is late, else all but a live
-    /// source; if that does not help, all; if that does not help either, the run ends. With SLAM
-    /// also the time in which a follower that the run waits for at its end must make progress; else
-    /// it is restarted.
+    /// source; if that does not help, all; if that does not help either, the run ends. With SLAM it
+    /// is also the time limit for progress of a follower at the end of the run; a follower without
+    /// progress is restarted.
     pub stall_timeout_s: f64,
     /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes
     /// longer, as one that cannot load its model, is treated as a stall.
@@ -87,7 +87,7 @@ pub struct StageConfig {
     pub python: Option<PathBuf>,
     /// Limits of its restarts.
     pub restart: RestartPolicy,
-    /// The scheduling of the process: its keys go before those of `run.scheduling`.
+    /// The scheduling of the process: its keys override `run.scheduling`.
     #[serde(skip_serializing_if = "is_default")]
     pub scheduling: Scheduling,
     /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
@@ -106,9 +106,6 @@ impl StageConfig {
     ];
 
     /// Returns the function of Python that a process can be.
-    ///
-    /// # Errors
-    /// Of the others: those that can be one.
     pub fn function(process: &str) -> Result<&'static str, String> {
         let found = Self::PYTHON.iter().find(|(name, _)| *name == process);
         found.map(|(_, function)| *function).ok_or_else(|| {
@@ -151,8 +148,7 @@ pub struct RestartPolicy {
     pub limit: usize,
     /// Length of the time window of `limit`, s.
     pub window_s: f64,
-    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at
-    /// once.
+    /// Delay before the restart of a stage that exited, ms. A killed one is restarted at once.
     pub backoff_ms: u64,
 }
 

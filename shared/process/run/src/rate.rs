@@ -1,4 +1,4 @@
-//! The pace at which a recording is played.
+//! The pace of playing a recording.
 
 use std::{borrow::Cow, fmt, str::FromStr};
 

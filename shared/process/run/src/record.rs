@@ -8,20 +8,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RecordConfig {
-    /// The file to which the run is recorded, `NAME.mcap`; `--record` on the command line. Default:
-    /// none.
+    /// The file of the run's recording, `NAME.mcap`; `--record` on the command line. Default: none.
     #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub file: PathBuf,
     /// The topics that are recorded: `scan`, `masked`, `rotation`, `motion`, `refined`, `pose`,
-    /// `loop`, `correction`, `fix`, `log`, `health`. Default: what the run has of these but
+    /// `loop`, `correction`, `fix`, `log`, `health`. Default: all of these in the run except
     /// `masked` and `rotation`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// Size from which on the recording goes on in the next file, MB (rosbag2: `max_bagfile_size`,
-    /// in bytes); 0: any.
+    /// Size of a file before the recording continues in the next file, MB (rosbag2:
+    /// `max_bagfile_size`, in bytes); 0: any.
     #[serde(skip_serializing_if = "crate::unset::is_zero")]
     pub split_mb: u64,
-    /// Time of the sensor after which the recording goes on in the next file, s (rosbag2:
+    /// Time of the sensor before the recording continues in the next file, s (rosbag2:
     /// `max_bagfile_duration`); 0: any.
     #[serde(skip_serializing_if = "is_none")]
     pub split_s: f64,

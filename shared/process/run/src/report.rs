@@ -36,14 +36,12 @@ pub struct Swapped {
     pub stage: String,
     /// The program and its arguments.
     pub command: Vec<String>,
-    /// Number of poses before.
     pub after_poses: u64,
 }
 
 /// Counters of one process of a stage, from its start to its clean exit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageCounters {
-    /// Items processed.
     pub processed: u64,
     /// Heap allocations in `process` after its first five items; `None` if the program does not
     /// count them (see `CountingAllocator` of `gyre-stage`).
@@ -52,7 +50,6 @@ pub struct StageCounters {
     pub allocations_in_first_five: Option<u64>,
     /// Items that were received twice and skipped, because a restarted publisher sent them again.
     pub duplicates: u64,
-    /// Number of wake-ups.
     pub wakes: u64,
     /// Lost wake-ups: input was found only after the longest wait.
     pub wakes_caught_late: u64,
@@ -61,8 +58,8 @@ pub struct StageCounters {
     /// Azimuths that are missing from the published scans of a live radar (source only). This and
     /// the next four are counts since the start of the run, also of sources that have died.
     pub missing_azimuths: u64,
-    /// Turns of a live radar of which there is no scan: nothing arrived, the connection broke in
-    /// the middle, half of the azimuths are missing, or times that do not increase (source only).
+    /// Turns of a live radar without a scan: nothing arrived, the connection broke in the middle,
+    /// half of the azimuths are missing, or times do not increase (source only).
     pub scans_left_out: u64,
     /// Messages of a live radar that could not be read (source only).
     pub damaged_messages: u64,

@@ -16,15 +16,13 @@ pub enum Judged {
     ByBudget,
     /// By all of `[budget]` but drops, which the scenario causes on purpose.
     ButDrops,
-    /// By all of `[budget]` but degraded motions, which it causes on purpose, by its recovery, and
-    /// by what `[budget.NAME]` says.
+    /// By all of `[budget]` except degraded motions, which it causes on purpose, by its recovery,
+    /// and by `[budget.NAME]`.
     ButDegraded,
-    /// By its recovery, and by what `[budget.NAME]` says alone: its purpose is a fault.
+    /// Only by its recovery and by `[budget.NAME]`, since its purpose is a fault.
     ByRecovery,
     /// By a figure of its own: the highest rate, the number of radars.
     ByItself,
-    /// Not at all: it compares.
-    Never,
 }
 
 /// Defines the scenarios: name, judgement, and a line that describes it.
@@ -40,7 +38,7 @@ macro_rules! scenarios {
         }
 
         impl Scenario {
-            /// All scenarios, in the order in which they are carried out.
+            /// All scenarios, in the order of execution.
             pub const ALL: [Self; [$($name,)+].len()] = [$(Self::$scenario,)+];
 
             /// Returns the name on the command line and in `[budget.NAME]`.
@@ -100,8 +98,6 @@ scenarios! {
         "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s";
     Fleet: "fleet", ByItself,
         "more and more pipelines until one misses its deadline: the number of 4 Hz radars";
-    Copying: "copying", Never,
-        "the transport beside copies through Unix sockets, with 1, 4 and 8 readers";
 }
 
 impl Scenario {

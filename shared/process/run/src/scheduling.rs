@@ -3,7 +3,7 @@
 use rustix::thread::CpuSet;
 use serde::{Deserialize, Serialize};
 
-/// The scheduling of a process. A key that is left out leaves what the process inherits.
+/// The scheduling of a process. A key that is left out keeps the inherited setting.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scheduling {
@@ -39,9 +39,6 @@ impl Scheduling {
     }
 
     /// Checks the ranges of the values.
-    ///
-    /// # Errors
-    /// The key and the range, as the end of a sentence that begins with the section.
     pub fn validate(&self) -> Result<(), String> {
         if self.nice.is_some_and(|nice| !(-20..=19).contains(&nice)) {
             return Err("scheduling.nice must be from -20 to 19".to_owned());

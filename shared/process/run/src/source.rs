@@ -58,12 +58,12 @@ pub struct SourceConfig {
     /// all.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub interface: String,
-    /// Time without an azimuth from the radar after which it is connected to anew, or in ROS 2
-    /// after which that is reported, s; 0: no limit.
+    /// Time without an azimuth before the radar is connected again, or in ROS 2 before that is
+    /// reported, s; 0: no limit.
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
     pub data: PathBuf,
-    /// Topic from which on a recording of a run is played: `scan`, `masked`, `rotation`, `motion`
+    /// First topic that is played from a recording of a run: `scan`, `masked`, `rotation`, `motion`
     /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but
     /// `scan` every message must have been recorded.
     #[serde(skip_serializing_if = "is_scan")]
@@ -73,8 +73,8 @@ pub struct SourceConfig {
     /// Number of scans to play. Default: all, and of a radar without end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
-    /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then
-    /// counts those of all turns; without it the run has no end.
+    /// Play the recording again and again, with times that advance: `gyre stress`. `scans` then
+    /// counts the scans of all turns; without it the run has no end.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub repeat: bool,
     /// Number of scans that become due at once, as from a network that holds them back; the mean
@@ -83,8 +83,8 @@ pub struct SourceConfig {
     #[serde(skip_serializing_if = "is_one")]
     #[schemars(skip)]
     pub burst: NonZeroUsize,
-    /// Faults that are put into what is played of a recording: `gyre stress`. As in
-    /// `[{ kind = "gyro-out", from_s = 4.0, for_s = 3.0 }]`.
+    /// Faults to inject into the playback of a recording: `gyre stress`. As in `[{ kind =
+    /// "gyro-out", from_s = 4.0, for_s = 3.0 }]`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<PlayedFault>,
     /// Time for which a file that the disk or the network does not give is tried again, s. Then the

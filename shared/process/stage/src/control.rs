@@ -23,23 +23,22 @@ pub const SOCKET: &str = "control.sock";
 const ANSWER: Duration = Duration::from_secs(15);
 /// Time between two looks at a swap that is waited for.
 const LOOK: Duration = Duration::from_secs(1);
-/// Said where a request that changes something is not waited for any more.
+/// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
 /// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
-    /// Say how the run is.
+    /// Report the state of the run.
     Status,
-    /// End the run as an interrupt does: its journal stays, and the same command goes on.
+    /// End the run as an interrupt does: its journal stays, and the same command continues it.
     Stop,
-    /// Start a process again.
     Restart {
         /// The name of the stage or follower, or `recorder`.
         process: String,
     },
-    /// Go on with another program in the place of a stage.
+    /// Replace the program of a stage.
     Swap(Swap),
 }
 
@@ -50,7 +49,7 @@ pub struct Swap {
     pub process: String,
     /// Program and arguments; `None`: those that the run was begun with.
     pub command: Option<Vec<String>>,
-    /// The directory in which the program is started.
+    /// The directory for starting the program.
     pub directory: PathBuf,
     /// True if the program is started only when the one before has ended, since it cannot stand by.
     pub cold: bool,
@@ -80,15 +79,13 @@ pub struct Status {
     pub out: PathBuf,
     /// The current folder of the command that has started the run.
     pub started_in: PathBuf,
-    /// True in live mode.
     pub live: bool,
     /// Where the run is between its start and its end.
     pub phase: Phase,
     /// Time since the supervisor has started, s.
     pub uptime_s: f64,
-    /// Scans that the source has published; `None` if a replaced source does not tell.
+    /// Scans that the source has published; `None` if a replaced source does not report them.
     pub published: Option<u64>,
-    /// Poses.
     pub poses: u64,
     /// Scans that were dropped before the newest pose.
     pub dropped: u64,
@@ -108,10 +105,9 @@ pub struct Status {
 pub struct PendingSwap {
     /// The name of the stage or follower.
     pub process: String,
-    /// Program and arguments.
     pub command: Vec<String>,
-    /// True if the program has taken over, and no scan has gone through it yet; false if it has not
-    /// said that it is ready to take over.
+    /// True if the program has taken over, but no scan has passed through it yet; false if it has
+    /// not reported that it is ready to take over.
     pub has_taken_over: bool,
     /// Time for which that has been waited for, s.
     pub waited_s: f64,
@@ -126,14 +122,12 @@ pub enum Phase {
     /// A stage has not opened its topics.
     #[default]
     Starting,
-    /// All stages are there.
     Running,
     /// The stream has ended, and followers read their logs to the end.
     Following,
 }
 
 impl Phase {
-    /// Returns its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Starting => "starting",
@@ -148,15 +142,12 @@ impl Phase {
 pub struct ProcessStatus {
     /// The name of the stage or follower, or `recorder`.
     pub name: String,
-    /// The process.
     pub pid: u32,
-    /// Program and arguments.
     pub command: Vec<String>,
-    /// True if the program is another one than the run was begun with.
+    /// True if the program differs from the one at the run's begin.
     pub is_swapped: bool,
-    /// The activity.
     pub activity: Activity,
-    /// For how long it has done that, s; `None` if it does not tell.
+    /// For how long it has done that, s; `None` if it does not report it.
     pub activity_s: Option<f64>,
     /// Time since its start, s.
     pub uptime_s: f64,
@@ -185,12 +176,10 @@ pub enum Activity {
     Silent,
     /// It runs, and writes no heartbeat, as a replacement need not.
     Running,
-    /// It has ended.
     Ended,
 }
 
 impl Activity {
-    /// Returns its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Starting => "starting",
@@ -207,16 +196,13 @@ impl Activity {
 #[derive(Debug)]
 pub struct Control {
     root: PathBuf,
-    /// Device and inode of the root: a later run with the same results has another one.
+    /// Device and inode of the root, which differ for a later run with the same results.
     id: (u64, u64),
     out: PathBuf,
 }
 
 impl Control {
     /// Returns the control of the run that writes its results to `out`.
-    ///
-    /// # Errors
-    /// There is no such run.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         Self::at(run::root_of(&absolute), out.to_owned()).ok_or_else(|| not_running(out.to_owned()))
@@ -253,9 +239,6 @@ impl Control {
     }
 
     /// Returns the state of the run.
-    ///
-    /// # Errors
-    /// The run has ended, or its supervisor does not answer.
     pub fn status(&self) -> Result<Status, StageError> {
         self.status_or("")
     }
@@ -268,37 +251,28 @@ impl Control {
     }
 
     /// Asks the run to end, as an interrupt does. It has ended when this run is there no more.
-    ///
-    /// # Errors
-    /// The run has ended, or its supervisor does not answer.
     pub fn stop(&self) -> Result<(), StageError> {
         self.order(&Request::Stop)
     }
 
     /// Starts a process of the run again.
-    ///
-    /// # Errors
-    /// There is no such process, the run has ended, or its supervisor does not answer.
     pub fn restart(&self, process: &str) -> Result<(), StageError> {
         let process = process.to_owned();
         self.order(&Request::Restart { process })
     }
 
-    /// Goes on with another program in the place of a stage. Returns when that has worked on a
-    /// first pose; or, with a sentence, when it has taken over and no scan came for it to work on.
-    /// Each second meanwhile `observe` gets what is waited for.
-    ///
-    /// # Errors
-    /// The program did not come to take over, or has failed, and the one before goes on; the run
-    /// has ended, or its supervisor does not answer.
+    /// Replaces the program of a stage. Returns when the new program has worked on a first pose;
+    /// or, with a sentence, when it has taken over but no scan came. Each second until then,
+    /// `observe` receives the reason for waiting. If the new program fails to take over, the
+    /// previous program continues.
     pub fn swap(
         &self,
         swap: Swap,
         observe: &mut dyn FnMut(&PendingSwap),
     ) -> Result<Option<String>, StageError> {
         let sent = self.send(&Request::Swap(swap))?;
-        // The supervisor has the limits: `run.start_timeout_s`, and that of the trial. But it may
-        // hang.
+        // The supervisor has the limits: `run.start_timeout_s`, and the limit of the trial. But it
+        // may hang.
         let answer = self.wait(sent, LOOK, |run| {
             let status = run.status_or(NOT_LATER)?;
             status.swap.iter().for_each(&mut *observe);
@@ -343,7 +317,7 @@ impl Control {
         sent.map_err(|error| self.failed(&error))
     }
 
-    /// Waits for the answer; calls `look` each time that there is none for another `period`.
+    /// Waits for the answer; calls `look` after each `period` without an answer.
     fn wait(
         &self,
         mut sent: Sent,

@@ -6,7 +6,7 @@ use gyre_run::StageCounters;
 
 use crate::{Manifest, StageError, allocations, run};
 
-/// Returns the file in the run's root to which a stage writes its counters.
+/// Returns the file in the run's root for a stage's counters.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.root.join(format!("{stage}.counters.json"))
 }

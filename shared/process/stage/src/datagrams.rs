@@ -8,13 +8,10 @@ use std::{
 
 use crate::StageError;
 
-/// The largest datagram, bytes: that of UDP.
+/// The largest datagram of UDP, bytes.
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
-/// Opens the socket for what a section receives, which does not block.
-///
-/// # Errors
-/// An address at which nothing can be received.
+/// Opens the non-blocking socket for the data of a section.
 pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, StageError> {
     let bound = UdpSocket::bind(address);
     let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
@@ -59,7 +56,7 @@ pub(crate) fn dropped(socket: &UdpSocket) -> u32 {
     counts[8]
 }
 
-/// Returns the lines of a datagram; one that is not text has one that says so.
+/// Returns the lines of a datagram; for a datagram that is not text, a line that reports this.
 pub(crate) fn lines(datagram: &[u8]) -> impl Iterator<Item = &str> {
     str::from_utf8(datagram).unwrap_or("not text").lines()
 }

@@ -7,26 +7,15 @@ use thiserror::Error;
 
 use crate::shared_memory::{self, SHARED_MEMORY};
 
-/// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
+/// An error that ends a stage. The exit code informs the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// The process was started outside of a run.
     #[error(
         "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
     )]
-    NoRun {
-        /// The stage.
-        stage: String,
-    },
-    /// The files of the run cannot be read.
+    NoRun { stage: String },
     #[error("cannot read {path}: {reason}; is the run still there?")]
-    Manifest {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        reason: String,
-    },
-    /// No run writes to a folder.
+    Manifest { path: PathBuf, reason: String },
     #[error("no run is writing to {out}{end}: `gyre run` starts one, and its --out names the folder", out = out.display())]
     NotRunning {
         /// The folder of the results.
@@ -34,38 +23,29 @@ pub enum StageError {
         /// When and why the last run there ended, in parentheses.
         end: String,
     },
-    /// A run does not answer.
     #[error("the run that writes to {out} does not answer: {reason}")]
     Silent {
         /// The folder of the results.
         out: PathBuf,
-        /// The reason.
         reason: String,
     },
-    /// A run has refused a request.
     #[error("{0}")]
     Refused(String),
-    /// All places of observers are taken.
     #[error(
         "the {observers} places for observers of topic `{topic}` are taken: wait until one leaves, or raise run.observers"
     )]
     NoPlace {
-        /// The topic.
         topic: &'static str,
-        /// The number of places.
         observers: usize,
     },
-    /// The run has no such topic.
     #[error("the run that writes to {out} has no topic `{topic}`: only a run with {needs} has it")]
     NoTopic {
-        /// The topic.
         topic: &'static str,
         /// The property of a run that has it.
         needs: &'static str,
         /// The folder of the results.
         out: PathBuf,
     },
-    /// The configuration is invalid.
     #[error("{0}")]
     Configuration(String),
     /// The input cannot be used, and a restart would not change that.
@@ -78,31 +58,22 @@ pub enum StageError {
     /// The transport failed; a restart usually helps.
     #[error("cannot {action}: {reason}")]
     Transport {
-        /// The operation.
         action: String,
         /// The transport's error.
         reason: String,
     },
-    /// An item is missing: it was overwritten or never sent.
     #[error("topic `{topic}`: expected item {expected}, but got {got}")]
     SequenceGap {
-        /// The topic.
         topic: &'static str,
-        /// The expected sequence number.
         expected: u64,
-        /// The received sequence number.
         got: u64,
     },
-    /// A message violates its contract.
     #[error("topic `{topic}`, item {seq}, sent by {sender}: {reason}")]
     Malformed {
-        /// The topic.
         topic: &'static str,
         /// The stage that sent it.
         sender: &'static str,
-        /// The sequence number.
         seq: u64,
-        /// The violation.
         reason: String,
     },
     /// There is too little shared memory. A dead process may have left some that is about to be
@@ -112,19 +83,14 @@ pub enum StageError {
          (containers: --shm-size), or lower run.window or raster.n"
     )]
     NoMemory {
-        /// The topic.
         topic: &'static str,
         /// The size of its segment, MB.
         megabytes: f64,
-        /// The system error.
         source: std::io::Error,
     },
-    /// A file of the run cannot be read or written.
     #[error("{path}: {source}")]
     File {
-        /// The file.
         path: PathBuf,
-        /// The system error.
         source: std::io::Error,
     },
 }

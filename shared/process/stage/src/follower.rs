@@ -25,23 +25,15 @@ const NICENESS: i32 = 10;
 
 /// A follower: a function of its logs.
 pub trait Follower {
-    /// The published message.
     type Output: Message;
     /// The logs whose growth wakes it.
     const LOGS: &'static [LogId];
 
     /// Works on the next records of the logs. A step should be short: requests to stop are looked
     /// for between two steps.
-    ///
-    /// # Errors
-    /// An error that ends the process.
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
-    /// Makes what it has written survive a power failure. A failure is found by nobody after the
-    /// process.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
+    /// Makes its writes survive a power failure. A failure is found by nobody after the process.
     fn sync(&mut self) -> Result<(), StageError>;
 
     /// Returns the position in the logs.
@@ -60,9 +52,6 @@ pub enum Step<H> {
 }
 
 /// Runs a follower to the end of its logs, or until SIGTERM.
-///
-/// # Errors
-/// A failure of the transport, or an error of the follower.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -84,7 +73,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     };
     let mut limit = Duration::ZERO;
     loop {
-        // Before the step: what is appended after this wakes the next one.
+        // Before the step: records appended after this wake the next one.
         let woken = launch
             .signals
             .wait(&grown, Some(flow.output.listener()), limit)?;

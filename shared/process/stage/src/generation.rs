@@ -3,9 +3,9 @@
 //! In live mode masking numbers the scans that it takes. When it is started again it gives the
 //! numbers behind the newest pose to other scans, and what had been sent under them is void; a
 //! sensor's source does so when the run is started again. Each such start begins a generation,
-//! which its messages carry. So whoever looks on, or reads a recording, can tell a scan that has
-//! taken the number of another one from one that is sent again. The file of the generations has all
-//! of them with their first numbers, for one that has seen no message of some.
+//! which its messages carry. So an observer, or a reader of a recording, can distinguish a scan
+//! that reuses a number from a scan that is sent again. The file of the generations has all of them
+//! with their first numbers, for one that has seen no message of some.
 
 use std::{
     fmt, io,
@@ -27,12 +27,9 @@ const MAX_BYTES: u64 = 64 * KEPT as u64;
 pub struct Generation(GivenAnew);
 
 impl Generation {
-    /// Begins a generation, in which a process gives its numbers from `first` on. The generation is
-    /// kept beside the journal and survives a power failure, so that no number of one is given
-    /// twice.
-    ///
-    /// # Errors
-    /// The file of the generations cannot be read or written.
+    /// Begins a generation. The process numbers from `first` on during this generation. The
+    /// generation is kept beside the journal and survives a power failure, so that no number of one
+    /// is given twice.
     pub fn begin(
         manifest: &Manifest,
         by: NumberedBy,
@@ -68,8 +65,8 @@ impl Generation {
     }
 }
 
-/// Returns, of the generations after `known` and before that of an item, the one that gave the
-/// smallest number anew. Without a generation before (0) nothing is known that could be void.
+/// Returns, among the generations after `known` and before the item's, the one that reused the
+/// smallest number. Without a generation before (0) nothing is known that could be void.
 pub(crate) fn skipped(
     out: &Path,
     by: NumberedBy,

@@ -1,5 +1,5 @@
-//! The fixes of a live GNSS receiver: what arrives in datagrams is appended to a log, which is what
-//! the corrected trajectory is made with.
+//! The fixes of a live GNSS receiver: the received datagrams are appended to a log, and the
+//! corrected trajectory uses that log.
 
 use std::{
     io::{self, ErrorKind},
@@ -32,12 +32,12 @@ const MAX_LOG: u64 = 1 << 30;
 /// Time between two looks whether reception is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// Receives fixes in a thread of its own, so that none waits while the trajectory is solved, and
-/// appends a row for each line of a datagram, in the order in which they arrive.
+/// Receives fixes in a thread of its own, so that no fix waits while the trajectory is solved, and
+/// appends a row for each line of a datagram, in the order of arrival.
 pub struct GnssReceiver {
     thread: Option<JoinHandle<Result<(), StageError>>>,
     shared: Arc<Shared>,
-    /// Datagrams of which the log was read.
+    /// Number of datagrams when the log was last read.
     read: Option<u64>,
 }
 
@@ -57,10 +57,7 @@ impl Shared {
 }
 
 impl GnssReceiver {
-    /// Receives at an address, and goes on with the log if there is one.
-    ///
-    /// # Errors
-    /// An address at which nothing can be received, or a file that cannot be written.
+    /// Receives at an address, and continues the log if there is one.
     pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
         let socket = listen("fixes of GNSS", "gnss", address)?;
         let log = Log::open(log).map_err(unwritten)?;
@@ -89,9 +86,6 @@ impl GnssReceiver {
 
     /// Returns what `read` makes of the log, which meanwhile does not change; `None` if it has not
     /// grown since the last call.
-    ///
-    /// # Errors
-    /// Reception has failed.
     pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, StageError> {
         if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             self.finish()?;
@@ -101,10 +95,7 @@ impl GnssReceiver {
         Ok((!is_read).then(read))
     }
 
-    /// Takes what has arrived by now, and ends reception: the log does not change any more.
-    ///
-    /// # Errors
-    /// Reception has failed.
+    /// Takes all received datagrams, and ends reception: the log does not change any more.
     pub fn finish(&mut self) -> Result<(), StageError> {
         self.shared.ends.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {
@@ -162,7 +153,6 @@ impl Log {
     }
 }
 
-/// The thread that receives.
 struct Reception {
     socket: UdpSocket,
     log: Log,
@@ -239,8 +229,8 @@ impl Reception {
     }
 }
 
-/// Returns the row of a line: a stamp, ns, latitude and longitude, degrees, both of which are empty
-/// without a fix, and the standard deviation, m, if the receiver knows it.
+/// Returns the row of a line: a stamp, ns, latitude and longitude, degrees (both empty without a
+/// fix), and the standard deviation, m, if the receiver knows it.
 fn row(line: &str) -> String {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let row = match fields[..] {

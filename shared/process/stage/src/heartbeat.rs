@@ -3,8 +3,8 @@
 //!
 //! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait,
 //! which is every 200 ms or more often, and a stage also before each item. So a process that works
-//! has a beat as old as its work, and one that is stopped, or that the system does not run, has an
-//! old beat that says that it waits.
+//! has a beat as old as its work, and a process that is stopped, or that the system does not run,
+//! has an old beat that reports a wait.
 
 use std::{
     fs::{File, OpenOptions},
@@ -41,11 +41,9 @@ pub enum Activity {
 /// The newest beat of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Time at which the activity began, `CLOCK_MONOTONIC`, ns.
+    /// Time when the activity began, `CLOCK_MONOTONIC`, ns.
     pub since_ns: i64,
-    /// The process.
     pub pid: u32,
-    /// The activity since then.
     pub activity: Activity,
 }
 
@@ -134,7 +132,7 @@ impl HeartbeatWriter {
         })
     }
 
-    /// Says that an activity begins now.
+    /// Reports that an activity begins now.
     pub fn beat(&self, activity: Activity) {
         let bytes = Heartbeat::now(activity, self.pid).to_bytes();
         let (words, _) = bytes.as_chunks();

@@ -16,8 +16,7 @@ pub enum Action {
     Wait,
     /// Keep the current item only as the previous one of the next: advance and publish nothing.
     Keep,
-    /// Process this item, the last input of which was received at the given time
-    /// (`CLOCK_MONOTONIC`, ns).
+    /// Process this item, whose last input was received at the given time (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
     /// Pass on the end of the stream.
     End(Item),
@@ -30,15 +29,8 @@ pub trait Inputs: Sized {
     where
         Self: 'a;
 
-    /// Opens the topics.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     fn open(launch: &Launch) -> Result<Self, StageError>;
     /// Reads the queues and returns what to do next.
-    ///
-    /// # Errors
-    /// A failure of the transport, a sequence gap.
     fn next_action(&mut self) -> Result<Action, StageError>;
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
@@ -59,7 +51,6 @@ pub struct Pairs<M: Message> {
 
 /// A view of [`Pairs`].
 pub struct PairView<'a, M: Message> {
-    /// The current item.
     pub current: &'a Received<M>,
     /// The previous item; `None` where the chain starts.
     pub previous: Option<&'a Received<M>>,
@@ -77,9 +68,6 @@ impl<M: Message> PairView<'_, M> {
 
 impl PairView<'_, Masked> {
     /// Returns the rasters to match.
-    ///
-    /// # Errors
-    /// A payload that is shorter than its header says.
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
         let previous = self
             .previous

@@ -50,9 +50,6 @@ pub struct Launch {
 
 impl Launch {
     /// Joins the run that [`run::ENVIRONMENT`] names.
-    ///
-    /// # Errors
-    /// No run is named, its files cannot be read, or the transport fails.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun {
             stage: name.to_owned(),
@@ -85,15 +82,12 @@ impl Launch {
         })
     }
 
-    /// Takes this process's place in the run, when it has loaded what it needs, and before it opens
-    /// its topics or files that it writes. A process that stands by waits here until the one before
-    /// it has ended (see [`run::STANDBY`]). False on a request to stop.
+    /// Takes this process's place in the run, after loading its data, and before opening its topics
+    /// or output files. A process that stands by waits here until the one before it has ended (see
+    /// [`run::STANDBY`]). False on a request to stop.
     ///
     /// The loops of this crate call it. A stage with files of its own calls it before it opens
     /// them; once is enough.
-    ///
-    /// # Errors
-    /// A file of the run that cannot be written, or memory that cannot be locked.
     pub fn take_place(&self) -> Result<bool, StageError> {
         if self.has_place.get() {
             return Ok(true);
@@ -162,9 +156,6 @@ impl Launch {
     }
 
     /// Returns a section of the run's configuration, or its defaults if the section is missing.
-    ///
-    /// # Errors
-    /// A key or value that the section does not allow.
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
         let table = self
             .configuration
@@ -229,8 +220,8 @@ pub fn main(
     }
 }
 
-/// Returns the name of the file in the run's root in which a stage says why it ended, or a process
-/// that was started to stand by.
+/// Returns the name of the file in the run's root where a stage, or a process on standby, writes
+/// why it ended.
 pub fn last_words(stage: &str, stands_by: bool) -> String {
     match stands_by {
         true => format!("{stage}.standby.error"),
@@ -238,7 +229,8 @@ pub fn last_words(stage: &str, stands_by: bool) -> String {
     }
 }
 
-/// Tells the supervisor why the stage ended, in shared memory: the disk of the logs may be full.
+/// Leaves the reason for the stage's end to the supervisor, in shared memory: the disk of the logs
+/// may be full.
 fn leave_last_words(stage: &str, sentence: &str) {
     if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
         let name = last_words(stage, stands_by());
@@ -247,9 +239,6 @@ fn leave_last_words(stage: &str, sentence: &str) {
 }
 
 /// Returns the filter of the log: `GYRE_LOG`, or `FILTER` without it.
-///
-/// # Errors
-/// `GYRE_LOG` is no filter.
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {
@@ -259,11 +248,8 @@ fn log_filter() -> Result<Targets, StageError> {
     })
 }
 
-/// Starts logging to `log.jsonl`, to which all processes append one line per event. While the
-/// returned span lives, each line carries the name of the stage.
-///
-/// # Errors
-/// The log cannot be opened, or `GYRE_LOG` is no filter.
+/// Starts logging to `log.jsonl`, where all processes append one line per event. While the returned
+/// span lives, each line carries the name of the stage.
 pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.events();
     let file = OpenOptions::new()

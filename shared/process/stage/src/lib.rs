@@ -8,16 +8,14 @@
 //!    topic, with the handshake that gives a new reader the history.
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes;
-//!    [`inputs`]: what a middle process waits for.
-//!    [`Generation`]: what tells a number that is given again from one that is sent again.
+//!    [`inputs`]: the next input of a middle process. [`Generation`]: distinguishes a reused number
+//!    from a message that is sent again.
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream;
 //!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
-//! 8. [`processes`], [`usage`]: the processes of the machine, and what they use of it;
-//!    [`hand_over`]: one topic alone, to measure the transport.
-//! 9. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
-//!    (`gyre-supervise`) reads and creates.
+//! 8. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: files and services that the
+//!    supervisor (`gyre-supervise`) reads and creates.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W
 //! of them in flight; each pose is the credit for one more. A stage is a function of its inputs,
@@ -38,7 +36,6 @@ mod error;
 pub mod follower;
 mod generation;
 mod gnss_receiver;
-pub mod hand_over;
 pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
@@ -46,7 +43,7 @@ mod log_id;
 mod manifest;
 pub mod observer;
 mod outlet;
-pub mod processes;
+pub mod python_function;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;
@@ -62,7 +59,6 @@ pub mod stage;
 #[cfg(test)]
 mod tests;
 pub mod transport;
-pub mod usage;
 pub mod wake;
 pub mod writer;
 

@@ -3,15 +3,12 @@
 /// A log of a run that followers read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogId {
-    /// The keyframes, by pose-integration.
     Keyframes,
-    /// The loops, by loop-closure.
     Loops,
     /// All scans with their points, by pose-integration.
     Scans,
 }
 
-/// All of them.
 pub(crate) const LOGS: [LogId; 3] = [LogId::Keyframes, LogId::Loops, LogId::Scans];
 
 impl LogId {

@@ -39,9 +39,6 @@ pub struct Manifest {
 
 impl Manifest {
     /// Reads the manifest of the run at `root`.
-    ///
-    /// # Errors
-    /// A file that is missing or invalid.
     pub fn read(root: &Path) -> Result<Self, StageError> {
         let path = Self::path(root);
         let failed = |reason: String| StageError::Manifest {
@@ -52,7 +49,7 @@ impl Manifest {
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
     }
 
-    /// Returns the log to which all processes append their events.
+    /// Returns the log where all processes append their events.
     pub fn events(&self) -> PathBuf {
         self.out.join("log.jsonl")
     }
@@ -63,9 +60,6 @@ impl Manifest {
 
     /// Writes the manifest, the resolved configuration and the configuration of the transport into
     /// the run's root.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, configuration: &str) -> Result<(), StageError> {
         let transport = format!(
             "[global]\nroot-path = \"{}/\"\nprefix = \"{}\"\n\n\

@@ -1,7 +1,7 @@
 //! Observers: subscribers that the run does not depend on, in processes of their own.
 //!
 //! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it:
-//! a full queue loses its oldest message, and the observer counts what it has missed. It looks at
+//! a full queue loses its oldest message, and the observer counts its missed messages. It looks at
 //! its queue at most every 10 ms, whatever the rate. It holds one message at a time, which the
 //! publishers' memory is sized for (see
 //! [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once,
@@ -32,9 +32,11 @@ use crate::{
 pub use sequence::Sequence;
 pub use topic::TopicObserver;
 
-/// The name of the nodes and the subscribers of observers. Those of a topic are counted by it.
+/// The name of the nodes and the subscribers of observers. The observers of a topic are counted by
+/// this name.
 pub const NAME: &str = "observer";
-/// Time to wait for a place. The supervisor frees those of killed observers within a second or two.
+/// Time to wait for a place. The supervisor frees the places of killed observers within a second or
+/// two.
 const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
 /// The shortest time between two looks at a queue that was empty. On a machine whose processors are
 /// all busy each wake-up takes time from the stages; at hundreds of messages in a second that is
@@ -76,9 +78,6 @@ pub enum Next<'a, M: Message> {
 
 impl ObservedRun {
     /// Attaches to the run that writes its results to `out`.
-    ///
-    /// # Errors
-    /// There is no such run, or the transport fails.
     pub fn writing_to(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         let root = run::root_of(&absolute);
@@ -90,9 +89,6 @@ impl ObservedRun {
     }
 
     /// Attaches to the run with this root, the value of [`run::ENVIRONMENT`] in its processes.
-    ///
-    /// # Errors
-    /// There is no such run, or the transport fails.
     pub fn at(root: &Path) -> Result<Self, StageError> {
         transport::silence();
         let manifest = Manifest::read(root)?;
@@ -115,20 +111,14 @@ impl ObservedRun {
         &self.manifest
     }
 
-    /// Tells the supervisor, which has started this process as its recorder under this name, that
+    /// Informs the supervisor, which has started this process as its recorder under this name, that
     /// all topics are observed, and reports the waits for `signals` from here on.
-    ///
-    /// # Errors
-    /// A file of the run cannot be written.
     pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), StageError> {
         signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
         run::write(ready_file(&self.manifest.root), "")
     }
 
-    /// Tells the supervisor how many messages its recorder, this process, has missed so far.
-    ///
-    /// # Errors
-    /// A file of the run cannot be written.
+    /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
         let text = format!("{} {missed}", process::id());
         run::write(missed_file(&self.manifest.root), &text)
@@ -139,11 +129,7 @@ impl ObservedRun {
         rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
     }
 
-    /// Subscribes to a topic. The first messages are those of the publisher's history.
-    ///
-    /// # Errors
-    /// The run has no such topic, all places of the topic are taken, the run has ended, or the
-    /// transport fails.
+    /// Subscribes to a topic. The first messages come from the publisher's history.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
         let (subscriber, data) = self.attach(&Topic::of::<M>())?;
         Ok(Observer {
@@ -193,8 +179,8 @@ impl ObservedRun {
             return Err(no_place());
         }
         let subscriber = Subscriber::observe(&service, NAME)?;
-        // Another one may have come at the same time. The places of the stages must stay free for
-        // their restarts.
+        // Another observer may have come at the same time. The places of the stages must stay free
+        // for their restarts.
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
@@ -209,14 +195,14 @@ pub fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
 }
 
-/// Returns the file in the run's root to which the recorder writes its process and the messages
-/// that it has missed.
+/// Returns the file in the run's root where the recorder writes its process and the number of
+/// missed messages.
 fn missed_file(root: &Path) -> PathBuf {
     root.join("recorder.missed")
 }
 
-/// Returns the number of messages that the recorder, this process, has missed as it says itself;
-/// none unless it has told of some.
+/// Returns the number of missed messages that the recorder, this process, has reported; 0 without a
+/// report.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
     // The recorder before has left its own.
@@ -227,9 +213,6 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
 impl<M: Message> Observer<'_, M> {
     /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The
     /// message before it is released, and the next call releases this one.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
         self.current = None;
         let since = Instant::now();
@@ -252,11 +235,8 @@ impl<M: Message> Observer<'_, M> {
         }
     }
 
-    /// Returns, of the generations after `known` and before that of an item, the one that gave the
-    /// smallest number anew.
-    ///
-    /// # Errors
-    /// The file of the generations cannot be read.
+    /// Returns, among the generations after `known` and before the item's, the one that reused the
+    /// smallest number.
     pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
         generation::skipped(
             &self.run.manifest.out,
@@ -271,16 +251,15 @@ impl<M: Message> Observer<'_, M> {
         &self.data
     }
 
-    /// Counts as missed what is between `next` and the first item that is received: all before it
-    /// is known already, as from an observer that was there earlier, whose newest item had this
+    /// Counts as missed all items between `next` and the first received item: all before it is
+    /// known already, as from an observer that was there earlier, whose newest item had this
     /// generation.
     pub fn expect(&mut self, next: u64, generation: u32) {
         self.sequence.expected = Some(next);
         self.sequence.generation = generation;
     }
 
-    /// Returns the number of items missed since the observer attached, or since the item that it
-    /// was told to expect.
+    /// Returns the number of items missed since the observer attached, or since the expected item.
     pub fn missed(&self) -> u64 {
         self.sequence.missed
     }
@@ -305,9 +284,6 @@ impl<M: Message> Observer<'_, M> {
 
 /// Sleeps until one of several observers may have a message, a signal requests a stop (then true),
 /// or `limit` has passed, and on for as long as an observer rests between two looks.
-///
-/// # Errors
-/// The system refuses to wait.
 pub fn wait_for_any(
     signals: &Signals,
     listeners: &[&Listener],

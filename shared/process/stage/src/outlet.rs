@@ -55,7 +55,7 @@ impl Outlet {
             )));
         };
         content.copy_from_slice(&message.payload);
-        // What is behind it in memory has no meaning, and is not to differ from run to run.
+        // The memory behind it has no meaning, and must not differ from run to run.
         payload[bytes..].fill(0);
         header.copy_from_slice(&message.header);
         *loan.item() = item;

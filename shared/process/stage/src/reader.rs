@@ -16,15 +16,12 @@ use crate::{
 pub struct Received<M: Message> {
     sample: Sample,
     message: PhantomData<M>,
-    /// Time at which it was taken from the queue, `CLOCK_MONOTONIC`, ns.
+    /// Time of its removal from the queue, `CLOCK_MONOTONIC`, ns.
     pub received_ns: i64,
 }
 
 impl<M: Message> Received<M> {
     /// Checks a message that another process has sent.
-    ///
-    /// # Errors
-    /// A violation of its contract, with the sender's name.
     pub(crate) fn checked(sample: Sample, limits: &Limits) -> Result<Self, StageError> {
         let received = Self {
             sample,
@@ -37,7 +34,6 @@ impl<M: Message> Received<M> {
         }
     }
 
-    /// Returns the header.
     pub fn header(&self) -> &M::Header {
         bytemuck::from_bytes(self.sample.header())
     }
@@ -84,17 +80,11 @@ pub struct Port<M: Message> {
 
 impl<M: Message> Port<M> {
     /// Subscribes to the topic and notifies its publisher, which answers with its history.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(launch: &Launch) -> Result<Self, StageError> {
         Self::on(&launch.node, &launch.manifest)
     }
 
     /// Subscribes as a process that is no stage.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let port = Self::silent(node, manifest)?;
         notify_publisher(node, M::TOPIC)?;
@@ -102,9 +92,6 @@ impl<M: Message> Port<M> {
     }
 
     /// Subscribes without notifying the publisher, as no stage may.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let service = Service::open(node, &Topic::of::<M>())?;
         Ok(Self {
@@ -116,9 +103,6 @@ impl<M: Message> Port<M> {
     }
 
     /// Receives the next message and checks it; `None` if the queue is empty.
-    ///
-    /// # Errors
-    /// A message that violates its contract; a failure of the transport.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         let sample = self.subscriber.receive()?;
         sample
@@ -150,9 +134,6 @@ pub struct Reader<M: Message> {
 impl<M: Message> Reader<M> {
     /// Subscribes to the topic. `next` is the first item wanted; `None` takes whichever arrives
     /// first.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(launch: &Launch, next: Option<u64>) -> Result<Self, StageError> {
         Self::on(&launch.node, &launch.manifest, next)
     }
@@ -172,10 +153,6 @@ impl<M: Message> Reader<M> {
     }
 
     /// Returns the current item and receives it first if necessary. Duplicates are skipped.
-    ///
-    /// # Errors
-    /// A failure of the transport; a sequence gap, since queues are sized so that no item can be
-    /// lost.
     pub fn head(&mut self) -> Result<Option<&Received<M>>, StageError> {
         while self.head.is_none() {
             let Some(received) = self.port.receive()? else {
@@ -224,7 +201,7 @@ impl<M: Message> Reader<M> {
         self.previous = None;
     }
 
-    /// Takes the next item out of shared memory; `None` if there is none yet.
+    /// Takes the next item out of shared memory; `None` if nothing has arrived yet.
     pub(crate) fn take_bytes(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let message = self.head()?.map(Received::to_bytes);
         self.release();

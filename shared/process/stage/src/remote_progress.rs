@@ -12,10 +12,10 @@ use crate::{Manifest, StageError};
 /// The name of the file in the run's root: one more than `Item::published` of the newest item that
 /// was handed over, eight bytes, little-endian.
 const FILE: &str = "elsewhere";
-/// Written until the other machine has said where it goes on.
+/// Written until the other machine has reported where it continues.
 const UNKNOWN: u64 = u64::MAX;
 
-/// Writes what was handed over.
+/// Writes the progress of the hand-over.
 pub(crate) struct ProgressWriter {
     path: PathBuf,
     file: File,

@@ -1,8 +1,7 @@
 //! Reserves the shared memory of a publisher before its first message.
 //!
-//! The transport creates segments without memory, and a first write to a page for which there is
-//! none kills the process. So all pages are allocated when a publisher is created, and a shortage
-//! is an error.
+//! The transport creates segments without memory, and a first write to a page without memory kills
+//! the process. So all pages are allocated when a publisher is created, and a shortage is an error.
 
 use std::{fs::File, path::Path};
 

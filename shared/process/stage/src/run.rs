@@ -22,12 +22,12 @@ pub(crate) use root::{is_alive, roots};
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
 
-/// The environment variable of a process that stands by for another one. When it has loaded what it
-/// needs it creates the file `NAME.ready` in the run's root, and it opens its topics when its
-/// standard input ends.
+/// The environment variable of a process that stands by for its predecessor. After loading its data
+/// it creates the file `NAME.ready` in the run's root, and it opens its topics when its standard
+/// input ends.
 pub const STANDBY: &str = "GYRE_STANDBY";
 
-/// Returns the path of the file by which a process says that it stands by.
+/// Returns the path of the file that marks a process as ready on standby.
 pub fn ready_file(root: &Path, process: &str) -> PathBuf {
     root.join(format!("{process}.ready"))
 }
@@ -40,9 +40,6 @@ pub fn keep_files_private() {
 
 /// Lets this process get a signal when the process that has started it, `parent`, ends, even if
 /// that is killed. False: it has ended already.
-///
-/// # Errors
-/// The system refuses.
 pub fn end_with(parent: i32, signal: Signal) -> Result<bool, Errno> {
     set_parent_process_death_signal(Some(signal))?;
     Ok(getppid().map(Pid::as_raw_pid) == Some(parent))

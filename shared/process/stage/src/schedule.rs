@@ -1,6 +1,6 @@
 //! The schedule of the source: how many scans it has published, and when the next one is due. The
-//! supervisor reads it, since only the source can tell a gap in the recording from a source that
-//! hangs. And the origin of its pace, for the source after it: scans of a live run become due
+//! supervisor reads it, since only the source can distinguish a gap in the recording from a source
+//! that hangs. And the origin of its pace, for the source after it: scans of a live run become due
 //! whether a source is there or not.
 
 use std::{
@@ -20,7 +20,7 @@ const FILE: &str = "source.schedule";
 pub struct Schedule {
     /// One more than `Item::published` of the newest item; 0 before the first one.
     pub published: u64,
-    /// Time at which the next item is due if the window admits it, `CLOCK_MONOTONIC`, ns.
+    /// Time when the next item is due if the window admits it, `CLOCK_MONOTONIC`, ns.
     pub due_ns: i64,
 }
 
@@ -58,7 +58,6 @@ fn from_bytes(bytes: [u8; 16]) -> (i64, i64) {
     (first, second)
 }
 
-/// Writes the schedule.
 pub(crate) struct ScheduleWriter {
     path: PathBuf,
     file: File,
@@ -78,8 +77,8 @@ impl ScheduleWriter {
         Self::begin(manifest, 0)
     }
 
-    /// Goes on after the source before, which has died. What it published is numbered, but no pose
-    /// of it is owed: its scans may be lost.
+    /// Continues after a dead source. Its published scans are numbered, but no pose is due for
+    /// them: they may be lost.
     pub fn resume(manifest: &Manifest) -> Result<Self, StageError> {
         Self::begin(
             manifest,

@@ -16,10 +16,6 @@ pub struct Services {
 }
 
 impl Services {
-    /// Creates the services.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let (mut topics, mut events) = (Vec::new(), Vec::new());
         for topic in gyre_messages::topics(window) {
@@ -54,12 +50,12 @@ impl Services {
     }
 }
 
-/// Returns the name of the event with which a publisher wakes the readers of a topic.
+/// Returns the name of a publisher's event to wake the readers of a topic.
 pub(crate) fn data_event(topic: &str) -> String {
     format!("{topic}_data")
 }
 
-/// Returns the name of the event with which a new reader notifies the publisher of a topic.
+/// Returns the name of a new reader's event to notify the publisher of a topic.
 pub(crate) fn handshake_event(topic: &str) -> String {
     format!("{topic}_handshake")
 }

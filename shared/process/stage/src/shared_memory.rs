@@ -6,9 +6,6 @@ use rustix::fs::statvfs;
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Returns the bytes of shared memory that are free; `None` if they are not limited.
-///
-/// # Errors
-/// There is no shared memory.
 pub fn free_shared_memory() -> rustix::io::Result<Option<u64>> {
     let there = statvfs(SHARED_MEMORY)?;
     Ok((there.f_blocks > 0).then_some(there.f_bavail * there.f_frsize))

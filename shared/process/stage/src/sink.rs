@@ -27,30 +27,18 @@ pub trait Sink {
     }
     /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream
     /// had ended.
-    ///
-    /// # Errors
-    /// A journal that cannot be read.
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError>;
     /// Adds a motion, with its scan if the sink takes scans, journals its pose and returns it.
-    ///
-    /// # Errors
-    /// A journal that cannot be written.
     fn integrate(
         &mut self,
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
     ) -> Result<PoseHeader, StageError>;
     /// Journals the end of the stream.
-    ///
-    /// # Errors
-    /// A journal that cannot be written.
     fn end(&mut self, item: &Item) -> Result<(), StageError>;
 }
 
 /// Runs the sink on the motions of topic `M` until SIGTERM.
-///
-/// # Errors
-/// A failure of the transport, a sequence gap, or an error of the sink.
 pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     launch: &Launch,
     sink: &mut S,
@@ -101,10 +89,6 @@ pub fn notice(manifest: &Manifest) -> Option<String> {
     (!notice.is_empty()).then_some(notice)
 }
 
-/// Writes it.
-///
-/// # Errors
-/// The file in the run's root cannot be written.
 pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), StageError> {
     run::write(manifest.root.join(NOTICE), notice)
 }
@@ -221,7 +205,7 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
 struct Input<'a> {
     motion: MotionHeader,
     scan: Option<&'a Received<Masked>>,
-    /// Time at which the last of them was received, `CLOCK_MONOTONIC`, ns.
+    /// Time when the last of them was received, `CLOCK_MONOTONIC`, ns.
     received_ns: i64,
 }
 

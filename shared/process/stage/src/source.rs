@@ -32,7 +32,6 @@ pub use player::{Recorded, run_player};
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
-/// A source of scans.
 pub trait Source {
     /// The stage that it is, or replaces.
     const HOP: StageId;
@@ -40,9 +39,9 @@ pub trait Source {
     /// The scans to play, by their index in the recording.
     fn scans(&self) -> Range<usize>;
 
-    /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known
-    /// without reading the scan. Without it a restarted source in live mode cannot tell which scans
-    /// it has missed, and plays them late.
+    /// Time when scan `index` is complete on the sensor's clock, ns since 1970, if it is known
+    /// without reading the scan. Without it a restarted source in live mode cannot determine the
+    /// missed scans, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
 
     /// Time between two scans, ns.
@@ -58,9 +57,6 @@ pub trait Source {
     fn drops_missed_scans(&self) -> bool;
 
     /// Reads scan `index` into shared memory.
-    ///
-    /// # Errors
-    /// The reason why the scan cannot be used.
     fn read(
         &mut self,
         index: usize,
@@ -70,9 +66,6 @@ pub trait Source {
 }
 
 /// Runs the source until SIGTERM.
-///
-/// # Errors
-/// Input that cannot be read within `tolerance`, or a failure of the transport.
 pub fn run(
     launch: &Launch,
     source: &mut impl Source,
@@ -94,7 +87,7 @@ pub fn run(
         counters: StageCounters::default(),
         may_have_new_readers: false,
     };
-    // The system ends a wait up to 50 us late unless told. If it refuses, scans are that late.
+    // By default the system ends a wait up to 50 us late. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
     if let Some(position) = playback.wait_for_start()? {
         playback.play(position)?;

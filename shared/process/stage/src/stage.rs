@@ -14,33 +14,25 @@ use crate::{
 /// A stage: a function of its inputs. This crate does the waiting, joining, publishing and
 /// restarting.
 pub trait Stage {
-    /// The inputs.
     type Inputs: Inputs;
-    /// The published message.
     type Output: Message;
     /// The stage that it is, or replaces.
     const HOP: gyre_messages::StageId;
 
     /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned
     /// sample. The item of the header is filled in afterwards.
-    ///
-    /// # Errors
-    /// An error that ends the process.
     fn process(
         &mut self,
         input: <Self::Inputs as Inputs>::View<'_>,
         output: &mut Draft<Self::Output>,
     ) -> Result<(), StageError>;
 
-    /// Adds what it has found in the item that was processed last to its identity, which all later
-    /// messages carry.
+    /// Adds the findings from the last processed item to its identity, which all later messages
+    /// carry.
     fn identify(&self, _item: &mut Item) {}
 }
 
 /// Runs a stage until SIGTERM.
-///
-/// # Errors
-/// A failure of the transport, a sequence gap, or an error of the stage.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

@@ -53,9 +53,6 @@ pub fn silence() {
 
 impl Manifest {
     /// Returns the transport of the run.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn transport(&self) -> Result<Transport, StageError> {
         Transport::of(self)
     }
@@ -80,9 +77,6 @@ impl Transport {
 
     /// Makes the configuration in a file the global one, which the transport uses to clean up
     /// incomplete nodes.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
         let failed = |reason: String| StageError::Manifest {
             path: path.to_owned(),
@@ -100,9 +94,6 @@ impl Transport {
     }
 
     /// Joins the run. The transport's tools show the name.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn join(&self, name: &str) -> Result<Node, StageError> {
         let name = NodeName::new(name).map_err(|e| StageError::transport("name the node", e))?;
         let node = NodeBuilder::new()

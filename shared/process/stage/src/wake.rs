@@ -31,9 +31,6 @@ pub use crate::heartbeat::MAX_WAIT;
 
 /// Lets a write beyond the limit of file sizes (`ulimit -f`) fail with an error, which a sentence
 /// can report. Without this, a signal ends the process.
-///
-/// # Errors
-/// The handler cannot be installed.
 pub fn report_file_size_limit() -> Result<(), StageError> {
     signal_hook::flag::register(consts::SIGXFSZ, Arc::default())
         .map(drop)
@@ -42,9 +39,6 @@ pub fn report_file_size_limit() -> Result<(), StageError> {
 
 /// Lets SIGTERM, SIGINT and SIGHUP end the process from here on, also where [`Signals`] are
 /// installed: for work after which nobody waits for them.
-///
-/// # Errors
-/// The handlers cannot be installed.
 pub fn let_signals_end_the_process() -> Result<(), StageError> {
     let always = Arc::new(AtomicBool::new(true));
     for signal in STOP {
@@ -54,7 +48,7 @@ pub fn let_signals_end_the_process() -> Result<(), StageError> {
     Ok(())
 }
 
-/// The signals by which a process is asked to stop.
+/// The signals that request a stop.
 const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
 /// Signals as file descriptors to wait for.
@@ -91,9 +85,6 @@ impl Woken {
 impl Signals {
     /// Installs handlers: from here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead
     /// of ending it.
-    ///
-    /// # Errors
-    /// The system refuses a socket or a handler.
     pub fn install() -> Result<Self, StageError> {
         let failed =
             |error: std::io::Error| StageError::transport("install the signal handlers", error);
@@ -120,18 +111,12 @@ impl Signals {
     }
 
     /// Sleeps for `limit` or until a signal arrives; true on a request to stop.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
     pub fn sleep(&self, limit: Duration) -> Result<bool, StageError> {
         Ok(self.wait(&[], None, limit)?.stop)
     }
 
     /// Sleeps until one of these listeners is notified, a signal arrives or `limit` has passed;
     /// true on a request to stop.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
     pub fn sleep_until_any(
         &self,
         listeners: &[&Listener],
@@ -144,9 +129,6 @@ impl Signals {
     /// first. Consumes the notifications of `data`: read all queues afterwards. A notification of
     /// `handshake` is left for [`Writer::accept_readers`](crate::writer::Writer::accept_readers),
     /// to be called if [`Woken::may_have_new_readers`].
-    ///
-    /// # Errors
-    /// The system refuses to wait, or a notification cannot be read.
     pub fn wait(
         &self,
         data: &[&Listener],
@@ -158,9 +140,6 @@ impl Signals {
 
     /// As [`wait`](Self::wait) with any number of topics that are published, or until one of these
     /// connections has something to read, which it leaves there.
-    ///
-    /// # Errors
-    /// The system refuses to wait, or a notification cannot be read.
     pub fn wait_or_readable<'fd>(
         &self,
         data: &[&Listener],
@@ -181,7 +160,7 @@ impl Signals {
         let timed_out = sleep_until_ready(&mut polled, limit);
         self.beat(Activity::Works);
         let timed_out = timed_out?;
-        // Read only what is ready: each system call saved reduces latency.
+        // Read only ready descriptors: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));

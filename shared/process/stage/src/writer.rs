@@ -32,9 +32,6 @@ pub(crate) struct UntypedWriter {
 
 impl<M: Message> Writer<M> {
     /// Opens the topic for publishing.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         Ok(Self {
             untyped: UntypedWriter::open(node, manifest, &Topic::of::<M>())?,
@@ -43,9 +40,6 @@ impl<M: Message> Writer<M> {
     }
 
     /// Loans a message to fill in. The header is zero; the payload is uninitialised.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn loan(&self) -> Result<Draft<M>, StageError> {
         Ok(Draft {
             loan: self.untyped.loan()?,
@@ -54,17 +48,11 @@ impl<M: Message> Writer<M> {
     }
 
     /// Publishes a message without copying: readers receive its offset in shared memory.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         self.untyped.send(draft.loan, hop)
     }
 
     /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
         self.untyped.send_unchanged(draft.loan)
     }
@@ -73,17 +61,11 @@ impl<M: Message> Writer<M> {
     ///
     /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
     /// topics, so unconditional wake-ups would circulate for ever.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn accept_readers(&self) -> Result<(), StageError> {
         self.untyped.accept_readers()
     }
 
     /// The same for readers that have notified alone; returns whether there were any.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn answer_handshakes(&self) -> Result<bool, StageError> {
         self.untyped.answer_handshakes()
     }
@@ -165,7 +147,6 @@ impl UntypedWriter {
 }
 
 impl<M: Message> Draft<M> {
-    /// Returns the header.
     pub fn header(&mut self) -> &mut M::Header {
         bytemuck::from_bytes_mut(self.loan.header())
     }
@@ -175,7 +156,6 @@ impl<M: Message> Draft<M> {
         self.parts().1
     }
 
-    /// Returns header and payload.
     pub fn parts<T: bytemuck::Pod>(&mut self) -> (&mut M::Header, &mut [T]) {
         let (header, payload) = self.loan.parts();
         (

@@ -40,7 +40,7 @@ pub(crate) struct Child {
     deaths: VecDeque<Instant>,
     /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
-    /// The file in which the process says why it ended.
+    /// The file where the process writes why it ended.
     last_words: PathBuf,
     log: Log,
     /// The cause of the last death of this program.
@@ -111,14 +111,14 @@ impl Child {
         std::mem::swap(self, &mut successor);
     }
 
-    /// Goes on with another program from the next start on.
+    /// Uses a different program from the next start on.
     pub(crate) fn change(&mut self, plan: StagePlan) {
         let before = std::mem::replace(&mut self.plan, plan);
         self.deaths.clear();
         self.try_after(before);
     }
 
-    /// A program that is itself on trial is none to go back to.
+    /// A program that is itself on trial is not kept as a fallback.
     fn try_after(&mut self, before: StagePlan) {
         if !self.is_on_trial {
             self.before = Some(before);
@@ -126,19 +126,18 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Returns whether its program has taken the place of another one and has not worked on a pose
-    /// yet.
+    /// Returns whether its program has replaced another and has not worked on a pose yet.
     pub(crate) fn is_on_trial(&self) -> bool {
         self.is_on_trial
     }
 
-    /// The program that has taken the place of another one has worked on a pose.
+    /// The replacing program has worked on a pose.
     pub(crate) fn pass_trial(&mut self) {
         self.is_on_trial = false;
     }
 
-    /// Goes back to the program before a swap, from the next start on, or to `begun`, that of the
-    /// run's begin, if a file of the former has changed since. False if there is none.
+    /// Returns to the program before a swap, from the next start on; or to `begun`, the program of
+    /// the run's begin, if a file of the former has changed since. False without such a program.
     pub(crate) fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
@@ -195,7 +194,7 @@ impl Child {
         self.last_death.as_deref()
     }
 
-    /// Returns whether it has lived for longer than the time in which its deaths are counted.
+    /// Returns whether it has lived for longer than the window for counting its deaths.
     pub(crate) fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
     }
@@ -213,7 +212,7 @@ impl Child {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
             if self.status.is_some() {
-                // End its own children too, as those of a shell.
+                // End its own children too, such as a shell's.
                 self.signal(Signal::KILL);
             }
         }
@@ -226,9 +225,6 @@ impl Child {
     }
 
     /// Counts a death against the restart policy.
-    ///
-    /// # Errors
-    /// A permanent failure, or more deaths than the policy allows.
     pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Permanent { message });
@@ -252,7 +248,7 @@ impl Child {
         })
     }
 
-    /// Returns what it has failed by if it has ended, and a restart would repeat that.
+    /// Returns the failure of an ended process if a restart would repeat it.
     pub(crate) fn permanent_failure(&mut self) -> Option<String> {
         let status = self.status?;
         if status.code() != Some(PERMANENT) {
@@ -300,11 +296,8 @@ impl Child {
     }
 
     /// Waits for the end of a killed process.
-    ///
-    /// # Errors
-    /// It does not end.
     pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
-        // What was waited for in vain once is not waited for again.
+        // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
             self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
         }
@@ -335,7 +328,7 @@ impl Child {
     }
 }
 
-/// Returns the file in which a process says why it ended. One that stands by has its own: the other
+/// Returns the file where a process writes why it ended. One that stands by has its own: the other
 /// is in use.
 fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
     let stands_by = position == Position::Taken;

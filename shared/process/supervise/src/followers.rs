@@ -1,5 +1,5 @@
 //! The supervision of followers: they are restarted alone, and waited for at the end of the stream.
-//! Odometry goes on without one that dies again and again.
+//! Odometry continues without a follower that dies again and again.
 
 use std::time::{Duration, Instant};
 
@@ -56,12 +56,10 @@ pub(crate) struct Followers<'a> {
 /// The decision about a follower that the run waits for.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Patience {
-    /// It goes on.
     Wait,
     /// It has stayed where it is for too long: it is ended, and then started again as after a
     /// death.
     End(Stall),
-    /// That has not helped.
     GiveUp(Stall),
 }
 

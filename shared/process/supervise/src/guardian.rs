@@ -1,5 +1,5 @@
-//! A process that outlives a killed supervisor, to end what the stages have started and to remove
-//! what the run has in shared memory.
+//! A process that outlives a killed supervisor, to end the stages' child processes and to remove
+//! the run's shared memory.
 //!
 //! The system ends a stage together with its supervisor, but not the stage's own children, as a
 //! shell has them. Each stage leads a process group, and the guardian knows them all: it reads them
@@ -18,20 +18,19 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{processes::ProcessStat, run, wake::Signals};
+use gyre_stage::{run, wake::Signals};
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
 };
 
-use crate::{SuperviseError, end::ends_within};
+use crate::{ProcessStat, SuperviseError, end::ends_within};
 
 /// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// The running guardian.
 pub(crate) struct Guardian {
     process: Child,
     groups: Option<PipeWriter>,
@@ -75,7 +74,7 @@ impl Guardian {
         })
     }
 
-    /// Returns the pipe by which a process joins: see [`join`].
+    /// Returns the pipe that a process uses to join: see [`join`].
     pub fn pipe(&self) -> Option<RawFd> {
         self.groups.as_ref().map(AsRawFd::as_raw_fd)
     }
@@ -85,7 +84,7 @@ impl Guardian {
     }
 
     /// Takes a group from the care of the guardian: its processes are dead, and its number may be
-    /// given anew.
+    /// reused.
     pub fn forget(&self, group: u32) {
         if let Some(pipe) = &self.groups {
             send(pipe, -(group as RawPid));
@@ -109,7 +108,7 @@ fn send(pipe: &PipeWriter, message: RawPid) {
 }
 
 /// Puts the group that this process leads into the care of the guardian. Called between fork and
-/// exec, so that there is no moment in which a stage has children that nobody knows of.
+/// exec, so that a stage never has unknown children.
 pub(crate) fn join(pipe: RawFd) {
     // SAFETY: the supervisor keeps the pipe open while it starts a process, and the new process has
     // a copy of it.
@@ -135,7 +134,7 @@ pub fn guard(mut messages: impl Read, root: Option<&Path>) {
     }
     let mut killed = Vec::new();
     for (group, since) in groups {
-        // A number can be given anew. While a group has processes left, no other process gets its
+        // A number can be reused. While a group has processes left, no other process gets its
         // number.
         let is_another = started(group).is_some_and(|now| Some(now) != since);
         if let Some(group) = Pid::from_raw(group).filter(|_| !is_another) {
@@ -143,7 +142,7 @@ pub fn guard(mut messages: impl Read, root: Option<&Path>) {
             killed.push(group);
         }
     }
-    // What still lives could make files anew.
+    // Living processes could create files again.
     let deadline = Instant::now() + STOP_TIMEOUT;
     while killed.iter().any(|group| lives(*group)) && Instant::now() < deadline {
         thread::sleep(PERIOD);
@@ -160,7 +159,7 @@ fn lives(group: Pid) -> bool {
     ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)
 }
 
-/// Returns when a process was started, in the system's ticks; `None` if there is none.
+/// Returns when a process was started, in the system's ticks; `None` without such a process.
 fn started(process: RawPid) -> Option<u64> {
     ProcessStat::of(process as u32).map(|stat| stat.started)
 }

@@ -32,7 +32,7 @@ const TAIL: usize = 4096;
 /// The line before the frames of a panic.
 const BACKTRACE: &str = "\nstack backtrace:\n";
 
-/// The most that is taken from a pipe at once, bytes: as much as it holds.
+/// The most bytes taken from a pipe at once: its capacity.
 const BUFFER: usize = 1 << 16;
 /// Times in a row that so much is taken.
 const ROUNDS: usize = 64;
@@ -51,7 +51,7 @@ struct Collected {
     input: PipeReader,
     file: File,
     path: PathBuf,
-    /// The end of what was written since the last look.
+    /// The end of the output since the last look.
     tail: Vec<u8>,
     buffer: Box<[u8]>,
 }
@@ -69,7 +69,7 @@ impl Log {
             .mode(0o600)
             .open(path)?;
         let (input, output) = io::pipe()?;
-        // Whoever reads takes what is there, and does not wait with the lock.
+        // A reader takes the present output, and does not wait with the lock.
         ioctl_fionbio(&input, true)?;
         let readable = input.try_clone()?;
         let collected = Arc::new(Mutex::new(Collected {
@@ -87,7 +87,7 @@ impl Log {
         Ok(Self { output, collected })
     }
 
-    /// Returns the pipe to which the stage writes.
+    /// Returns the pipe for the stage's output.
     pub fn output(&self) -> &PipeWriter {
         &self.output
     }
@@ -102,13 +102,13 @@ impl Log {
 }
 
 impl Drop for Log {
-    /// Writes what is left of a stage that has ended.
+    /// Writes the remaining output of an ended stage.
     fn drop(&mut self) {
         lock(&self.collected).take();
     }
 }
 
-/// Writes what comes through a pipe, until all who can write to it have ended.
+/// Writes the data from a pipe, until all its writers have ended.
 fn collect(readable: &PipeReader, collected: &Mutex<Collected>) {
     loop {
         let mut readable = [PollFd::new(readable, PollFlags::IN)];
@@ -127,7 +127,7 @@ fn lock(collected: &Mutex<Collected>) -> MutexGuard<'_, Collected> {
 }
 
 impl Collected {
-    /// Writes what is in the pipe; returns whether more can come. A stage that floods is left for
+    /// Writes the data in the pipe; returns whether more can come. A stage that floods is left for
     /// others to look at after a while.
     fn take(&mut self) -> bool {
         for _ in 0..ROUNDS {
@@ -157,7 +157,7 @@ impl Collected {
         self.tail.drain(..old);
     }
 
-    /// Empties a file that was removed or renamed: it has no name by which it would be bounded.
+    /// Empties a file that was removed or renamed, since without its name it would not be bounded.
     fn bound_what_has_lost_its_name(&self) {
         if length(&self.file) > MAX {
             let _ = self.file.set_len(0);
@@ -165,8 +165,8 @@ impl Collected {
     }
 }
 
-/// Returns the last line that is not empty: what a program that has ended says of it. A panic's
-/// backtrace, and notes such as the one on how to get it, say nothing.
+/// Returns the last line that is not empty: an ended program's own reason. A panic's backtrace, and
+/// notes such as the one on how to get it, give no reason.
 pub fn last_line(text: &str) -> Option<&str> {
     let is_silent = |line: &str| line.trim().is_empty() || line.starts_with("note: ");
     let traced = text.rfind(BACKTRACE).filter(|begin| {
@@ -179,7 +179,7 @@ pub fn last_line(text: &str) -> Option<&str> {
     said.lines().rfind(|line| !is_silent(line))
 }
 
-/// The logs of a run to which processes append by themselves, and which are kept short.
+/// The logs of a run where processes append directly, and which are kept short.
 pub(crate) struct Logs {
     files: Vec<PathBuf>,
     due: Instant,
@@ -203,7 +203,6 @@ impl Logs {
         }
     }
 
-    /// Bounds all logs.
     pub fn bound(&self) {
         self.files.iter().for_each(|file| bound(file));
     }

@@ -1,4 +1,4 @@
-//! Frees the places of killed observers while the run goes on.
+//! Frees the places of killed observers during the run.
 
 use std::{
     fs,
@@ -9,13 +9,12 @@ use gyre_stage::Manifest;
 
 use crate::run::Run;
 
-/// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
 /// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage
-/// cleans up by itself.
+/// includes a cleanup.
 const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
 
-/// Looks for killed observers at a low rate, since nothing tells the supervisor of their death.
+/// Looks for killed observers at a low rate, since nothing informs the supervisor of their death.
 pub(crate) struct Sweep {
     due: Instant,
 }

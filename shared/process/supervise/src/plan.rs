@@ -44,11 +44,10 @@ pub struct StagePlan {
     /// The files that the command executes. After a change of one of them the stage is not started
     /// again.
     pub programs: Vec<Program>,
-    /// The directory in which it is started; `None`: the supervisor's.
+    /// The directory for starting it; `None`: the supervisor's.
     pub directory: Option<PathBuf>,
     /// The scheduling of the process.
     pub scheduling: Scheduling,
-    /// The restart policy.
     pub restart: RestartPolicy,
     /// True if it keeps running when the others are restarted: a live source, since a radar does
     /// not wait.
@@ -56,11 +55,11 @@ pub struct StagePlan {
     /// True if its death restarts the others too: it has state that its own restart does not
     /// recover.
     pub restarts_all: bool,
-    /// Time in which it may end by itself when the run is complete, unless a stop is requested.
+    /// Time for it to end unasked when the run is complete, unless a stop is requested.
     pub end_timeout: Duration,
 }
 
-/// Time for a process to end by itself before it is killed.
+/// Time for a process to end before it is killed.
 pub const END_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl StagePlan {
@@ -78,19 +77,14 @@ pub enum Event<'a> {
     Started {
         /// The name of the stage.
         stage: &'a str,
-        /// The process id.
         pid: u32,
     },
-    /// A new pose.
     Pose(&'a PoseHeader),
-    /// A process has died.
     Died {
         /// The name of the stage.
         stage: &'a str,
-        /// The cause.
         death: &'a Death,
     },
-    /// Processes were started again.
     Restarted {
         /// The only one, by its name; `None` if they are several: all stages, or all but a live
         /// source.
@@ -100,20 +94,17 @@ pub enum Event<'a> {
     Following {
         /// The name of the follower.
         follower: &'a str,
-        /// The position.
         progress: Progress,
     },
-    /// A follower is not restarted any more. Odometry goes on, and then the run ends with this
+    /// A follower is not restarted any more. Odometry continues, and then the run ends with this
     /// error.
     GaveUp {
         /// The name of the follower.
         follower: &'a str,
-        /// Why.
         error: &'a SuperviseError,
     },
     /// The end of the recording, or a notice of a stage about the run.
     Note {
-        /// A sentence.
         sentence: &'a str,
     },
     /// The run makes no progress: the stages that may be the cause are about to be restarted.
@@ -136,7 +127,6 @@ pub enum Event<'a> {
     WentBack {
         /// The name of the stage.
         stage: &'a str,
-        /// Why.
         reason: &'a str,
     },
 }
@@ -144,42 +134,30 @@ pub enum Event<'a> {
 /// A run that makes no progress, although no process has died.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Stall {
-    /// A published scan lacks its pose.
     #[error("no pose for {limit:?}")]
-    Pose {
-        /// The time limit.
-        limit: Duration,
-    },
+    Pose { limit: Duration },
     /// The source has not published a scan that is due, and all others have their poses.
     #[error("no scan from the source for {limit:?}, although one is due")]
-    Scan {
-        /// The time limit.
-        limit: Duration,
-    },
+    Scan { limit: Duration },
     /// The stream has ended, and a follower stays where it is in its logs.
     #[error("{follower} has made no progress for {limit:?} (run.stall_timeout_s)")]
     Follower {
         /// The name of the follower.
         follower: String,
-        /// The time limit.
         limit: Duration,
     },
-    /// A process neither works on nor waits for anything new.
     #[error(
         "{process} hangs: it has not come to its next wait for {limit:?} (run.stall_timeout_s)"
     )]
     Hang {
         /// The name of the stage or follower.
         process: String,
-        /// The time limit.
         limit: Duration,
     },
-    /// A stage has not opened its topics.
     #[error("{stage} has not opened its topics within {limit:?} (run.start_timeout_s)")]
     Start {
         /// The name of the stage.
         stage: String,
-        /// The time limit.
         limit: Duration,
     },
 }
@@ -187,22 +165,17 @@ pub enum Stall {
 /// An error that ends a run.
 #[derive(Debug, Error)]
 pub enum SuperviseError {
-    /// The supervisor's own access to the transport or to files.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A command cannot be started.
     #[error(
         "cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration"
     )]
     Spawn {
         /// The name of the stage.
         stage: String,
-        /// The command.
         command: String,
-        /// The system error.
         source: std::io::Error,
     },
-    /// The system refuses how a process is to be run.
     #[error(
         "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
     )]
@@ -211,10 +184,8 @@ pub enum SuperviseError {
         stage: String,
         /// The key and its value.
         what: String,
-        /// The system error.
         source: std::io::Error,
     },
-    /// The system does not let processors be kept awake.
     #[error(
         "cannot limit the time in which processors wake to {us} us (run.cpu_wake_us): /dev/cpu_dma_latency: {source}; give the user \
          of the run the right to write to it, or leave the key out"
@@ -222,20 +193,15 @@ pub enum SuperviseError {
     WakeLimit {
         /// The limit, us.
         us: u32,
-        /// The system error.
         source: std::io::Error,
     },
-    /// The guardian cannot be started.
     #[error(
         "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {source}"
     )]
     Guardian {
-        /// The command.
         command: String,
-        /// The system error.
         source: std::io::Error,
     },
-    /// A process does not end.
     #[error(
         "{stage} (process {pid}) does not end although it was killed: the kernel holds it, as it does while a disk or a network \
          folder does not answer"
@@ -243,17 +209,14 @@ pub enum SuperviseError {
     Undying {
         /// The name of the stage.
         stage: String,
-        /// The process.
         pid: u32,
     },
-    /// The program of a dead stage is another one by now.
     #[error(
         "{stage} has ended, and {path} has changed since it was started: another program may compute other motions; put back the one that the run was begun with"
     )]
     Replaced {
         /// The name of the stage.
         stage: String,
-        /// The file.
         path: PathBuf,
     },
     /// A stage failed in a way that a restart would repeat.
@@ -262,23 +225,20 @@ pub enum SuperviseError {
         /// The stage's own error message.
         message: String,
     },
-    /// A stage died more often than its policy allows.
     #[error(
         "{stage} died {times} times within {window_s} s, the last time by {cause}{output}; giving up"
     )]
     TooManyDeaths {
         /// The name of the stage.
         stage: String,
-        /// Number of deaths.
         times: usize,
-        /// The time in which they were counted, s.
+        /// The window for counting them, s.
         window_s: f64,
         /// The cause of the last death.
         cause: String,
         /// The last line of output, in parentheses.
         output: String,
     },
-    /// Restarts did not help against a stall.
     #[error(
         "{0}, three times in a row, although no stage died; log.jsonl and log/ show what the stages wait for"
     )]
@@ -289,7 +249,7 @@ pub enum SuperviseError {
 }
 
 impl SuperviseError {
-    /// Returns whether it says that one process cannot be kept alive.
+    /// Returns whether it means that one process cannot be kept alive.
     pub(crate) fn is_of_one_process(&self) -> bool {
         matches!(
             self,

@@ -1,4 +1,4 @@
-//! The poses of a run, which say how far it is.
+//! The poses of a run, which show its progress.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ pub(crate) struct Poses {
     seen: Option<Instant>,
 }
 
-/// A message that says something new.
+/// A message with new information.
 pub(crate) enum News {
     Pose(Received<Pose>),
     /// The end of the stream.

@@ -30,7 +30,7 @@ pub(crate) fn status_of(process: usize, processes: &Processes, run: &Run<'_>) ->
     }
 }
 
-/// Returns what a living process does.
+/// Returns the activity of a living process.
 pub(crate) fn activity(beat: Heartbeat) -> Activity {
     match beat.activity {
         _ if beat.is_silent() => Activity::Silent,

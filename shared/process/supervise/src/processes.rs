@@ -127,7 +127,7 @@ impl Processes {
         for child in on_trial {
             let has_passed = match child.stage() {
                 Some(hop) => recovery.has_worked(hop, pose),
-                // No pose says what a follower has done.
+                // Poses do not show the work of a follower.
                 None => child.has_outlived_its_window(),
             };
             if has_passed {
@@ -177,11 +177,8 @@ impl Processes {
         timeouts.max()
     }
 
-    /// Checks that no process has failed at its end, as one that cannot keep what it has written.
+    /// Checks that no process has failed at its end, for example because it cannot keep its output.
     /// Followers that were given up are left out: their end was reported when it came.
-    ///
-    /// # Errors
-    /// The failure of one that says so by its exit code.
     pub fn require_good_ends(&mut self, followers: &Followers<'_>) -> Result<(), SuperviseError> {
         let children = self.children.iter_mut().enumerate();
         let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));

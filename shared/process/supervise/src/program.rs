@@ -1,4 +1,4 @@
-//! The files that a command executes, which must not change while the run goes on.
+//! The files that a command executes, which must not change during the run.
 
 use std::{
     env, fs, io, iter,
@@ -36,9 +36,6 @@ impl State {
 
 impl Program {
     /// Returns the file at `path` as it is now.
-    ///
-    /// # Errors
-    /// A file that does not exist or may not be looked at.
     pub fn at(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),
@@ -46,8 +43,9 @@ impl Program {
         })
     }
 
-    /// Returns the files of a command as they are now; it is to be started in `directory`, or in
-    /// that of this process. A file that is missing is reported when the command is started.
+    /// Returns the files of a command in their present state; the command starts in `directory`, or
+    /// in the directory of this process. A file that is missing is reported when the command is
+    /// started.
     pub fn all_of(command: &[String], directory: Option<&Path>) -> Vec<Self> {
         let files = files_of(command, directory.unwrap_or(Path::new(""))).into_iter();
         files.filter_map(|path| Self::at(&path).ok()).collect()
@@ -64,7 +62,6 @@ impl Program {
         place.unwrap_or_else(|| PathBuf::from(program))
     }
 
-    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -1,5 +1,5 @@
 //! The recorder of a run: a process beside the stages that nothing depends on. It is restarted
-//! alone, and the run goes on without one that dies too often.
+//! alone, and the run continues without a recorder that dies too often.
 
 use std::time::{Duration, Instant};
 
@@ -172,7 +172,8 @@ impl Recorder {
         }
     }
 
-    /// Tells the recorder to write what it has received, and kills it if it has not after `limit`.
+    /// Asks the recorder to write its received messages, and kills it if it has not finished after
+    /// `limit`.
     fn end(&mut self, run: &mut Run<'_>, limit: Duration) -> Result<(), SuperviseError> {
         if self.has_ended || self.restart_at.is_some() {
             return Ok(());
@@ -193,7 +194,7 @@ impl Recorder {
             true => format!(
                 "the recorder had not written all after {limit:?}, and was killed: the end of the recording is missing"
             ),
-            // It says something, whether it has missed messages or not.
+            // A sentence follows, whether the recorder has missed messages or not.
             false if output.is_empty() => format!(
                 "the recorder died ({}): the end of the recording is missing",
                 self.child.death().cause

@@ -1,4 +1,4 @@
-//! Requests from other processes: what is asked at the control socket, and the answers.
+//! Requests from other processes: requests at the control socket, and the answers.
 
 use std::{env, path::Path, process};
 
@@ -22,9 +22,6 @@ const MAX_REQUESTS: usize = 8;
 
 /// Waits until `look`, which updates the status, returns something, before there are processes.
 /// `None`: the run is to end.
-///
-/// # Errors
-/// The socket cannot be opened in the run's root, or the system refuses to wait.
 pub fn wait<T>(
     root: &Path,
     signals: &Signals,
@@ -82,8 +79,8 @@ impl Supervisor<'_> {
         )));
     }
 
-    /// Ends a process and starts it again, which counts as a restart and not as a death. One that
-    /// could not be started again goes on.
+    /// Ends a process and starts it again, which counts as a restart and not as a death. A process
+    /// that could not be started again continues.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(name) else {
             let newest = self.poses.newest_seq();
@@ -113,8 +110,8 @@ impl Supervisor<'_> {
         self.restart(stages, clock::now_ns())
     }
 
-    /// Starts a program that is to take the place of another one. The client has its answer when
-    /// that has done so, and has worked on a first pose.
+    /// Starts a program that is to replace another. The client has its answer when that has done
+    /// so, and has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
@@ -183,7 +180,7 @@ impl Supervisor<'_> {
         self.run.guardian.forget(pid);
     }
 
-    /// Ends the program that is to be replaced, and lets the new one go on.
+    /// Ends the replaced program, and lets the new one continue.
     fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
         let process = standby.process;
         let stages = self.run.roles().restarted_with(process);
@@ -210,8 +207,8 @@ impl Supervisor<'_> {
         Ok(!self.poses.are_owed(self.run.manifest()))
     }
 
-    /// Says that a program has taken the place of another one, and lets the client wait until it
-    /// proves itself.
+    /// Reports that a program has replaced another, and lets the client wait until it proves
+    /// itself.
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
         self.swaps.has_swapped(child.plan(), self.poses.count());

@@ -1,4 +1,4 @@
-//! Restarts: what is done after a death or a stall, as the parts of the supervisor have decided.
+//! Restarts: the actions after a death or a stall, as the parts of the supervisor have decided.
 
 use std::time::{Duration, Instant};
 
@@ -22,8 +22,8 @@ impl Supervisor<'_> {
         self.restart(&restarted, died_ns)
     }
 
-    /// Goes back to the programs before those that are on trial while another stage fails: what
-    /// they sent may be the cause. Returns them.
+    /// Returns to the programs before those on trial while another stage fails: their messages may
+    /// be the cause. Returns them.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial() && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
@@ -67,7 +67,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Goes back to the program before a swap, from the next start on; false if there was none.
+    /// Returns to the program before a swap, from the next start on; false without such a program.
     fn go_back(&mut self, process: usize, reason: &str) -> bool {
         let begun = &self.run.plan.stages[process];
         let child = &mut self.processes[process];
@@ -99,8 +99,8 @@ impl Supervisor<'_> {
         self.run.say(Event::Restarted { only });
     }
 
-    /// Ends processes and starts others in their places; in one of them a process that stood by
-    /// goes on.
+    /// Ends processes and starts replacements; one of the replacements may be the process on
+    /// standby.
     pub(crate) fn replace(
         &mut self,
         processes: &[usize],
@@ -125,8 +125,8 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Starts a process again. If its program cannot be started, and has taken the place of another
-    /// one, that one is.
+    /// Starts a process again. If its program cannot be started and had replaced another, the
+    /// replaced program is started.
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
@@ -205,8 +205,8 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Says how far a follower is, and ends one that has stayed there for too long: it is then
-    /// started again as after a death.
+    /// Reports the progress of a follower, and ends one that has stayed there for too long: it is
+    /// then started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
         let progress = self.followers.progress_of(follower);

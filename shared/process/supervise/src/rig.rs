@@ -3,7 +3,7 @@
 //! output.
 //!
 //! Messages are values here ([`Recorded`]), since the tester is to send also what no stage may
-//! send. Readers check what they receive as the readers of a run do.
+//! send. Readers check received messages as the readers of a run do.
 
 mod recorded;
 
@@ -56,22 +56,13 @@ pub struct Process {
 /// The publisher of a topic, in place of the stage that it is of.
 pub trait Feed {
     /// Sends a message as it is, with its time stamps and its process id, and notifies its readers.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     fn send(&self, message: &Recorded) -> Result<(), StageError>;
 
     /// Sends the history to readers that have notified since the last call; returns whether there
     /// were any. A reader that does not notify is not connected to.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     fn answer_handshakes(&self) -> Result<bool, StageError>;
 
     /// Sends the history to all new readers, whether they have notified or not.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     fn connect(&self) -> Result<(), StageError>;
 
     /// Returns the number of subscribers of the topic.
@@ -84,9 +75,6 @@ pub trait Feed {
 /// A reader of a topic.
 pub trait Tap {
     /// Receives the next message; `None` if the queue is empty.
-    ///
-    /// # Errors
-    /// A message that breaks its contract; a failure of the transport.
     fn receive(&self) -> Result<Option<Recorded>, StageError>;
 
     /// Returns the listener that the publisher notifies.
@@ -94,12 +82,8 @@ pub trait Tap {
 }
 
 impl<'a> Rig<'a> {
-    /// Creates the root of a run with this manifest, the prefix and the root of which are set, and
-    /// this configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
-    ///
-    /// # Errors
-    /// Shared memory that cannot be used, a guardian that cannot be started, or a failure of the
-    /// transport.
+    /// Creates the root of a run with this manifest, whose prefix and root are set, and this
+    /// configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
     pub fn new(
         manifest: Manifest,
         configuration: &str,
@@ -112,9 +96,6 @@ impl<'a> Rig<'a> {
     }
 
     /// The same without any service.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
     pub fn without_services(
         mut manifest: Manifest,
         configuration: &str,
@@ -145,9 +126,6 @@ impl<'a> Rig<'a> {
 
     /// Starts a process with the environment and the process group that a stage of this name has.
     /// The output is appended to the log of the process.
-    ///
-    /// # Errors
-    /// A command that cannot be started, or not with this priority.
     pub fn start(
         &self,
         name: &str,
@@ -172,10 +150,7 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Removes what a killed process has left, as the supervisor does before it starts another one.
-    ///
-    /// # Errors
-    /// The transport's cleanup hangs.
+    /// Removes the remains of a killed process, as the supervisor does before it starts a new one.
     pub fn remove_dead(&self) -> Result<(), SuperviseError> {
         clean::remove_dead(&self.manifest, &self.transport, false)
     }
@@ -200,17 +175,11 @@ impl<'a> Rig<'a> {
     }
 
     /// Opens a topic of a stage for publishing.
-    ///
-    /// # Errors
-    /// A failure of the transport; no stage has such a topic.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         self.ports().feed(topic)
     }
 
     /// Subscribes to a topic of a stage, and asks for its history.
-    ///
-    /// # Errors
-    /// As [`feed`](Self::feed).
     pub fn tap(&self, topic: &str) -> Result<Box<dyn Tap>, StageError> {
         self.ports().tap(topic, Joining::Asks)
     }
@@ -224,9 +193,6 @@ impl<'a> Rig<'a> {
 
     /// Sleeps until one of these topics has a new reader, a connection has something to read, or
     /// `limit` has passed; true on a request to stop.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
     pub fn sleep_until_readable(
         &self,
         feeds: &[&dyn Feed],
@@ -242,21 +208,17 @@ impl<'a> Rig<'a> {
 
     /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to
     /// stop.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
     pub fn sleep(&self, taps: &[&dyn Tap], limit: Duration) -> Result<bool, StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
         self.signals.sleep_until_any(&listeners, limit)
     }
 }
 
-/// The way in which a reader joins.
+/// The manner of a reader's joining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joining {
     /// It notifies the publisher, and so receives its history.
     Asks,
-    /// It does not.
     Silently,
 }
 
@@ -295,17 +257,11 @@ impl<'a> Ports<'a> {
     }
 
     /// Opens a topic of a stage for publishing.
-    ///
-    /// # Errors
-    /// A failure of the transport; no stage has such a topic.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         of_topic!(topic, self.open_feed())
     }
 
     /// Subscribes to a topic of a stage.
-    ///
-    /// # Errors
-    /// As [`feed`](Self::feed).
     pub fn tap(&self, topic: &str, joining: Joining) -> Result<Box<dyn Tap>, StageError> {
         of_topic!(topic, self.open_tap(joining))
     }
@@ -334,7 +290,7 @@ fn no_such(topic: &str) -> StageError {
 }
 
 impl Process {
-    /// Returns the process id, which is also that of its group.
+    /// Returns the process id, which is also its group's.
     pub fn pid(&self) -> u32 {
         self.child.pid()
     }
@@ -354,9 +310,6 @@ impl Process {
     }
 
     /// Kills the group and waits for its end.
-    ///
-    /// # Errors
-    /// It does not end.
     pub fn kill(mut self) -> Result<(), SuperviseError> {
         self.child.kill();
         self.child.await_end()

@@ -32,12 +32,10 @@ impl<'a> Roles<'a> {
         self.0.iter().map(|plan| plan.name.as_str())
     }
 
-    /// Returns all stages.
     pub fn stages(self) -> impl Iterator<Item = usize> {
         (0..self.0.len()).filter(move |process| !self.follows(*process))
     }
 
-    /// Returns all followers.
     pub fn followers(self) -> impl Iterator<Item = usize> {
         (0..self.0.len()).filter(move |process| self.follows(*process))
     }

@@ -15,8 +15,7 @@ use crate::{
     start::Starter, wake_limit::WakeLimit,
 };
 
-/// The plan of a run, and what its processes need to be started, to be seen and to be cleaned up
-/// after.
+/// The plan of a run, and its processes' needs for start, observation and cleanup.
 pub(crate) struct Run<'a> {
     pub plan: &'a Plan,
     observe: &'a mut dyn FnMut(Event<'_>),
@@ -70,7 +69,6 @@ impl<'a> Run<'a> {
         Starter::new(&self.signals, &self.guardian)
     }
 
-    /// Reports an event.
     pub fn say(&mut self, event: Event<'_>) {
         (self.observe)(event);
     }

@@ -8,7 +8,7 @@ use rustix::{
     thread::{CpuSet, sched_setaffinity},
 };
 
-/// Returns what a new process can apply to itself between fork and exec.
+/// Returns the settings that a new process can apply to itself between fork and exec.
 pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
     let mut set = CpuSet::new();
     scheduling.cpus.iter().for_each(|cpu| set.set(*cpu));
@@ -53,9 +53,6 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Applies it to this process, and so to all that it will start. It only calls the system.
-    ///
-    /// # Errors
-    /// What could not be set, and why.
     pub fn apply(&self) -> Result<(), (Key, io::Error)> {
         if let Some(set) = &self.cpus {
             sched_setaffinity(None, set).map_err(|error| (Key::Cpus, error.into()))?;

@@ -44,8 +44,9 @@ impl ControlSocket {
         self.0.as_fd()
     }
 
-    /// Returns the next request, and where its answer goes. One that cannot be read is refused
-    /// here, and one whose client has gone is left: that has been told that nobody answers.
+    /// Returns the next request, and where its answer goes. An unreadable request is refused here,
+    /// and a request whose client has gone is dropped: the client has been informed that nobody
+    /// answers.
     pub fn next(&self) -> Option<(Request, Client)> {
         loop {
             let (stream, _) = self.0.accept().ok()?;

@@ -1,4 +1,5 @@
-//! Finds a run that makes no progress although no process has died, and says what to restart.
+//! Finds a run that makes no progress although no process has died, and decides which processes to
+//! restart.
 
 use std::time::{Duration, Instant};
 
@@ -28,7 +29,7 @@ pub(crate) struct Stalls<'a> {
 /// The result of a look at all processes.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Found {
-    /// Followers that hang: odometry goes on, with them or without.
+    /// Followers that hang: odometry continues, with them or without.
     pub followers: Vec<(usize, Stall)>,
     /// The stall of the stages.
     pub stall: Option<Stall>,
@@ -55,7 +56,7 @@ impl<'a> Stalls<'a> {
         self.watchdog.restarted();
     }
 
-    /// Looks for stalls. `hangs` says whether a process has not come to its next wait for longer
+    /// Looks for stalls. `hangs` returns whether a process has not come to its next wait for longer
     /// than a time, and `starting` is the stage that has been opening its topics for longest.
     pub fn look(
         &mut self,
@@ -80,7 +81,7 @@ impl<'a> Stalls<'a> {
         }
         let stall = self.watchdog.look(self.manifest, starting);
         let cause = match stall {
-            // What is owed has been waited for since some time after the process began to hang.
+            // The wait for the due message began some time after the process began to hang.
             Some(Stall::Pose { limit } | Stall::Scan { limit }) => {
                 self.hang(&hangs, limit / 2, limit)
             }
@@ -132,7 +133,7 @@ struct Looks {
     last: Instant,
     /// The last look at the heartbeats.
     at_heartbeats: Instant,
-    /// Until when old heartbeats say nothing.
+    /// Until then, old heartbeats are no evidence.
     resumes_until: Option<Instant>,
 }
 

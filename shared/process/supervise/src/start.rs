@@ -23,7 +23,6 @@ const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 /// The position in the pipeline of a process that is started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Position {
-    /// Nobody else has it.
     Free,
     /// Another process has it: the new one stands by until its standard input ends (see
     /// [`run::STANDBY`]).

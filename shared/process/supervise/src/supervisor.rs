@@ -1,5 +1,5 @@
-//! The loop of the supervisor. Its parts look at what has happened and decide; what they have
-//! decided is done in `restarts` and `requests`.
+//! The loop of the supervisor. Its parts look at events and decide; `restarts` and `requests` carry
+//! out their decisions.
 
 use std::collections::BTreeMap;
 
@@ -31,9 +31,6 @@ use crate::{
 ///
 /// Install the signals before acquiring the run's root. A signal in between would otherwise end the
 /// process without cleanup.
-///
-/// # Errors
-/// A stage that cannot be started or fails too often, a stall, or a failure of the transport.
 pub fn supervise(
     plan: &Plan,
     signals: Signals,

@@ -1,10 +1,10 @@
-//! Swaps: another program takes the place of a stage while the run goes on.
+//! Swaps: a new program replaces a stage's program during the run.
 //!
-//! The new program first stands by: it loads what it needs while the one before works. It takes
-//! over when no scan is in flight, if there is such a moment, and a restart of the stage is all
-//! that the others see. (Masking in live mode alone knows which scans it has admitted: if there are
-//! some without a pose, the others are restarted with it.) A program that fails before its first
-//! pose, or too often later, is given up, and the one before is started again.
+//! The new program first stands by: it loads its data while the one before works. It takes over
+//! when no scan is in flight, if there is such a moment, and a restart of the stage is all that the
+//! others see. (Masking in live mode alone knows which scans it has admitted: if there are some
+//! without a pose, the others are restarted with it.) A program that fails before its first pose,
+//! or too often later, is given up, and the one before is started again.
 
 mod trial;
 
@@ -25,8 +25,8 @@ use crate::{
 };
 use trial::Trial;
 
-/// Time for which a moment without a scan in flight is waited for. At the highest rate there is
-/// none.
+/// Time for which a moment without a scan in flight is waited for. At the highest rate there is no
+/// such moment.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 const ENDED: &str = "the stream has ended";
@@ -34,7 +34,7 @@ const ENDED: &str = "the stream has ended";
 /// The swaps of a run: at most one at a time.
 #[derive(Default)]
 pub(crate) struct Swaps {
-    /// The program that stands by to take the place of another one.
+    /// The program that stands by to replace another.
     standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
@@ -100,7 +100,8 @@ impl Swaps {
         Ok(())
     }
 
-    /// Looks after the program that stands by. `is_in_flight` says whether a scan lacks its pose.
+    /// Looks after the program that stands by. `is_in_flight` returns whether a scan lacks its
+    /// pose.
     pub fn step(&mut self, run: &Run<'_>, is_in_flight: impl FnOnce() -> bool) -> Step {
         let Some(mut standby) = self.standby.take() else {
             return Step::Wait;
@@ -155,7 +156,7 @@ impl Swaps {
         self.standby.as_ref().map(|standby| standby.child.pid())
     }
 
-    /// Records that a program has taken the place of another one.
+    /// Records that a program has replaced another.
     pub fn has_swapped(&mut self, plan: &StagePlan, after_poses: u64) {
         self.done.push(Swapped {
             stage: plan.name.clone(),
@@ -164,8 +165,8 @@ impl Swaps {
         });
     }
 
-    /// Goes back to the program before a swap, or to `begun`, that of the run's begin, from the
-    /// next start on; false if there is none.
+    /// Returns to the program before a swap, or to `begun`, the program of the run's begin, from
+    /// the next start on; false without such a program.
     pub fn go_back(
         &mut self,
         process: usize,
@@ -209,8 +210,8 @@ impl Standby {
         (self.child, self.client)
     }
 
-    /// Tells the client why it cannot take over, and ends the program. Returns the process that it
-    /// was.
+    /// Informs the client why the program cannot take over, and ends the program. Returns the
+    /// process that it was.
     pub fn give_up(self, reason: &str) -> u32 {
         let name = self.child.name();
         let command = self.child.plan().command.join(" ");

@@ -8,8 +8,7 @@ use std::{fs::File, io::Write};
 
 use crate::SuperviseError;
 
-/// The system keeps to what a process has written here until that process closes it (Linux, "PM
-/// QoS").
+/// The system applies the value written here until the process closes the file (Linux, "PM QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
 /// A limit that is in effect until it is dropped.
@@ -20,9 +19,6 @@ pub(crate) struct WakeLimit {
 impl WakeLimit {
     /// Lets no processor sleep so deeply that it takes longer than `us` microseconds to wake; with
     /// 0 none sleeps.
-    ///
-    /// # Errors
-    /// The system refuses it.
     pub fn hold(us: u32) -> Result<Self, SuperviseError> {
         let set = || {
             let mut file = File::options().write(true).open(FILE)?;

@@ -82,8 +82,8 @@ impl Watchdog {
         self.stalls_in_a_row
     }
 
-    /// Returns what is owed now. A source without a schedule always owes a scan, and so the run a
-    /// pose.
+    /// Returns the message that is due now. A source without a schedule always owes a scan, and so
+    /// the run a pose.
     fn owed_by(&self, source: Option<Schedule>, limit: Duration) -> Option<Stall> {
         let Some(source) = source else {
             return Some(Stall::Pose { limit });

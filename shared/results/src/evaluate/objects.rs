@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-/// The strongest echo of an object from which on it is seen, counts: the threshold of the masks.
+/// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
 
 /// A row of a run's `objects.csv`.
@@ -57,11 +57,9 @@ struct PoseRow {
     yaw_rad: f64,
 }
 
-/// Compares the `objects.csv` of a run with that of the simulated recording in `truth`, in the
-/// frame of the sensor: by the run's own poses, and the recording's `ground_truth.tum`.
-///
-/// # Errors
-/// A file that cannot be read, or whose times are not those of the other.
+/// Compares the `objects.csv` of a run with the `objects.csv` of the simulated recording in
+/// `truth`, in the frame of the sensor: by the run's own poses, and the recording's
+/// `ground_truth.tum`.
 pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     let poses: Vec<PoseRow> = rows(&run.join("poses.csv"))?;
     let (folder, truth) = files(truth);

@@ -24,8 +24,7 @@ const COLUMNS: [&str; 11] = [
     "cov_yawyaw",
 ];
 
-/// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that
-/// is not said.
+/// The fields of [`COLUMNS`], and the correlation of the errors of motions: zero if it is missing.
 #[derive(Deserialize)]
 struct MotionRow {
     stamp_ns: i64,
@@ -45,9 +44,6 @@ struct MotionRow {
 
 /// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
 /// has none.
-///
-/// # Errors
-/// A file that cannot be read, a missing column, a row that is damaged.
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
     let file = gyre_storage::open(path)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
@@ -58,7 +54,7 @@ pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
     parse(lines).map_err(|reason| format!("{}: {reason}", path.display()).into())
 }
 
-/// The longest line, bytes: several times that of a row in full.
+/// The longest line, bytes: several times the length of a full row.
 const LONGEST_LINE: usize = 1 << 16;
 
 /// Refuses a line without end, which would be kept in memory.

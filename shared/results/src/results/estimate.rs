@@ -49,9 +49,6 @@ impl Estimate {
     }
 
     /// Checks that no pose was let go.
-    ///
-    /// # Errors
-    /// One sentence.
     pub fn require_all(&self) -> Result<(), Failure> {
         match self.poses <= MOST {
             true => Ok(()),

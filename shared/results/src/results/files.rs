@@ -24,9 +24,6 @@ impl<'a> Files<'a> {
     }
 
     /// Creates a file that is written piece by piece.
-    ///
-    /// # Errors
-    /// A file that cannot be created.
     pub fn create(&self, name: &str) -> Result<Draft, Failure> {
         Ok(Draft::create(&self.out.join(name))?)
     }
@@ -37,9 +34,6 @@ impl<'a> Files<'a> {
     }
 
     /// Writes a file and adds it.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn add(&mut self, name: &str, content: impl AsRef<[u8]>) -> Result<(), Failure> {
         let mut draft = self.create(name)?;
         draft.append(content)?;
@@ -48,9 +42,6 @@ impl<'a> Files<'a> {
     }
 
     /// Makes all of them the results. Any other result is of fewer poses, and is removed.
-    ///
-    /// # Errors
-    /// A file that cannot take its place or be removed.
     pub fn commit(self) -> Result<(), Failure> {
         let made = |path: &Path| self.drafts.iter().any(|draft| draft.path() == path);
         // The truth of a simulation is written when the run begins.

@@ -11,9 +11,7 @@ use crate::out::Out;
 
 /// Returns the picture as a PNG file; `None`, with a note, where the drive is too long for one.
 ///
-/// # Errors
-/// Keyframes that cannot be read, and a full disk: what does not fit into memory lies in a file
-/// without a name in `out`.
+/// Data that does not fit into memory is stored in an unnamed file in `out`.
 pub fn map_png(
     configuration: &Configuration,
     out: &Out,

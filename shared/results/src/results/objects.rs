@@ -13,10 +13,7 @@ const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_
     cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy\n";
 
 /// Returns `objects.csv`: a row for each object and scan, in fixed decimals, so that equal objects
-/// give equal bytes. Of a run that goes on, the objects so far.
-///
-/// # Errors
-/// A log that cannot be read.
+/// give equal bytes. For an unfinished run, the objects so far.
 pub fn csv(out: &Path) -> Result<String, Failure> {
     let mut logged = RecordReader::<LoggedObjects>::open(out)?;
     let mut rows = HEADER.to_owned();

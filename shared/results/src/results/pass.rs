@@ -1,9 +1,9 @@
 //! One pass over the journal.
 
 use gyre_datasets::ground_truth::write_tum_pose;
-use gyre_latency::LatencyMeter;
 use gyre_messages::{Item, PoseHeader, flag};
 use gyre_radar::Trajectory;
+use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
 use gyre_terminal::Failure;
 
@@ -32,7 +32,8 @@ pub struct Read {
     pub end: Option<Item>,
     /// The poses of all sessions.
     pub counter: Counter,
-    /// Those of this session: earlier ones may be of another boot, whose clock is another one.
+    /// The latencies of this session only: earlier sessions may belong to a different boot with a
+    /// different clock.
     pub latency: LatencyMeter,
     /// The path to be drawn.
     pub sketch: Sketch,
@@ -45,11 +46,8 @@ pub struct Read {
 }
 
 impl<'a, 'b> Pass<'a, 'b> {
-    /// Starts with a journal of which `resumed` poses are of earlier sessions. Poses are kept if
+    /// Starts with a journal that contains `resumed` poses of earlier sessions. Poses are kept if
     /// they are to be judged.
-    ///
-    /// # Errors
-    /// A file that cannot be created.
     pub fn new(
         files: &'a mut Files<'b>,
         resumed: usize,
@@ -75,9 +73,6 @@ impl<'a, 'b> Pass<'a, 'b> {
     }
 
     /// Adds the next record.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
         if pose.item.is(flag::END) {
             self.read.end = Some(pose.item);
@@ -123,7 +118,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         Ok(tum.append(line)?)
     }
 
-    /// Returns what was read.
+    /// Returns the collected data.
     pub fn finish(self) -> Read {
         self.files.push(self.odometry);
         self.files.push(self.tum);

@@ -1,4 +1,4 @@
-//! The path to be drawn, of which a picture needs only so many poses.
+//! The path to be drawn, reduced to the number of poses that a picture needs.
 
 use gyre_evaluation::{PlotError, plot::path_svg};
 use gyre_geometry::Pose;
@@ -62,9 +62,6 @@ impl Sketch {
     }
 
     /// Returns the plot as an SVG document; `None` without poses.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn svg(&self) -> Result<Option<String>, PlotError> {
         let drawn = self.path();
         match drawn.is_empty() {

@@ -54,10 +54,7 @@ fn require_no_poses(out: &Out) -> Result<(), Failure> {
 
 impl Slam {
     /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before
-    /// the first keyframe. Of a run that goes on, the loops so far are left out.
-    ///
-    /// # Errors
-    /// Keyframes that cannot be read or used.
+    /// the first keyframe. For an unfinished run, the loops so far are left out.
     pub fn read(configuration: &Configuration, out: &Out) -> Result<Option<Self>, Failure> {
         let Some(kind) = configuration.slam.kind.estimator() else {
             return Ok(None);
@@ -77,7 +74,7 @@ impl Slam {
         .with_fixes(Fixes::new(fixes.unwrap_or_default(), config));
         let mut known = Vec::new();
         for index in 0..keyframes.len() {
-            // With its points: the checksum is that of the whole record.
+            // With its points, because the checksum covers the whole record.
             let keyframe = keyframes.read(index)?;
             estimator.push(&keyframe)?;
             known.push((keyframe.scan, keyframe.stamp_ns));
@@ -119,9 +116,6 @@ impl Slam {
     }
 
     /// Returns `loops.csv`: a row for each verified candidate.
-    ///
-    /// # Errors
-    /// None: writing to a string does not fail.
     pub fn loops_csv(&self) -> Result<String, fmt::Error> {
         let mut rows = HEADER.to_owned();
         let judged = self.estimator.loops();
@@ -164,9 +158,6 @@ impl Slam {
     }
 
     /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
     pub fn gnss(&mut self) -> Result<Option<GnssSummary>, Failure> {
         let Some(log) = &self.gnss else {
             return Ok(None);
@@ -175,11 +166,8 @@ impl Slam {
         Ok(Some(GnssSummary::of(log, &mut self.estimator)?))
     }
 
-    /// Returns the errors of the corrected keyframes with what their covariances say, against the
-    /// first one that has a true pose.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
+    /// Returns the errors of the corrected keyframes with their standard deviations, relative to
+    /// the first keyframe with a true pose.
     pub fn bands(&mut self, truth: &Trajectory) -> Result<Bands, Failure> {
         self.estimator.scale_covariances()?;
         let step = self.keyframes.len().div_ceil(DRAWN);
@@ -216,7 +204,6 @@ impl Slam {
         }))
     }
 
-    /// Returns the counts.
     pub fn summary(&self) -> SlamSummary {
         let loops_used = self.used().count();
         let verified = |query: &Query| {

@@ -14,10 +14,9 @@ const MAX_UNREADABLE_SHARE: f64 = 0.2;
 /// Largest share of motions without a firm match in a run that succeeds.
 const MAX_UNSURE_SHARE: f64 = 0.2;
 
-/// Motions from which the radar's period is taken, so that longer runs take no more memory.
+/// The radar's period is estimated from this many motions, so that longer runs take no more memory.
 const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
-/// Counts of scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Scans that the source published.
@@ -30,7 +29,7 @@ pub struct Counts {
     pub unreadable: u64,
     /// Scans that the recording lacks, by the gaps in its times.
     pub missing: u64,
-    /// Places where the chain of motions starts anew, after the first.
+    /// Places where the chain of motions restarts, after the first.
     pub breaks: u64,
     /// `None`: no scan has lost azimuths, or they were not looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,7 +43,7 @@ pub struct Counts {
     /// `None`: no wheels have measured a distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheels: Option<WheelCounts>,
-    /// `None`: no two scans in a row have said their velocity by Doppler.
+    /// `None`: no two scans in a row have measured their velocity by Doppler.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler: Option<DopplerCounts>,
 }
@@ -84,13 +83,13 @@ impl LostCounts {
 /// The contribution of a gyro.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GyroCounts {
-    /// Motions whose turn it measured; the others are those of the radar alone.
+    /// Motions whose turn it measured; the radar alone measured the others.
     pub motions: u64,
-    /// Those whose turn differed by more than noise from that of the radar, and was weighed all the
-    /// same, since single matches can err by so much.
+    /// Motions whose turn differed from the radar's turn by more than noise, and was weighed all
+    /// the same, since single matches can err by so much.
     pub doubted: u64,
-    /// Those in which it was not used: the turn was another one than that of the radar, or had last
-    /// been.
+    /// Motions that did not use the gyro: its turn differed from the radar's turn, or had differed
+    /// recently.
     pub refused: u64,
     /// Bias after the last of them, rad/s.
     pub bias_radps: f64,
@@ -121,12 +120,12 @@ impl GyroCounts {
 pub struct WheelCounts {
     /// Motions whose distance they measured.
     pub motions: u64,
-    /// Those in which they slipped: the distance was another one than that of the radar, or had
-    /// last been.
+    /// Motions with slip: the distance differed from the radar's distance, or had differed
+    /// recently.
     pub slips: u64,
     /// Those that were predicted by them, since the radar saw nothing that matched.
     pub predicted: u64,
-    /// True distance over that of the wheels, after the last of them.
+    /// True distance over distance of the wheels, after the last of them.
     pub scale: f64,
     /// Standard deviation of that scale.
     pub scale_sigma: f64,
@@ -152,10 +151,9 @@ impl WheelCounts {
 /// The contribution of the velocity by Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DopplerCounts {
-    /// Motions between scans that both said it.
+    /// Motions between two scans that both measured it.
     pub motions: u64,
-    /// Those in which it was not used: it was another one than that of the radar's matches, or had
-    /// last been.
+    /// Motions that did not use it: it differed from the radar's matches, or had differed recently.
     pub refused: u64,
     /// Those that were predicted by it, since nothing matched.
     pub predicted: u64,
@@ -185,7 +183,6 @@ impl DopplerCounts {
 /// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
-    /// Refined.
     pub refined: u64,
     /// Accepted with a wider covariance because of little support.
     pub weak: u64,
@@ -197,10 +194,10 @@ pub struct MotionCounts {
     pub unsure: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
-    /// Those of a standing vehicle.
+    /// Motions of a standing vehicle.
     pub stationary: u64,
-    /// Those along walls without structure, where the radar does not see how far the vehicle has
-    /// driven: wheels or Doppler say it, or the motions before.
+    /// Motions along walls without structure, where the radar does not observe the distance:
+    /// wheels, Doppler or earlier motions determine it.
     pub along_walls: u64,
 }
 
@@ -320,7 +317,7 @@ impl Counter {
 /// Counts the scans that a recording lacks, by the intervals between those that it has.
 #[derive(Debug, Default)]
 struct Gaps {
-    /// The first motions, which tell the period.
+    /// The first motions, which determine the period.
     first: Vec<Motion>,
     period_ns: Option<i64>,
     missing: u64,
@@ -361,7 +358,7 @@ impl Gaps {
         }
     }
 
-    /// Takes the median of the first motions' periods, and counts what is missing among them.
+    /// Takes the median of the first motions' periods, and counts missing scans among them.
     fn settle(&mut self) {
         let period = |motion: &Motion| motion.interval_ns / motion.turns as i64;
         let mut periods: Vec<i64> = self.first.iter().map(period).collect();

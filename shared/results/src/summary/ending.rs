@@ -6,23 +6,25 @@ use gyre_run::{Ending, Rate};
 use gyre_terminal::{WIDTH, wrap};
 
 use super::Summary;
+use crate::figures::all_unusual;
 
 /// Columns of the names of the lines.
 const NAMES: usize = 12;
 
-/// The way a run has gone, of which all results tell parts.
+/// The text at the end of a run.
 impl Summary {
     /// Returns a line each for the path, its accuracy, the latency, unusual events and the files;
     /// with SLAM one for the loops, and one for a problem.
     pub fn in_brief(&self) -> String {
         let problem = self.problem.as_ref().map(ToString::to_string);
+        let unusual = all_unusual(&self.figures());
         let lines = [
             (self.ending_word(), Some(self.path())),
             ("problem", problem),
             ("accuracy", Some(self.accuracy())),
             ("loops", self.loops()),
             ("latency", Some(self.pace())),
-            ("unusual", Some(self.unusual())),
+            ("unusual", Some(unusual)),
             ("look at", Some(self.places())),
         ];
         let lines = lines.into_iter().filter_map(|(name, text)| {
@@ -34,9 +36,14 @@ impl Summary {
     }
 
     fn loops(&self) -> Option<String> {
-        let text = self.slam.as_ref()?.to_string();
-        let first = text.lines().next()?.trim_start_matches("slam");
-        Some(first.trim().to_owned() + "; trajectory_slam.tum, map.png")
+        let slam = self.slam.as_ref()?;
+        let ate = slam.ate_m.map_or(String::new(), |ate_m| {
+            format!("; ATE after correction {ate_m:.3} m rmse")
+        });
+        Some(format!(
+            "{} loops between {} keyframes, {} rejected{ate}; trajectory_slam.tum, map.png",
+            slam.loops_used, slam.keyframes, slam.loops_rejected
+        ))
     }
 
     fn ending_word(&self) -> &'static str {
@@ -102,43 +109,6 @@ impl Summary {
         )
     }
 
-    fn unusual(&self) -> String {
-        let c = &self.counts;
-        let motions = c.motions.unwrap_or_default();
-        let lost = c.lost.unwrap_or_default();
-        let restarts = self.restarts.values().sum::<usize>() as u64;
-        let counts = [
-            (c.dropped, "scans dropped"),
-            (c.unreadable, "scans unreadable"),
-            (c.missing, "scans missing in the recording"),
-            (c.breaks, "breaks, after which the path starts anew"),
-            (lost.azimuths, "azimuths lost, which are put back"),
-            (lost.unplaced, "of them at unknown places"),
-            (motions.weak, "motions weak"),
-            (
-                motions.predicted,
-                "motions predicted, since nothing matched",
-            ),
-            (
-                c.gyro.map_or(0, |gyro| gyro.doubted + gyro.refused),
-                "turns of the gyro doubted or refused",
-            ),
-            (
-                c.wheels.map_or(0, |wheels| wheels.slips),
-                "distances of slipping wheels",
-            ),
-            (restarts, "restarts of processes"),
-        ];
-        let counts = counts.iter().filter(|(count, _)| *count > 0);
-        let counts: Vec<String> = counts
-            .map(|(count, what)| format!("{count} {what}"))
-            .collect();
-        match counts.is_empty() {
-            true => "nothing".to_owned(),
-            false => counts.join(", "),
-        }
-    }
-
     fn places(&self) -> String {
         let again = match self.ending {
             Some(Ending::Complete) => "",
@@ -161,7 +131,7 @@ mod tests {
     use std::time::Duration;
 
     use gyre_configuration::Configuration;
-    use gyre_latency::{Latency, Percentiles};
+    use gyre_run::latency::{Latency, Percentiles};
 
     use super::*;
     use crate::summary::{
@@ -288,7 +258,7 @@ look at     gyre report out/radiate --open; all figures:
         assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));
         assert!(problem(0, 0, 201, 1.0, 0.0).contains("201 of their 400"));
         assert!(problem(0, 0, 0, 1.05, 0.0).contains("`gyro.scale` or"));
-        assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.late_s=-0.30"));
+        assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.delay_s=-0.30"));
         assert!(problem(0, 0, 0, 0.0, 0.0).contains("gyro.kind is set, but none of the 465"));
     }
 

@@ -1,7 +1,5 @@
 //! The part of the summary about GNSS.
 
-use std::fmt;
-
 use gyre_datasets::{GnssFaults, GnssLog};
 use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
@@ -20,15 +18,15 @@ pub struct GnssSummary {
     /// The topic in the bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     topic: Option<String>,
-    /// Fixes of the log without those of its faults.
+    /// Fixes of the log without the faulty ones.
     fixes: usize,
     /// The faults of the log.
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
     outside: usize,
-    /// Fixes beside another one that is nearer to the same keyframe.
+    /// Fixes that are farther from their keyframe than a different fix.
     thinned: usize,
-    /// Fixes too far from a keyframe for odometry to say where the vehicle was.
+    /// Fixes too far from a keyframe for odometry to predict the place of the vehicle.
     far: usize,
     /// Fixes that the corrected trajectory is made with.
     used: usize,
@@ -37,10 +35,10 @@ pub struct GnssSummary {
     /// Why none are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
-    /// Time by which the fixes are late by their speeds, beyond `gnss.late_s`, s; `None` where the
-    /// drive does not tell it.
+    /// Delay of the fixes, estimated from their speeds, beyond `gnss.delay_s`, s; `None` if the
+    /// drive does not determine it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    late_s: Option<f64>,
+    delay_s: Option<f64>,
     /// Root mean square of the distances of the used fixes from the corrected trajectory, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     residual_rms_m: Option<f64>,
@@ -84,10 +82,7 @@ impl EastNorth {
 }
 
 impl GnssSummary {
-    /// Takes what the last solution says of the fixes of a log.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
+    /// Summarises the fixes of a log by the last solution.
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
@@ -121,7 +116,7 @@ impl GnssSummary {
                 .unusable
                 .clone()
                 .or_else(|| fixes.refusal().map(ToString::to_string)),
-            late_s: fixes.clock().map(|clock| clock.late_s),
+            delay_s: fixes.clock().map(|clock| clock.delay_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
             east_north: frame.as_ref().map(EastNorth::of),
             plane: log.plane.map(|plane| {
@@ -137,30 +132,5 @@ impl GnssSummary {
     pub fn refusal(&self) -> Option<(&str, bool)> {
         let refusal = self.refusal.as_deref()?;
         Some((refusal, refusal != FixRefusal::Undetermined.to_string()))
-    }
-}
-
-impl fmt::Display for GnssSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { used, refused, .. } = self;
-        write!(f, "gnss          {used} fixes used, {refused} refused")?;
-        if let Some(rms_m) = self.residual_rms_m {
-            write!(f, "; they lie {rms_m:.2} m rms from the trajectory")?;
-        }
-        for (count, what) in self.faults.named() {
-            write!(f, "\n              {count} entries of the log {what}")?;
-        }
-        if let (Some(origin), Some(east_north)) = (&self.origin, &self.east_north) {
-            let across_m = east_north.east_sigma_m.max(east_north.north_sigma_m);
-            write!(
-                f,
-                "\n              begins at {:.6}, {:.6}, heading {:.2} deg; +- {across_m:.2} m, {:.2} deg",
-                origin.latitude_deg,
-                origin.longitude_deg,
-                origin.heading_deg,
-                east_north.yaw_sigma_deg
-            )?;
-        }
-        Ok(())
     }
 }

@@ -73,7 +73,7 @@ pub fn problem(
         let doubts = it.doubted + it.refused;
         let is_wrong = too_many(doubts, it.motions, MAX_DOUBTED_SHARE)
             || !config.gyro.allows_scale(it.scale);
-        let cause = cause("gyro", config.gyro.late_s, it.delay_s, is_wrong)?;
+        let cause = cause("gyro", config.gyro.delay_s, it.delay_s, is_wrong)?;
         Some(format!(
             "the gyro contradicts the radar: {doubts} of its {} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out",
             it.motions
@@ -82,7 +82,7 @@ pub fn problem(
     let by_wheels = || {
         let it = counts.wheels?;
         let is_wrong = too_many(it.slips, it.motions, MAX_SLIPPING_SHARE);
-        let cause = cause("wheels", config.wheels.late_s, it.delay_s, is_wrong)?;
+        let cause = cause("wheels", config.wheels.delay_s, it.delay_s, is_wrong)?;
         Some(format!(
             "the wheels contradict the radar: {} of their {} distances are not those that it sees; {cause}, and wheels.kind=none leaves them out",
             it.slips, it.motions
@@ -96,16 +96,16 @@ pub fn problem(
 }
 
 /// Returns which key of a section is wrong: by a delay, if that is certain.
-fn cause(section: &str, late_s: f64, delay_s: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+fn cause(section: &str, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
     let up = if section == "gyro" { "`gyro.up`, " } else { "" };
-    match delay_s {
+    match measured {
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
-            "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.late_s={:.2}, which `gyre calibrate` finds too",
-            late_s + delay_s
+            "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
+            set_s + delay_s
         )),
         _ => is_wrong.then(|| {
             format!(
-                "{up}`{section}.late_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
+                "{up}`{section}.delay_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
             )
         }),
     }

@@ -1,6 +1,5 @@
 //! The errors of a gyro: noise, bias, scale, misalignment, steps.
 
-use gyre_samples::UpAxis;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -16,15 +15,14 @@ const LOG_STEPS: [f64; 2] = [1e9, 1e6];
 /// A gyro with the errors of one drive.
 pub(super) struct Errors {
     rng: ChaCha8Rng,
-    up: UpAxis,
     step_radps: f64,
     /// Standard deviation of one sample, rad/s.
     noise_radps: f64,
-    /// From the vehicle's axes to those of the gyro as it is mounted, up still up.
+    /// From the vehicle's axes to the axes of the gyro as mounted, up still up.
     mounting: UnitQuaternion<f64>,
     scale: Vector3<f64>,
     bias_radps: Vector3<f64>,
-    /// Share of the drift that is left a sample later, and standard deviation of what is new.
+    /// Share of the drift that remains a sample later, and standard deviation of the added drift.
     kept: f64,
     new_drift_radps: f64,
     drift_radps: Vector3<f64>,
@@ -32,14 +30,13 @@ pub(super) struct Errors {
 
 impl Errors {
     /// Draws the errors of a drive.
-    pub fn new(figures: &GyroFigures, up: UpAxis, seed: u64) -> Self {
+    pub fn new(figures: &GyroFigures, seed: u64) -> Self {
         let mut rng = Stream::GyroErrors.generator(seed);
         let bias = normal(&mut rng);
         let scale = normal(&mut rng);
         let askew = normal(&mut rng);
         let kept = (-1.0 / (figures.rate_hz * figures.bias_drift_s)).exp();
         Self {
-            up,
             step_radps: figures.step_radps,
             noise_radps: figures.noise_rad_per_sqrt_s * figures.rate_hz.sqrt(),
             mounting: UnitQuaternion::from_scaled_axis(askew * figures.misalignment_rad),
@@ -67,12 +64,12 @@ impl Errors {
         let accelerations = self.mounting * motion.acceleration_mps2;
         let mut values = [0.0; 6];
         for (kind, vector) in [rates, accelerations].into_iter().enumerate() {
-            let logged = in_axes(self.up, vector).map(|value| {
+            let logged = vector.map(|value| {
                 let steps = (value * LOG_STEPS[kind]).round();
                 // Adding zero turns a negative one into a positive one.
                 steps / LOG_STEPS[kind] + 0.0
             });
-            values[3 * kind..][..3].copy_from_slice(&logged);
+            values[3 * kind..][..3].copy_from_slice(logged.as_slice());
         }
         values
     }
@@ -81,18 +78,4 @@ impl Errors {
 /// Three numbers of a standard normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.sample(StandardNormal))
-}
-
-/// The components along the axes of a gyro of which `up` points up, of a vector along forward, left
-/// and up.
-pub(super) fn in_axes(up: UpAxis, vector: Vector3<f64>) -> [f64; 3] {
-    let [x, y, z]: [f64; 3] = vector.into();
-    match up {
-        UpAxis::Z => [x, y, z],
-        UpAxis::MinusZ => [x, -y, -z],
-        UpAxis::X => [z, x, y],
-        UpAxis::MinusX => [-z, y, x],
-        UpAxis::Y => [y, z, x],
-        UpAxis::MinusY => [x, -z, y],
-    }
 }

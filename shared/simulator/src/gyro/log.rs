@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 
 use gyre_samples::{Sample, SampleKind};
 
-use super::attitude::Vehicle;
+use super::attitude::MeanMotion;
 use super::clock::Clock;
 use super::config::SimulatedGyroConfig;
 use super::errors::Errors;
+use crate::path::Path;
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
-/// The first row of the file: that of the log of RADIATE.
+/// The first row of the file, as in the log of RADIATE.
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
@@ -20,15 +21,15 @@ const HEADER: &str =
 pub(crate) fn samples(
     config: &SimulatedGyroConfig,
     seed: u64,
-    vehicle: &Vehicle<'_>,
+    path: &dyn Path,
     (start_ns, end_s): (i64, f64),
 ) -> Option<Vec<Sample>> {
-    let figures = config.figures()?;
-    let mut errors = Errors::new(&figures, config.up, seed);
+    let figures = config.profile.figures()?;
+    let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);
     let sample = |index: usize| {
         let span_s = [index, index + 1].map(|index| index as f64 / figures.rate_hz);
-        let values = errors.measure(&vehicle.mean_motion(span_s));
+        let values = errors.measure(&MeanMotion::along(path, span_s));
         let stamp_ns = clock.stamp_ns(0.5 * (span_s[0] + span_s[1]))?;
         Some(Sample {
             stamp_ns: start_ns + stamp_ns,
@@ -41,7 +42,7 @@ pub(crate) fn samples(
     Some((0..count).filter_map(sample).collect())
 }
 
-/// The samples as CSV: the numbers read from it are those of the samples.
+/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

@@ -1,14 +1,13 @@
 //! Gyros that can be bought, by the figures of their data sheets.
 //!
-//! "Typical" figures are taken for standard deviations. No data sheet says how a bias wanders with
-//! the temperature inside a vehicle: a wander of 1 K over 10 minutes is assumed, and how well a
-//! gyro is mounted is assumed where the sheet has no figure.
+//! "Typical" figures are taken for standard deviations. No data sheet states how a bias changes
+//! with the temperature inside a vehicle: a change of 1 K over 10 minutes is assumed, and the
+//! accuracy of the mounting is assumed where the sheet has no figure.
 
 use serde::{Deserialize, Serialize};
 
 /// Degrees in radians.
 const DEG: f64 = std::f64::consts::PI / 180.0;
-/// An hour in seconds.
 const HOUR_S: f64 = 3600.0;
 /// Time over which the temperature wanders, s.
 const TEMPERATURE_S: f64 = 600.0;
@@ -32,7 +31,7 @@ pub enum GyroProfile {
     Adis16495,
 }
 
-/// The figures of a gyro; standard deviations where not said otherwise.
+/// The figures of a gyro; standard deviations unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroFigures {
     /// Samples a second.
@@ -71,7 +70,7 @@ impl GyroProfile {
             Self::Exact => Some(exact),
             // After BST-BMI088-DS001: output noise 0.014 °/s/√Hz, zero-rate offset ±1 °/s and
             // ±0.015 °/s/K, cross axis ±1 %, sensitivity ±1 %, 16 bits for ±125 °/s. It has no bias
-            // instability; Bosch's flyer says below 2 °/h.
+            // instability; Bosch's flyer states below 2 °/h.
             Self::Bmi088 => Some(GyroFigures {
                 noise_rad_per_sqrt_s: 0.014 * DEG,
                 bias_sigma_radps: DEG,
@@ -82,8 +81,7 @@ impl GyroProfile {
                 ..exact
             }),
             // After DocID031239: rate noise 5 mdps/√Hz, bias instability 3 °/h, zero-rate level ±1
-            // °/s and ±0.005 °/s/K, 4.37 mdps a step at ±125 °/s. Sensitivity as that of the
-            // BMI088.
+            // °/s and ±0.005 °/s/K, 4.37 mdps a step at ±125 °/s. Sensitivity as for the BMI088.
             Self::Asm330lhh => Some(GyroFigures {
                 rate_hz: 104.0,
                 noise_rad_per_sqrt_s: 0.005 * DEG,
@@ -95,8 +93,8 @@ impl GyroProfile {
                 ..exact
             }),
             // After its data sheet: angle random walk 0.09 °/√h, in-run bias stability 0.8 °/h,
-            // bias repeatability 0.07 °/s, sensitivity 0.2 %, axes to the frame 0.25°, 32 bits of
-            // which the upper ones are 0.00625 °/s. The bias is compensated for temperature.
+            // bias repeatability 0.07 °/s, sensitivity 0.2 %, axes to the frame 0.25°, 32 bits
+            // whose upper half has steps of 0.00625 °/s. The bias is compensated for temperature.
             Self::Adis16495 => Some(GyroFigures {
                 rate_hz: 200.0,
                 noise_rad_per_sqrt_s: 0.09 * DEG / HOUR_S.sqrt(),

@@ -4,7 +4,7 @@
 
 use std::f64::consts::PI;
 
-use super::side_file::SideFile;
+use super::SideFile;
 use crate::simulator::Simulator;
 
 pub(crate) const FOLDER: &str = "radar";

@@ -2,7 +2,7 @@
 //! azimuth; `radar.timestamps`; and `gt/radar_odometry.csv`: the pose of each scan but the first in
 //! the frame of the one before, at the middle of the sweeps, x forward, **y right, yaw clockwise**.
 
-use super::side_file::SideFile;
+use super::SideFile;
 use crate::simulator::Simulator;
 
 pub(crate) const FOLDER: &str = "radar";

@@ -1,6 +1,6 @@
 //! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, without metadata;
-//! and `Navtech_Polar.txt` with the times at which the host received the scans. RADIATE has no
-//! exact ground truth, so it is written as `ground_truth.tum`.
+//! and `Navtech_Polar.txt` with the receive times of the scans on the host. RADIATE has no exact
+//! ground truth, so it is written as `ground_truth.tum`.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,6 @@ use rand::Rng;
 
 use crate::error::SimulatorError;
 use crate::output::HostStamps;
-use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::stream::Stream;
 
@@ -24,9 +23,6 @@ const STALL_S: std::ops::Range<f64> = 0.3..1.4;
 const CATCH_UP_US: i64 = 5_000;
 
 /// Checks that readers of this format can handle the radar.
-///
-/// # Errors
-/// [`SimulatorError::Config`] if they cannot.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
     match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
@@ -48,7 +44,7 @@ const LOST: f64 = 0.0015;
 
 /// Returns the azimuths of a scan that the host loses, in order.
 pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
-    if index == 0 || !is_on(simulator.config().effects.lost_azimuths) {
+    if index == 0 || !simulator.config().sensor.lost_azimuths {
         return Vec::new();
     }
     let mut rng = Stream::Lost(index as u64).generator(seed);
@@ -57,7 +53,7 @@ pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> V
 }
 
 /// Loses azimuths of an image, range downwards: the columns behind each move up by one, and the
-/// last ones are those of the image before.
+/// last ones keep the content of the image before.
 pub(crate) fn lose(pixels: &mut [u8], before: &[u8], columns: usize, azimuths: &[usize]) {
     let measured = columns - azimuths.len();
     let rows = pixels.chunks_exact_mut(columns);

@@ -63,11 +63,6 @@ impl BlockLoop {
         }
     }
 
-    /// Time of one lap, seconds.
-    pub fn lap_s(&self) -> f64 {
-        self.lap_s
-    }
-
     /// Length of one lap, metres.
     pub fn lap_m(&self) -> f64 {
         self.lap_m
@@ -75,6 +70,10 @@ impl BlockLoop {
 }
 
 impl Path for BlockLoop {
+    fn lap_s(&self) -> Option<f64> {
+        Some(self.lap_s)
+    }
+
     fn pose(&self, time_s: f64) -> Pose {
         let time = time_s.rem_euclid(self.lap_s);
         let next = self
@@ -107,7 +106,7 @@ fn bend_heading(share: f64) -> f64 {
     FRAC_PI_2 * gained / area
 }
 
-/// Distance from a corner at which its bend begins, metres.
+/// Distance from a corner to the start of its bend, metres.
 fn bend_footprint() -> f64 {
     let count = (BEND_M / STEP_M) as usize;
     let step = BEND_M / count as f64;

@@ -17,6 +17,11 @@ pub trait Path: Send + Sync {
         f64::INFINITY
     }
 
+    /// Duration of a lap, seconds, of a path that repeats itself.
+    fn lap_s(&self) -> Option<f64> {
+        None
+    }
+
     /// Velocity of the sensor in the world at a time, metres a second.
     fn velocity(&self, time_s: f64) -> Vector2<f64> {
         let half_s = 0.5e-3;

@@ -26,39 +26,12 @@ pub struct Excerpt {
     pub rate_hz: f64,
 }
 
-impl Default for Excerpt {
-    fn default() -> Self {
-        Self {
-            from_s: 0.0,
-            for_s: f64::INFINITY,
-            rate_hz: 4.0,
-        }
-    }
-}
-
 /// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a
 /// path along it, in the frame of the excerpt's first pose.
 ///
 /// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
 /// is noise of the poses.
-///
-/// # Errors
-/// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the
-/// excerpt has fewer than two poses, jumps, pauses for hours, or does not move forward.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
-    read_in(path, excerpt, None)
-}
-
-/// As [`read`], in the frame `world` of the file's poses; without one in that of the excerpt's
-/// first pose.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_in(
-    path: &Path,
-    excerpt: Excerpt,
-    world: Option<Pose>,
-) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
     let error = |reason: String| SimulatorError::Drive {
         path: path.to_owned(),
@@ -77,7 +50,7 @@ pub fn read_in(
         )));
     };
     check_steps(&within).map_err(error)?;
-    let into_world = world.unwrap_or(*origin).inverse();
+    let into_world = origin.inverse();
     let moved: Vec<_> = within
         .iter()
         .map(|(s, pose)| (s - start_s, into_world * pose))
@@ -98,22 +71,6 @@ fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
         Some(text) => parse_trajectory(text, path),
         None => read_trajectory(path),
     }
-}
-
-/// The first pose of a file.
-///
-/// # Errors
-/// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if it is
-/// empty.
-pub fn first_pose(path: &Path) -> Result<Pose, SimulatorError> {
-    let read = trajectory(path)?;
-    read.poses
-        .first()
-        .copied()
-        .ok_or_else(|| SimulatorError::Drive {
-            path: path.to_owned(),
-            reason: "it has no poses".to_owned(),
-        })
 }
 
 /// Rejects jumps, and pauses of hours.

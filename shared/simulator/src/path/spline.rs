@@ -61,7 +61,7 @@ impl<const D: usize> UniformSpline<D> {
         curve
     }
 
-    /// The coordinates at a place; outside the samples those of the nearer end.
+    /// The coordinates at a place; outside the samples the coordinates of the nearer end.
     pub fn value(&self, at: f64) -> [f64; D] {
         let (first, share) = self.locate(at);
         self.combine(first, &basis(share))
@@ -73,7 +73,7 @@ impl<const D: usize> UniformSpline<D> {
         self.combine(first, &basis_slope(share).map(|b| b / self.step))
     }
 
-    /// The interval in which a place lies, and the share of it before the place.
+    /// The interval that contains a place, and the share of it before the place.
     fn locate(&self, at: f64) -> (usize, f64) {
         let intervals = self.coefficients.len() - (SUPPORT - 1);
         let along = ((at - self.start) / self.step).clamp(0.0, intervals as f64);

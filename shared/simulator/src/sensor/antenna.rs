@@ -31,15 +31,11 @@ pub struct Antenna {
 
 impl Antenna {
     /// An antenna whose two-way power falls to one half at `width_rad / 2` from its axis.
-    pub fn new(width_rad: f64, side_lobes: bool) -> Self {
+    pub fn new(width_rad: f64) -> Self {
         let power = |widths: f64| {
             // One half at half a width.
             let main_db = -12.04 * widths * widths;
-            let db = if side_lobes {
-                main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db))
-            } else {
-                main_db
-            };
+            let db = main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db));
             10f64.powf(db / 10.0)
         };
         let entries = (REACH * STEPS) as usize + 1;
@@ -73,18 +69,16 @@ mod tests {
 
     #[test]
     fn power_falls_monotonically_and_to_one_half_at_half_the_width() {
-        for side_lobes in [false, true] {
-            let antenna = Antenna::new(0.03, side_lobes);
-            assert_eq!(antenna.gain(0.0), 1.0);
-            assert!((antenna.gain(-0.015).powi(2) - 0.5).abs() < 0.01);
-            assert!(antenna.amplitudes.windows(2).all(|pair| pair[1] <= pair[0]));
-            assert_eq!(antenna.gain(3.0), 0.0);
-        }
+        let antenna = Antenna::new(0.03);
+        assert_eq!(antenna.gain(0.0), 1.0);
+        assert!((antenna.gain(-0.015).powi(2) - 0.5).abs() < 0.01);
+        assert!(antenna.amplitudes.windows(2).all(|pair| pair[1] <= pair[0]));
+        assert_eq!(antenna.gain(3.0), 0.0);
     }
 
     #[test]
     fn gain_is_below_the_minimum_beyond_the_reach() {
-        let antenna = Antenna::new(0.03, true);
+        let antenna = Antenna::new(0.03);
         for min_gain in [0.5, 0.05, 0.005, 0.0001] {
             let reach = antenna.reach_rad(min_gain);
             assert!(antenna.gain(reach - 1e-3) >= min_gain || reach > 0.23);

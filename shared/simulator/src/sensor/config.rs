@@ -6,19 +6,37 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 use crate::profile::{Profile, Receiver, Sampling};
 
-/// The radar, and its deviations from its profile.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Encoder counts from one azimuth to the next of a radar with another number of azimuths than its
+/// profile.
+const ENCODER_STEP: u16 = 14;
+
+/// The radar: a known radar, and the values that differ from its profile.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
-    /// The seed of noise, speckle, the drops of rain, the vehicle's pitch and roll, and the echoes
-    /// that are fixed to the radar. Default: the seed of the simulation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seed: Option<u64>,
     /// The radar. Default: `cts350x-oxford`.
     pub profile: Profile,
-    /// Time of one sweep, seconds. Default: the profile's.
+    /// The seed of noise, speckle and losses, for another drive through the same streets. Default:
+    /// the seed of the simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Range bins of an azimuth. Default: the profile's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bins: Option<usize>,
+    /// Length of a bin, metres. Default: the profile's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bin_m: Option<f64>,
+    /// Azimuths of a turn. Default: the profile's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuths: Option<usize>,
+    /// Time of one turn, seconds. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
+    /// Two-way half-power width of the beam, degrees. Default: the profile's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beam_deg: Option<f64>,
+    /// Excess of the receiver's noise over its profile, decibels.
+    pub noise_db: f64,
     /// Metres to add to a bin's range. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f64>,
@@ -26,71 +44,69 @@ pub struct SensorConfig {
     /// effect. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f64>,
-    /// Decibels by which it is more sensitive than its profile, -20 to 20. Default: 0, or as
-    /// `simulation.realism` says.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gain_db: Option<f64>,
     /// Eccentricity of the encoder's disc, radians: the beam points to `azimuth + eccentricity *
-    /// cos(azimuth)`, which `dataset.azimuth_eccentricity_rad` corrects. Default: 0.
+    /// cos(azimuth)`, which `dataset.azimuth_eccentricity_rad` corrects.
     pub azimuth_eccentricity_rad: f64,
-}
-
-impl Default for SensorConfig {
-    fn default() -> Self {
-        Self {
-            seed: None,
-            profile: Profile::default(),
-            period_s: None,
-            range_offset_m: None,
-            doppler_s: None,
-            gain_db: None,
-            azimuth_eccentricity_rad: 0.0,
-        }
-    }
+    /// True if the host loses azimuths, as the one of RADIATE did: the columns behind them move up,
+    /// and the last ones are of the scan before. Only for `output.format = "radiate"`.
+    pub lost_azimuths: bool,
 }
 
 impl SensorConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
-        require_within(
-            "sensor.range_offset_m",
-            self.range_offset_m.unwrap_or(0.0),
-            -5.0,
-            5.0,
-        )?;
-        require_within("sensor.gain_db", self.gain_db.unwrap_or(0.0), -20.0, 20.0)?;
-        require_within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
-        require_within(
-            "sensor.azimuth_eccentricity_rad",
-            self.azimuth_eccentricity_rad,
-            -0.05,
-            0.05,
-        )
+        let sampling = self.sampling();
+        let (bins, azimuths) = (sampling.bins as f64, sampling.azimuths as f64);
+        for (key, value, min, max) in [
+            ("sensor.bins", bins, 16.0, 20_000.0),
+            ("sensor.bin_m", sampling.range_resolution_m, 0.01, 5.0),
+            ("sensor.azimuths", azimuths, 60.0, 4000.0),
+            ("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0),
+            ("sensor.beam_deg", self.beam_deg.unwrap_or(1.0), 0.1, 20.0),
+            ("sensor.noise_db", self.noise_db, -20.0, 40.0),
+            ("sensor.range_offset_m", sampling.range_offset_m, -5.0, 5.0),
+            ("sensor.doppler_s", sampling.doppler_s, -0.5, 0.5),
+            (
+                "sensor.azimuth_eccentricity_rad",
+                self.azimuth_eccentricity_rad,
+                -0.05,
+                0.05,
+            ),
+        ] {
+            require_within(key, value, min, max)?;
+        }
+        Ok(())
     }
 
     /// The transmitter and receiver of the radar.
     pub fn receiver(&self) -> Receiver {
         let kind = self.profile.receiver();
         Receiver {
-            constant: kind.constant * 10f64.powf(self.gain_db.unwrap_or(0.0) / 10.0),
+            beam_rad: self.beam_deg.map_or(kind.beam_rad, f64::to_radians),
+            // A bin is at most as long as the radar's resolution.
+            cell_m: kind.cell_m.max(self.bin_m.unwrap_or(0.0)),
             ..kind
         }
     }
 
     /// The sampling of the radar.
     pub fn sampling(&self) -> Sampling {
-        let kind = self.profile.sampling();
+        let mut sampling = self.profile.sampling();
+        if let Some(azimuths) = self.azimuths.filter(|count| *count != sampling.azimuths) {
+            sampling.azimuths = azimuths;
+            sampling.encoder_step = ENCODER_STEP;
+            sampling.encoder_counts = (azimuths as u16).saturating_mul(ENCODER_STEP);
+            sampling.encoder_first = 0;
+        }
         Sampling {
-            period_us: self
-                .period_s
-                .map_or(kind.period_us, |period_s| (period_s * 1e6).round() as i64),
-            range_offset_m: self.range_offset_m.unwrap_or(kind.range_offset_m),
-            doppler_s: self.doppler_s.unwrap_or(kind.doppler_s),
-            ..kind
+            bins: self.bins.unwrap_or(sampling.bins),
+            range_resolution_m: self.bin_m.unwrap_or(sampling.range_resolution_m),
+            period_us: self.period_s.map_or(sampling.period_us, |period_s| {
+                (period_s * 1e6).round() as i64
+            }),
+            range_offset_m: self.range_offset_m.unwrap_or(sampling.range_offset_m),
+            doppler_s: self.doppler_s.unwrap_or(sampling.doppler_s),
+            ..sampling
         }
     }
 }

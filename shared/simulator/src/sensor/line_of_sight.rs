@@ -13,17 +13,15 @@ const RAYS: usize = 4;
 /// against walls.
 const CLEARANCE_M: f32 = 0.1;
 
-/// Maximum distance of a moving body's parts from its origin, metres: half a long bus.
-const MOVER_M: f64 = 10.0;
+/// Maximum distance of a moving body's parts from its origin, metres: more than half a car.
+const MOVER_M: f64 = 3.0;
 
 /// A wall along a ray.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WallHit {
-    pub range_m: f32,
-    pub transmission: f32,
-    pub body: u32,
-    /// Index of the wall in the world; `u32::MAX` for walls of moving bodies.
-    pub wall: u32,
+struct WallHit {
+    range_m: f32,
+    transmission: f32,
+    body: u32,
 }
 
 /// The rays of a sweep, each from the pose of the sensor at its azimuth.
@@ -67,13 +65,11 @@ impl LineOfSight {
         reach_m: f64,
     ) {
         let passed = &mut self.passed;
-        let mut add = |number: u32, wall: &Wall, share: f64| {
-            let range_m = (share * reach_m) as f32;
+        let mut add = |wall: &Wall, share: f64| {
             passed.push(WallHit {
-                range_m,
+                range_m: (share * reach_m) as f32,
                 transmission: wall.transmission as f32,
                 body: wall.body,
-                wall: number,
             });
         };
         world.walls_between(
@@ -92,7 +88,7 @@ impl LineOfSight {
             }
             for wall in &mover.body.walls {
                 if let Some(share) = crossing(from, line, wall) {
-                    add(u32::MAX, wall, share);
+                    add(wall, share);
                 }
             }
         }
@@ -110,22 +106,11 @@ impl LineOfSight {
             .product()
     }
 
-    /// Two-way share of the power that passes to a range along the axis of an azimuth's beam.
-    pub fn transmission_along(&self, azimuth: usize, range_m: f64) -> f32 {
-        self.transmission(azimuth as f64, range_m, NO_BODY)
-    }
-
     /// The walls along the ray nearest to an azimuth, nearest first.
-    pub fn ray(&self, azimuth: f64) -> &[WallHit] {
+    fn ray(&self, azimuth: f64) -> &[WallHit] {
         // The cast turns negative numbers into zero.
         let ray = ((azimuth + MARGIN as f64) * RAYS as f64 + 0.5) as usize;
         let ray = ray.min(self.starts.len() - 2);
         &self.passed[self.starts[ray]..self.starts[ray + 1]]
-    }
-
-    /// The first walls of all rays within the sweep.
-    pub fn first_walls(&self, azimuths: usize) -> impl Iterator<Item = &WallHit> {
-        let rays = MARGIN * RAYS..(azimuths + MARGIN) * RAYS;
-        rays.filter_map(|ray| self.passed[self.starts[ray]..self.starts[ray + 1]].first())
     }
 }

@@ -1,4 +1,4 @@
-//! The sensor's pose at each azimuth of a sweep, and the times at which its beam passes a place.
+//! The sensor's pose at each azimuth of a sweep, and the times when its beam passes a place.
 
 use std::f64::consts::TAU;
 
@@ -20,9 +20,7 @@ pub(super) struct AzimuthPose {
     pub heading_rad: f64,
     /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
-    /// Elevation of the beam, radians.
-    pub elevation_rad: f64,
-    /// Time since the middle of the sweep, seconds; zero where all azimuths are measured then.
+    /// Time since the middle of the sweep, seconds.
     pub time_s: f64,
 }
 
@@ -37,16 +35,13 @@ pub(super) struct SweepPoses {
 
 impl SweepPoses {
     /// Samples the path during a sweep. `error_rad` is the deviation of the beam to the right of a
-    /// reported azimuth, `elevation_rad` its elevation at a time of the drive, seconds, and an
-    /// azimuth.
+    /// reported azimuth.
     pub fn sample(
         &mut self,
         path: &dyn Path,
         time: SweepTime,
         sampling: &Sampling,
-        moving: bool,
         error_rad: impl Fn(f64) -> f64,
-        elevation_rad: impl Fn(f64, f64) -> f64,
     ) {
         let middle_s = time.drive_time_s(time.middle_us());
         self.azimuths = sampling.azimuths;
@@ -56,11 +51,7 @@ impl SweepPoses {
         for index in 0..sampling.azimuths + 2 * MARGIN {
             let azimuth = index as f64 - MARGIN as f64;
             let since_start_s = azimuth * time.period_us as f64 * 1e-6 / sampling.azimuths as f64;
-            let time_s = if moving {
-                time.drive_time_s(time.start_us) - middle_s + since_start_s
-            } else {
-                0.0
-            };
+            let time_s = time.drive_time_s(time.start_us) - middle_s + since_start_s;
             let pose = path.pose(middle_s + time_s);
             let velocity = path.velocity(middle_s + time_s);
             let azimuth_rad = self.first_rad + azimuth * self.step_rad;
@@ -68,22 +59,13 @@ impl SweepPoses {
             let heading_rad = pose.rotation.angle() - error_rad(azimuth_rad);
             let (sine, cosine) = (heading_rad - azimuth_rad).sin_cos();
             let position = Point2::from(pose.translation.vector);
-            let elevation_rad = elevation_rad(middle_s + time_s, azimuth_rad);
             self.all.push(AzimuthPose {
                 position,
                 velocity,
                 heading_rad,
                 beam: Vector2::new(cosine, sine),
-                elevation_rad,
                 time_s,
             });
-        }
-    }
-
-    /// Tilts the beam at each azimuth by the gradient of the vehicle along it.
-    pub fn tilt(&mut self, gradient_rad: impl Fn(Point2<f64>, Vector2<f64>) -> f64) {
-        for pose in &mut self.all {
-            pose.elevation_rad += gradient_rad(pose.position, pose.beam);
         }
     }
 
@@ -102,7 +84,6 @@ impl SweepPoses {
         self.at((self.azimuths / 2) as f64)
     }
 
-    /// Azimuths of the sweep.
     pub fn azimuths(&self) -> usize {
         self.azimuths
     }
@@ -112,7 +93,7 @@ impl SweepPoses {
         self.step_rad
     }
 
-    /// Visits the azimuths, with fractions, at which the beam passes an object at
+    /// Visits the azimuths, with fractions, where the beam passes an object at
     /// `place(azimuth_pose)`: usually once, twice or never near the sweep's seam if the vehicle
     /// turns, and up to [`MARGIN`] azimuths outside the sweep.
     pub fn beam_passes(

@@ -7,7 +7,6 @@ pub struct SweepTime {
     pub start_us: i64,
     /// Time of one turn, microseconds.
     pub period_us: i64,
-    /// Azimuths in one turn.
     pub azimuths: usize,
     /// The start of the drive, microseconds since 1970.
     pub epoch_us: i64,

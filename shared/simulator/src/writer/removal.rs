@@ -10,9 +10,7 @@ use crate::simulated_drive::SimulatedDrive;
 
 /// Removes the dataset in `folder` with the configuration that made it.
 ///
-/// # Errors
-/// [`SimulatorError::OutputInUse`] if the folder holds a file that is not of such a dataset: then
-/// nothing is removed. [`SimulatorError::Busy`] if another process writes to it.
+/// If the folder holds any other file, nothing is removed.
 pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     let _alone = super::lock(folder)?;
     let found = files(folder)?;
@@ -30,7 +28,7 @@ pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     {
         return Err(in_use(other));
     }
-    // What says whose dataset it is goes last.
+    // The file that identifies the dataset is removed last.
     let (last, first): (Vec<_>, Vec<_>) = found
         .iter()
         .partition(|path| path.as_path() == Path::new(MADE_BY));

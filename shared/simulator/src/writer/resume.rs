@@ -16,7 +16,7 @@ use crate::simulated_drive::SimulatedDrive;
 /// The file with the configuration that made a dataset.
 pub const MADE_BY: &str = "simulation.toml";
 
-/// The largest image that is compared, bytes: twice what a radar's image may have.
+/// The size of the largest image that is compared, bytes: twice the largest image of a radar.
 const MAX_IMAGE_BYTES: u64 = 64 << 20;
 
 /// The file with the options to read it; see [`gyre_datasets::open`].
@@ -44,10 +44,6 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
 }
 
 /// Returns the scans that `out` lacks.
-///
-/// # Errors
-/// [`SimulatorError`] if `out` holds images of another dataset, or images that differ from what is
-/// rendered now.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,
@@ -97,8 +93,8 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     Ok(names)
 }
 
-/// Returns whether `out` was made by `config`, up to the number of scans and how they are played;
-/// false if it does not say.
+/// Returns whether `out` was made by `config`, except for the number of scans and their storage;
+/// false if that is unknown.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
     match made_with(out)? {
         None => Ok(false),
@@ -107,7 +103,7 @@ fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, Simulator
     }
 }
 
-/// The configuration that made the dataset in `out`; `None` if it does not say.
+/// The configuration that made the dataset in `out`; `None` if that is unknown.
 pub(super) fn made_with(out: &Path) -> Result<Option<SimulationConfig>, SimulatorError> {
     let path = out.join(MADE_BY);
     match read_text(&path, SETTINGS) {
@@ -129,7 +125,7 @@ fn other_dataset(out: &Path) -> SimulatorError {
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     let mut config = SimulationConfig {
         scans: Some(1),
-        ..config.resolved()
+        ..config.clone()
     };
     config.output.store = false;
     config

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{LogError, LogMagic, records::Records};
 
-/// Reads a log to which another process may append. It needs 16 bytes of memory for each record.
+/// Reads a log while another process may append to it. It needs 16 bytes of memory for each record.
 #[derive(Debug)]
 pub struct LogReader {
     records: Records,
@@ -12,9 +12,6 @@ pub struct LogReader {
 
 impl LogReader {
     /// Opens a log and finds its complete records. One that does not exist yet is empty.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is not such a log, or is damaged.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
         let mut reader = Self {
             records: Records::new(path, magic),
@@ -26,9 +23,6 @@ impl LogReader {
     /// Looks for records that were appended or cut off meanwhile; returns the number of complete
     /// ones now. Only the headers of the new ones are read, and the bytes of those that may be
     /// damaged.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is not such a log, or is damaged.
     pub fn refresh(&mut self) -> Result<usize, LogError> {
         self.records.refresh()?;
         Ok(self.len())
@@ -53,9 +47,6 @@ impl LogReader {
 
     /// Reads a record, which replaces the content of `bytes`.
     ///
-    /// # Errors
-    /// [`LogError::Damaged`], or a file that cannot be read.
-    ///
     /// # Panics
     /// There are no more than `index` records.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
@@ -68,10 +59,7 @@ impl LogReader {
     }
 
     /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`.
-    /// They are not checked: the checksum is that of the whole record.
-    ///
-    /// # Errors
-    /// [`LogError::Damaged`] if the header of the record is, or a file that cannot be read.
+    /// They are not checked: the checksum covers the whole record.
     ///
     /// # Panics
     /// There are no more than `index` records.

@@ -92,7 +92,6 @@ pub(super) struct Records {
 /// The place of a record.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// The offset behind it.
     end: u64,
     length: u32,
     check: u32,
@@ -205,8 +204,8 @@ impl Records {
         Ok(Some(length))
     }
 
-    /// Returns whether the last known record is still in the file of this length. The process that
-    /// appends may have cut it off and appended another one.
+    /// Returns whether the last known record is still in the file of this length. The appending
+    /// process may have cut it off and appended a different one.
     fn is_last_unchanged(&self, length: u64) -> Result<bool, StorageError> {
         let (Some(last), Some(place)) = (self.len().checked_sub(1), self.places.last()) else {
             return Ok(true);
@@ -237,7 +236,7 @@ impl Records {
     }
 
     /// Checks that the record after the end was in danger when the last one in the file was
-    /// written: that it is not one that was damaged later.
+    /// written: that it was not damaged later.
     fn require_no_safe_record_after_end(&self, length: u64) -> Result<(), LogError> {
         if length - self.end() > LONGEST_END {
             return Err(self.damaged(self.len()));

@@ -254,7 +254,7 @@ fn a_record_of_an_impossible_length_is_not_read() {
     bytes.extend(header);
     fs::write(&path, bytes).unwrap();
     let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
-    // As long as the record says that it is, and longer than what a power failure can leave.
+    // As long as the record states, and longer than a power failure can leave.
     file.set_len(1 << 33).unwrap();
     let error = LogReader::open(&path, MAGIC).unwrap_err();
     assert!(

@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, fmt};
 /// The messages that were received and missed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Received {
-    /// The counts by topic.
     pub topics: BTreeMap<String, ReceivedCount>,
     /// True if it ended on a request to stop, before the run.
     pub is_interrupted: bool,
@@ -14,7 +13,6 @@ pub struct Received {
 /// The messages of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReceivedCount {
-    /// Messages that arrived.
     pub received: u64,
     /// Messages between them that did not arrive.
     pub missed: u64,

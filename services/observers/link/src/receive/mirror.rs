@@ -66,7 +66,8 @@ impl Mirror<'_> {
         })
     }
 
-    /// Requests the messages of a topic from one on, and those of later generations than this one.
+    /// Requests the messages of a topic from a number on, and messages of later generations than
+    /// this one.
     fn fetch(&self, topic: &str, from: u64, generation: u32, is_lossless: bool) -> Fetcher {
         let request = Request {
             key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),

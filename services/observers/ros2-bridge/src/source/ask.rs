@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_colossus::{Configuration, SweepAssembler};
-use gyre_live_radar::Sizes;
+use gyre_stages::live_radar::Sizes;
 use thiserror::Error;
 
 use super::{
@@ -18,55 +18,33 @@ use super::{
 /// The longest wait for the configuration, which the driver repeats every four turns, and for
 /// azimuths to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
-/// Time between two polls.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// A driver's radar that cannot be used.
 #[derive(Debug, Error)]
 pub enum AskError {
-    /// The node or the topic cannot be opened.
     #[error(transparent)]
     Driver(#[from] DriverError),
-    /// Nobody publishes.
     #[error(
         "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
     )]
-    NoTopic {
-        /// The topic.
-        topic: String,
-        /// The domain.
-        domain: u16,
-    },
-    /// Nothing arrives.
+    NoTopic { topic: String, domain: u16 },
     #[error(
         "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
     )]
-    Silent {
-        /// The topic.
-        topic: String,
-    },
-    /// The depth of a bin is unknown.
+    Silent { topic: String },
     #[error(
         "the driver publishes no {topic}, and nothing else tells the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
     )]
-    NoConfiguration {
-        /// The topic of configurations.
-        topic: String,
-    },
-    /// The configuration is not usable.
+    NoConfiguration { topic: String },
     #[error("the radar on {topic} cannot be used: {source}")]
     Unusable {
-        /// The topic.
         topic: String,
-        /// The reason.
         source: gyre_colossus::BadConfiguration,
     },
 }
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
-///
-/// # Errors
-/// No driver, or a radar that cannot be used.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let mut driver = Driver::open(settings)?;
     let configuration = match published(&driver, settings)? {

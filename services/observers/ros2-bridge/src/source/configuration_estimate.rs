@@ -16,7 +16,7 @@ pub struct ConfigurationEstimate {
     last: Option<u16>,
     /// Encoder counts from one azimuth to the next in a turn.
     steps: Vec<u16>,
-    /// The times at which turns have begun, ns.
+    /// The times of the starts of turns, ns.
     begins_ns: Vec<i64>,
     bins: usize,
     /// Azimuths of a turn, where turns arrive as a whole.

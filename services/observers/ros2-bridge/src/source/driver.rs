@@ -35,32 +35,21 @@ const TURNS: usize = 10;
 /// A driver that cannot be received.
 #[derive(Debug, Error)]
 pub enum DriverError {
-    /// The node cannot be made.
     #[error(transparent)]
     Node(#[from] NodeError),
-    /// Fixes of GNSS cannot be received, or not be passed on.
     #[error(transparent)]
     Fixes(#[from] FixError),
-    /// The system refuses a descriptor.
     #[error("cannot wait for topics of ROS 2: {0}")]
     Wait(#[from] io::Error),
-    /// The topic has another type.
     #[error("{topic} carries {found}, but Gyre reads {}", names().join(", "))]
-    Type {
-        /// The topic.
-        topic: String,
-        /// The type on DDS.
-        found: String,
-    },
+    Type { topic: String, found: String },
 }
 
 /// A message that cannot be used.
 #[derive(Debug, Error)]
 pub enum BadPacket {
-    /// The message is not CDR of its type.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A number of the message is invalid.
     #[error(transparent)]
     Message(#[from] BadMessage),
 }
@@ -77,19 +66,14 @@ fn names() -> [String; 3] {
 
 /// A message of a driver, and its publisher.
 pub struct Packet {
-    /// The message.
     pub message: PacketMessage,
-    /// The publisher.
     pub publisher: Gid,
 }
 
-/// A message with azimuths.
 pub enum PacketMessage {
-    /// One azimuth.
     Azimuth(RadarFftDataMsg),
     /// One azimuth of a driver before 2024.
     Bytes(RadarFftDataMessage),
-    /// A turn.
     Turn(RadarBScanMsg),
 }
 
@@ -112,9 +96,6 @@ impl PacketMessage {
     }
 
     /// Returns the only azimuth; `None` of a turn.
-    ///
-    /// # Errors
-    /// A number that has not the bytes of its type.
     pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, BadMessage> {
         match self {
             Self::Azimuth(message) => Ok(Some(message.azimuth())),
@@ -148,7 +129,6 @@ pub struct Driver {
     pub sample_wakeups: Wakeups,
     /// Samples of an inertial sensor.
     gyro: Option<Subscription<Imu>>,
-    /// The odometry of the wheels.
     wheels: Option<Subscription<Odometry>>,
     /// A GNSS receiver, whose fixes others need.
     fixes: Option<Fixes>,
@@ -157,17 +137,12 @@ pub struct Driver {
 /// The radar's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
-    /// The description.
     pub radar: Configuration,
-    /// Rows by which images of turns are turned.
+    /// The rotation of images by the driver, in rows.
     pub azimuth_offset: u16,
 }
 
 impl Driver {
-    /// Subscribes to the configuration.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or the name of the topic is none.
     pub fn open(settings: &Settings) -> Result<Self, DriverError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
@@ -206,9 +181,6 @@ impl Driver {
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    ///
-    /// # Errors
-    /// It is none that is read.
     pub fn found(&self) -> Result<Option<String>, DriverError> {
         match self.node.type_of(&self.dds_name) {
             Some(found) if !names().contains(&found) => Err(DriverError::Type {
@@ -220,9 +192,6 @@ impl Driver {
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    ///
-    /// # Errors
-    /// The topic has another type, or cannot be opened.
     pub fn receive(&mut self) -> Result<bool, DriverError> {
         if self.azimuths.is_some() {
             return Ok(true);
@@ -248,18 +217,12 @@ impl Driver {
     }
 
     /// Clears the descriptor: take all messages after this.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn clear(&mut self) -> io::Result<()> {
         self.wakeups.clear()
     }
 
     /// Takes the next configuration. A reader also receives messages of the other type, and may
     /// decode them to meaningless numbers: the published type decides.
-    ///
-    /// # Errors
-    /// The counts of a message are none of a radar.
     pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadPacket> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
@@ -287,8 +250,8 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro. That of a message that cannot be read, or has no rates,
-    /// is not a number, so that it is counted.
+    /// Takes the next sample of the gyro. The sample of an unreadable message, or one without
+    /// rates, is not a number, so that it is counted.
     pub fn gyro_sample(&self) -> Option<Sample> {
         match self.gyro.as_ref()?.take() {
             Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),
@@ -312,9 +275,6 @@ impl Driver {
     }
 
     /// Takes the next message with azimuths.
-    ///
-    /// # Errors
-    /// A message of another form.
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         Ok(match &self.azimuths {
             Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,

@@ -17,17 +17,10 @@ const FIXES: usize = 200;
 /// Fixes that cannot be received, or not be passed on.
 #[derive(Debug, Error)]
 pub enum FixError {
-    /// The name of the topic is none.
     #[error(transparent)]
     Node(#[from] NodeError),
-    /// The address is none, or the system gives no socket.
     #[error("cannot pass the fixes of GNSS on to {listen} (gnss.listen): {source}")]
-    Address {
-        /// The address.
-        listen: String,
-        /// The cause.
-        source: io::Error,
-    },
+    Address { listen: String, source: io::Error },
 }
 
 /// Where fixes come from, and where they go to.
@@ -49,10 +42,6 @@ pub struct Fixes {
 }
 
 impl Fixes {
-    /// Subscribes.
-    ///
-    /// # Errors
-    /// The name of the topic or the address is none, or the system gives no socket.
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,
@@ -73,7 +62,7 @@ impl Fixes {
         })
     }
 
-    /// Passes on what has arrived, as many as are kept at most. Those who receive it count lines
+    /// Passes on the arrived fixes, up to the number that is kept. Those who receive it count lines
     /// that are no fix.
     pub fn pass_on(&mut self) {
         for _ in 0..FIXES {

@@ -6,7 +6,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_live_radar::{Intake, NoScans};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
 use gyre_samples::{Sample, SampleKind};
@@ -14,6 +13,7 @@ use gyre_stage::{
     StageError, clock,
     source::{Arrival, Received, Sensor},
 };
+use gyre_stages::live_radar::{Intake, NoScans};
 use ros2_client::Gid;
 
 use super::{
@@ -28,7 +28,7 @@ const MAX_MESSAGES: usize = 512;
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time after which a configuration is estimated: the driver sends it every four turns.
 const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
-/// Time without an azimuth of a publisher after which another one is received in its place.
+/// Time without an azimuth of a publisher after which a different publisher takes its place.
 const PUBLISHER_WAIT: Duration = Duration::from_secs(1);
 
 /// A radar behind its driver.
@@ -52,10 +52,6 @@ pub struct Radar {
 }
 
 impl Radar {
-    /// Joins the domain.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or a topic cannot be opened.
     pub fn open(settings: Settings) -> Result<Self, DriverError> {
         let now = Instant::now();
         Ok(Self {
@@ -155,9 +151,9 @@ impl Radar {
         completed.is_some()
     }
 
-    /// Returns whether this publisher is the one that is received. Another one takes its place when
-    /// it has fallen silent: the driver was restarted, and its messages do not continue the scan
-    /// before.
+    /// Returns whether this publisher is the one that is received. A different publisher takes its
+    /// place when it has fallen silent: the driver was restarted, and its messages do not continue
+    /// the scan before.
     fn takes(&mut self, publisher: Gid, room: usize) -> Result<bool, StageError> {
         let silent = self.last_azimuth.elapsed();
         match self.publisher {
@@ -185,7 +181,7 @@ impl Radar {
         Ok(true)
     }
 
-    /// Estimates the configuration from azimuths, where none is published.
+    /// Estimates the configuration from azimuths if the driver publishes no configuration.
     fn estimate(
         &mut self,
         message: &PacketMessage,

@@ -23,9 +23,6 @@ pub struct Wakeups {
 
 impl Wakeups {
     /// Creates one without a topic.
-    ///
-    /// # Errors
-    /// The system refuses a descriptor.
     pub fn new() -> io::Result<Self> {
         Ok(Self {
             poll: Poll::new()?,
@@ -34,10 +31,6 @@ impl Wakeups {
         })
     }
 
-    /// Adds a topic.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> io::Result<()>
     where
         Subscription<M>: Source,
@@ -49,15 +42,11 @@ impl Wakeups {
             .register(topic, token, Interest::READABLE)
     }
 
-    /// Returns the descriptor.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.poll.registry().as_fd()
     }
 
     /// Makes it unreadable until the next message. Take all messages after this, and not before.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn clear(&mut self) -> io::Result<()> {
         match self.poll.poll(&mut self.events, Some(Duration::ZERO)) {
             Err(error) if error.kind() != io::ErrorKind::Interrupted => Err(error),

@@ -13,7 +13,7 @@ use tokio::{
     time::{Sleep, sleep},
 };
 
-/// A connection that fails if the client does not take what is written within a time.
+/// A connection that fails if the client does not take the written bytes within a time limit.
 pub struct Timed {
     stream: TcpStream,
     limit: Duration,
@@ -22,7 +22,7 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// Gives the client so much time for what is written at once.
+    /// Limits the time for the bytes of one write.
     pub fn new(stream: TcpStream, limit: Duration) -> Self {
         Self {
             stream,

@@ -12,8 +12,10 @@ use bytemuck::bytes_of;
 use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
-use gyre_recorder::LogTail;
-use gyre_recording::view::{LOG, POINTS, TRAJECTORY, View, views};
+use gyre_recording::{
+    LogTail,
+    view::{LOG, POINTS, TRAJECTORY, View, views},
+};
 use gyre_stage::{
     StageError, clock,
     observer::{Next, ObservedRun, Observer},
@@ -31,7 +33,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures of a topic, for recordings that are played fast.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The shortest time between two trajectories, each of which has all of it.
+/// The shortest time between two complete trajectories.
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A topic that is published to viewers.
@@ -45,9 +47,6 @@ struct FollowedTopic<M: Message> {
 }
 
 /// Starts the threads. They end when the view is stopped.
-///
-/// # Errors
-/// The system refuses a thread.
 pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHandle<()>>> {
     let report = {
         let (followed, hub) = (Arc::clone(followed), Arc::clone(hub));

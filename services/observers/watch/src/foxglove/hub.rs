@@ -92,7 +92,7 @@ impl Hub {
 }
 
 impl HubMember {
-    /// Subscribes to a channel; false if there is none with this number.
+    /// Subscribes to a channel; false if the number is unknown.
     pub fn subscribe(&self, channel: usize, subscription: u32) -> bool {
         let Some(wanted) = self.hub.wanted.get(channel) else {
             return false;

@@ -60,13 +60,12 @@ impl Assembly {
         self.is_done
     }
 
-    /// Forgets the azimuth.
     pub(super) fn clear(&mut self) {
         self.of = None;
     }
 
-    /// Ends an azimuth that has fewer bins than it says: true if its parts follow each other from
-    /// the first bin on, and no message is missing before the one with this number.
+    /// Ends an azimuth with fewer bins than stated: true if its parts follow each other from the
+    /// first bin on, and no message is missing before the message with this number.
     pub(super) fn ends_before(&mut self, number: u32) -> bool {
         let (first, last) = self.numbers;
         let span = last.wrapping_sub(first) as usize + 1;

@@ -9,20 +9,19 @@ use crate::parser::{Damage, Event};
 
 /// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
-/// The largest step of the number of a message: a larger one is that of a radar that has been
-/// started anew.
+/// The largest step of the number of a message: a larger step means that the radar has restarted.
 const MAX_STEP: i32 = 1 << 16;
 
-/// A buffer that is filled with one datagram after the other, and the messages in them: those of
-/// the TCP protocol.
+/// A buffer that is filled with one datagram after the other, and the messages in them, as in the
+/// TCP protocol.
 ///
-/// Read a datagram into [`Datagrams::space`], say how long it is with [`Datagrams::filled`], and
-/// take all events with [`Datagrams::next`]. The first event is the radar's description of itself,
-/// which each datagram carries.
+/// Read a datagram into [`Datagrams::space`], pass its length to [`Datagrams::filled`], and take
+/// all events with [`Datagrams::next`]. The first event is the radar's description of itself, which
+/// each datagram carries.
 ///
 /// An azimuth is returned when its last part is there, in whatever order they come. It is lost if a
-/// part of another azimuth comes before that: no azimuth waits for another. So the scan says which
-/// azimuths were lost.
+/// part of another azimuth comes before that: no azimuth waits for another. So the scan reports its
+/// lost azimuths.
 #[derive(Clone, Debug)]
 pub struct Datagrams {
     encoder_size: u16,
@@ -70,7 +69,7 @@ impl Datagrams {
         &mut self.buffer
     }
 
-    /// Says that the first `bytes` of the space are a datagram.
+    /// Marks the first `bytes` of the space as a datagram.
     pub fn filled(&mut self, bytes: usize) {
         self.filled = bytes.min(MAX_BYTES);
     }
@@ -108,7 +107,7 @@ impl Datagrams {
     }
 
     /// Passes over the description that was returned last, and the datagram that it came with. The
-    /// next datagram is described anew, so that none is taken for one of another radar.
+    /// next datagram is described again, so that no datagram is attributed to a different radar.
     pub fn refuse_description(&mut self) {
         self.described = None;
         self.filled = 0;

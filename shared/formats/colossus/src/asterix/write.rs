@@ -19,7 +19,7 @@ const HEALTHY: u16 = 0b1010_1010_1010_1010;
 
 /// Hands the datagrams of an azimuth to `send`, each with the next `number`. The time must be
 /// big-endian seconds and nanoseconds: see [`ClockFormat::fields`](crate::ClockFormat::fields). Its
-/// bins are those of the configuration.
+/// bins are as configured.
 pub fn write_azimuth(
     radar: &Configuration,
     azimuth: &Azimuth<'_>,

@@ -1,17 +1,16 @@
-//! Counts of what is not as sent.
+//! Counts of differences from the sent data.
 
-/// Counts of what has been lost, dropped and changed since the start of a stream.
+/// Counts of losses, drops and changes since the start of a stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Sweeps returned.
     pub sweeps: u64,
     /// Azimuths that did not arrive, of the sweeps returned.
     pub missing_azimuths: u64,
     /// Sweeps dropped because more than half of their azimuths did not arrive.
     pub incomplete_sweeps: u64,
     /// Sweeps dropped because a turn or more is missing in the middle, or the radar's clock was
-    /// set. One each, however many turns are missing: those of which no azimuth arrived are not
-    /// counted here.
+    /// set. One each, however many turns are missing: turns without an azimuth are not counted
+    /// here.
     pub broken_sweeps: u64,
     /// Azimuths dropped because their sweep had begun before the stream.
     pub discarded_azimuths: u64,

@@ -38,7 +38,7 @@ impl PowerOrder {
         }
     }
 
-    /// Returns the order; big-endian, as the headers are, while the powers do not tell.
+    /// Returns the order; big-endian, like the headers, until the powers determine it.
     fn order(&mut self, powers: &[[u8; 2]]) -> ByteOrder {
         if let Some(order) = self.decided {
             return order;

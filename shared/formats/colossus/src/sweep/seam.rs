@@ -3,7 +3,7 @@
 use super::{Empty, Reading};
 use crate::configuration::Configuration;
 
-/// The part of a turn by which the time between two azimuths may differ from that of the rotation.
+/// The largest difference of the time between two azimuths from the configured rotation, in turns.
 /// Where it differs by more, a turn or more is missing, or the clock was set.
 const BREAK_TURNS: f64 = 0.75;
 
@@ -46,7 +46,7 @@ impl Grid {
         }
     }
 
-    /// Returns an encoder count below that of a turn. A full turn is 0, as for the readers of
+    /// Returns an encoder count less than a full turn. A full turn is 0, as for the readers of
     /// recordings.
     pub(super) fn encoder(&self, count: u16) -> Option<u16> {
         (count <= self.encoder_size).then_some(count % self.encoder_size)
@@ -67,7 +67,7 @@ impl Grid {
         (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
     }
 
-    /// Returns whether the time between two azimuths is not that of the rotation between them.
+    /// Returns whether the time between two azimuths differs from the rotation between them.
     pub(super) fn is_break(&self, last: Reading, here: Reading) -> bool {
         let expected_ns = self.counts(last, here) * self.ns_per_count;
         let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;

@@ -78,7 +78,7 @@ impl Assembly {
     pub fn with(configuration: &Configuration, constants: Constants) -> Self {
         let assembler = SweepAssembler::new(configuration, constants).unwrap();
         let mut slot = OwnedScan::with_limits(assembler.limits());
-        // What a slot held before must not show.
+        // Earlier content of a slot must not show.
         slot.bytes.fill(0xaa);
         slot.flags.fill(0xaa);
         Self {

@@ -35,7 +35,7 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     Ok(DatasetOptions::default())
 }
 
-/// Returns what is wrong, with the key of the line where it is.
+/// Returns the error, with the key of its line.
 fn reason(text: &str, error: &toml::de::Error) -> String {
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.and_then(|before| before.rsplit('\n').next());

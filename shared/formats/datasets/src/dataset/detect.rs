@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
 use super::file_list::FileList;
-use super::first_image::{FirstImage, NamedBy};
+use super::first_image::FirstImage;
 use super::foreign::{foreign, foreign_in};
 use super::format::Format;
 use super::image_list::has_png;
 use super::image_source::ImageSource;
 use super::images::Images;
+use super::profiles::{KNOWN, Profile};
 
 /// A located dataset, the input of the readers.
 #[derive(Debug)]
@@ -60,31 +61,9 @@ impl Found {
 /// The remedy where a format is looked for.
 const SET_FORMAT: &str = "if it is one, set its `format`";
 
-/// The folders of images of each format, relative to the root.
-const LAYOUTS: [(Format, &[&str]); 8] = [
-    (Format::Radiate, &["Navtech_Polar"]),
-    (Format::Oord, &["Navtech_CTS350-X_Radar"]),
-    (
-        Format::MulranOxfordForm,
-        &[
-            "polar_oxford_form",
-            "radar/polar_oxford_form",
-            "sensor_data/radar/polar_oxford_form",
-        ],
-    ),
-    (
-        Format::Mulran,
-        &["sensor_data/radar/polar", "radar/polar", "polar"],
-    ),
-    (Format::Fomo, &["navtech"]),
-    (Format::Oxford, &["radar"]),
-    (Format::Boreas, &["radar"]),
-    (Format::BoreasRt, &["radar"]),
-];
-
 /// Returns whether a folder has images where a dataset has them.
 pub fn is_dataset(root: &Path) -> bool {
-    let mut folders = LAYOUTS.iter().flat_map(|(_, folders)| *folders);
+    let mut folders = KNOWN.iter().flat_map(|(_, folders, _)| *folders);
     folders.any(|folder| has_png(&root.join(folder)))
 }
 
@@ -117,21 +96,22 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     })
 }
 
-/// Returns whether images have times in their rows where those of the format have none, or none
-/// where they have.
+/// Returns whether the presence of row times in the images differs from the format.
 fn is_other_form(format: Format, image: &FirstImage) -> bool {
     let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
     image.has_stamps() != has_stamps
 }
 
-/// Returns whether both the names of images and the files beside them are those of another format.
+/// Returns whether both the names of images and the files beside them belong to a different format.
 /// A recording of one's own may differ in either.
 fn is_marked_otherwise(format: Format, image: &FirstImage, root: &Path, folder: &Path) -> bool {
-    let names = evident(format).map(|(_, named, _)| named);
+    let names = Profile::of(format)
+        .filter(|it| it.bins.is_some())
+        .map(|it| it.named_by);
     let is_named_otherwise =
         names.is_some() && image.named_by().is_some_and(|by| names != Some(by));
     let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
-    // The names of folders say less: `navtech` may hold anything.
+    // The names of folders are weaker evidence: `navtech` may hold anything.
     let has_oxford_files = by_layout(root, folder) == Some(Format::Oxford);
     let by_files = has_oxford_files && format != Format::Oxford;
     is_named_otherwise && (by_files || (has_boreas_folders(root) && !is_boreas))
@@ -167,13 +147,13 @@ fn check_folder(root: &Path) -> Result<(), OpenError> {
     }
 }
 
-/// Returns the folder that holds the images: that of a known layout, otherwise the root.
+/// Returns the folder of the images: the folder of a known layout, otherwise the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
     let known = || {
-        LAYOUTS
+        KNOWN
             .iter()
-            .filter(|(f, _)| forced.is_none_or(|forced| forced == *f))
-            .flat_map(|(_, folders)| folders.iter())
+            .filter(|(f, ..)| forced.is_none_or(|forced| forced == *f))
+            .flat_map(|(_, folders, _)| folders.iter())
     };
     let mut candidates = known().map(|folder| root.join(folder));
     if let Some(folder) = candidates.clone().find(|folder| has_png(folder)) {
@@ -227,15 +207,17 @@ fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
                 .is_some_and(|parent| parent.join(file).exists())
     };
     match name {
-        "Navtech_Polar" => Some(Format::Radiate),
-        "Navtech_CTS350-X_Radar" => Some(Format::Oord),
-        "polar_oxford_form" => Some(Format::MulranOxfordForm),
-        "polar" => Some(Format::Mulran),
-        "navtech" => Some(Format::Fomo),
-        "radar" if beside("radar.timestamps") || beside("gt/radar_odometry.csv") => {
-            Some(Format::Oxford)
+        // A folder of this name may be of several formats.
+        "radar" => {
+            let is_oxford = beside("radar.timestamps") || beside("gt/radar_odometry.csv");
+            is_oxford.then_some(Format::Oxford)
         }
-        _ => None,
+        _ => {
+            let is_of = |folder: &&str| Path::new(folder).ends_with(name);
+            let mut known = KNOWN.iter();
+            let found = known.find(|(_, folders, _)| folders.iter().any(is_of));
+            found.map(|(format, ..)| *format)
+        }
     }
 }
 
@@ -295,24 +277,17 @@ fn decided(format: Format, evidence: &str) -> String {
 }
 
 fn evidence(image: &FirstImage) -> String {
-    let named = image.named_by().map_or(
-        "names that are not times of the sweep",
-        NamedBy::description,
+    let named = image.named_by().map_or_else(
+        || "names that are not times of the sweep".to_owned(),
+        |by| format!("named by {}", by.description()),
     );
-    let named = if image.named_by().is_some() {
-        format!("named by {named}")
-    } else {
-        named.to_owned()
+    let chirps = match image.chirps_alternate() {
+        true => ", chirps alternate",
+        false => "",
     };
-    let chirps = if image.chirps_alternate() {
-        ", chirps alternate"
-    } else {
-        ""
-    };
-    let unit = if image.nanoseconds() {
-        ", stamps in ns"
-    } else {
-        ""
+    let unit = match image.nanoseconds() {
+        true => ", stamps in ns",
+        false => "",
     };
     format!("{} range bins, {named}{chirps}{unit}", image.bins())
 }
@@ -320,44 +295,22 @@ fn evidence(image: &FirstImage) -> String {
 /// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// Returns the range bins, the names and the chirps of the images of a format. `None`: it has no
-/// metadata columns, or, as OORD, differs from Oxford only in its folders.
-fn evident(format: Format) -> Option<(&'static [usize], NamedBy, bool)> {
-    Some(match format {
-        Format::Oxford => (&[3768], NamedBy::Start, false),
-        Format::Boreas => (&[3360], NamedBy::Middle, false),
-        Format::BoreasRt => (&[6848], NamedBy::Middle, true),
-        Format::Fomo => (&[6848], NamedBy::Start, false),
-        Format::MulranOxfordForm => (&[3360], NamedBy::End, false),
-        Format::Oord
-        | Format::Mulran
-        | Format::Radiate
-        | Format::Mcap
-        | Format::Other
-        | Format::Ros2Bag => return None,
-    })
-}
-
 /// Scores how well a format fits the first image.
 fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
-    let Some((bins, named, chirps)) = evident(format) else {
+    let Some(profile) = Profile::of(format).filter(|it| it.bins.is_some()) else {
         return NEVER;
     };
-    let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
-    let by_name = image
-        .named_by()
-        .map_or(0, |by| if by == named { 2 } else { -2 });
-    let by_bins = if bins.contains(&image.bins()) { 2 } else { 0 };
-    let by_chirps = if image.chirps_alternate() == chirps {
-        1
-    } else {
-        -1
+    let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
+    let by_name = match image.named_by() {
+        None => 0,
+        Some(by) if by == profile.named_by => 2,
+        Some(_) => -2,
     };
-    let by_unit = if image.nanoseconds() == (format == Format::MulranOxfordForm) {
-        0
-    } else {
-        -3
-    };
-    let by_folders = if boreas_folders && boreas { 4 } else { 0 };
-    by_name + by_bins + by_chirps + by_unit + by_folders
+    let is_in_ns = format == Format::MulranOxfordForm;
+    by_name
+        + 2 * i32::from(profile.bins == Some(image.bins()))
+        + 2 * i32::from(image.chirps_alternate() == profile.chirps)
+        - 1
+        - 3 * i32::from(image.nanoseconds() != is_in_ns)
+        + 4 * i32::from(boreas_folders && is_boreas)
 }

@@ -14,7 +14,6 @@ pub struct FileList {
 }
 
 impl FileList {
-    /// Number of files.
     pub fn len(&self) -> usize {
         self.ends.len()
     }

@@ -14,11 +14,11 @@ const SAME_TIME_NS: i64 = 5_000_000;
 /// The time in the sweep that an image is named by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NamedBy {
-    /// That of the first row.
+    /// The time of the first row.
     Start,
-    /// That of row `n / 2 - 1`.
+    /// The time of row `n / 2 - 1`.
     Middle,
-    /// That of the last row.
+    /// The time of the last row.
     End,
 }
 
@@ -42,9 +42,6 @@ pub(crate) struct FirstImage {
 
 impl FirstImage {
     /// Returns `None` if the first images are damaged, or too narrow for metadata.
-    ///
-    /// # Errors
-    /// The first images cannot be read. Whatever depends on them would be another at another time.
     pub(crate) fn read(images: &mut Images) -> Result<Option<Self>, ReadError> {
         let size = images.size;
         if size.width <= METADATA_BYTES || size.height < 2 {
@@ -63,7 +60,6 @@ impl FirstImage {
         self.name_ns
     }
 
-    /// Range bins.
     pub(crate) fn bins(&self) -> usize {
         self.size.width - METADATA_BYTES
     }

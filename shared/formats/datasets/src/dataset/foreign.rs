@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
 
-/// Bytes that tell what a file is: the signature of a tar archive is the last of them.
+/// Bytes that identify the type of a file: the signature of a tar archive is the last of them.
 const HEAD_BYTES: u64 = 512;
 
 /// Where a signature begins, the signature, the kind of the file, and what to do with it.
@@ -51,7 +51,7 @@ const KINDS: [Kind; 10] = [
     (0, b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-/// Returns an error that says what a file is, if it is one of these.
+/// Returns an error that names the type of the file, if it is one of these.
 pub fn foreign(path: &Path) -> Option<OpenError> {
     let mut head = Vec::new();
     let file = gyre_storage::open(path).ok()?;

@@ -1,4 +1,4 @@
-//! The image files of a folder: which of them are scans of one series, and in which order.
+//! The image files of a folder: the scans of one series, in order.
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -14,7 +14,7 @@ use super::stamp;
 /// Files that are named at most where several are left out.
 const MAX_NAMED: usize = 4;
 
-/// The scans of a folder, and a sentence on the images in it that are none.
+/// The scans of a folder, and a sentence on its other images.
 #[derive(Debug, Default)]
 pub(crate) struct ImageList {
     pub(crate) files: FileList,
@@ -83,7 +83,7 @@ pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {
     }
 }
 
-/// Divides names into those of the series, in order, and the others.
+/// Divides names into the names of the series, in order, and the others.
 fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
     let (hidden, shown): (Vec<_>, Vec<_>) = names.into_iter().partition(is_hidden);
     let numbers: HashSet<i64> = shown
@@ -195,7 +195,8 @@ fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
     if !extension.is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Ok(None);
     }
-    // The listing says what an entry is. Only a link must be followed, which costs a system call.
+    // The listing contains the type of an entry. Only a link must be followed, which costs a system
+    // call.
     let kind = entry.file_type()?;
     let is_file = kind.is_file() || (kind.is_symlink() && entry.path().is_file());
     Ok(is_file.then_some(name))

@@ -8,7 +8,6 @@ use super::image_size::ImageSize;
 /// A generator of a recording's images on request. [`open_source`](super::open_source) reads them
 /// like images on disk.
 pub trait ImageSource: Send {
-    /// The file format.
     fn format(&self) -> Format;
 
     /// Size of all images.

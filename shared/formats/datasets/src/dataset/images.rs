@@ -47,13 +47,13 @@ impl fmt::Debug for Origin {
 }
 
 impl Images {
-    /// Lists `folder`, and returns its images with sentences on what is left out.
+    /// Lists `folder`, and returns its images with sentences on the omitted ones.
     pub(crate) fn open(folder: &Path) -> Result<(Self, Vec<String>), OpenError> {
         let ImageList { files, note } = image_list::list(folder)?;
         Ok((Self::listed(folder, files)?, note.into_iter().collect()))
     }
 
-    /// Reads the sizes of some of `files`, those of `folder`.
+    /// Reads the sizes of some of the `files` in `folder`.
     pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
         if files.is_empty() {
             return Err(OpenError::NoImages {
@@ -163,9 +163,6 @@ impl Images {
 
     /// Returns the first image with rows of azimuths that can be decoded, its index and its size;
     /// `None` if the first ones are damaged.
-    ///
-    /// # Errors
-    /// One of the first ones cannot be read, and none can be decoded.
     pub(crate) fn first_readable(
         &mut self,
     ) -> Result<Option<(usize, ImageSize, Vec<u8>)>, ReadError> {

@@ -1,52 +1,22 @@
-//! MulRan: `sensor_data/radar/polar/<ns>.png` as recorded (3360 rows of range x 400 columns of
-//! azimuth, no metadata), or converted to the format of Oxford in `polar_oxford_form/<ns>.png` with
-//! stamps in ns. Named by the last row's stamp.
+//! MulRan as recorded: `sensor_data/radar/polar/<ns>.png`, 3360 rows of range x 400 columns of
+//! azimuth without metadata, named by the last row's stamp.
 //!
-//! Column k as recorded is row k of the other form, where the encoder says 7, 21, ..., 5593 of 5600
-//! counts (KAIST03): the middle of the k-th of 400 equal parts of the turn.
+//! Column k is row k of the form of Oxford, where the encoder gives 7, 21, ..., 5593 of 5600 counts
+//! (KAIST03): the middle of the k-th of 400 equal parts of the turn.
 
 use super::detect::Found;
 use super::error::OpenError;
-use super::first_image::NamedBy;
-use super::format::Format;
 use super::images::Images;
-use super::navtech_png::ByteTen;
-use super::navtech_profile::{Profile, ScanTime};
-use super::navtech_scans::NavtechScans;
-use super::options::{AzimuthSource, DatasetOptions};
+use super::options::DatasetOptions;
+use super::profiles::MULRAN_RESOLUTION_M;
 use super::stamp;
 use super::transposed::{FirstAzimuth, TransposedScans, Turn};
 
-/// Depth of a range bin, m: 200 m over 3360 bins.
-pub const RANGE_RESOLUTION_M: f32 = 200.0 / 3360.0;
-
 const STAMPS: &str = "Files are named by the time of the last column; columns are spread uniformly over a turn, which is the time since \
                       the previous file, and the time of a scan is the mean of its columns'.";
-const ROW_STAMPS: &str = "Files are named by the end of the sweep; the time of a scan is the mean of its first and last row's stamps.";
 
-pub(crate) fn open_oxford_form(
-    found: Found,
-    options: &DatasetOptions,
-) -> Result<NavtechScans, OpenError> {
-    NavtechScans::open(found, options, |_| Profile {
-        format: Format::MulranOxfordForm,
-        range_resolution_m: RANGE_RESOLUTION_M,
-        range_offset_m: 0.0,
-        doppler_s: 0.0,
-        azimuth_eccentricity_rad: 0.0,
-        encoder_counts: 5600,
-        azimuth_source: AzimuthSource::Encoder,
-        scan_time: ScanTime::Halfway,
-        smooth_stamps: true,
-        byte_ten: ByteTen::Unused,
-        named_by: NamedBy::End,
-        stamp_meaning: ROW_STAMPS,
-    })
-}
-
-/// Opens MulRan as recorded.
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
-    let mut scans = TransposedScans::open(found, options, STAMPS, |_| RANGE_RESOLUTION_M)?;
+    let mut scans = TransposedScans::open(found, options, STAMPS, |_| MULRAN_RESOLUTION_M)?;
     scans.first_azimuth = FirstAzimuth::HalfAStep;
     let ends_ns = (0..scans.images.len())
         .map(|index| end_ns(&scans.images, index))

@@ -1,14 +1,15 @@
-//! Sentences on what the first image of Navtech scans shows.
+//! Sentences on the properties of the first image of Navtech scans.
 
 use super::first_image::FirstImage;
+use super::format::Format;
 use super::navtech_png::ByteTen;
-use super::navtech_profile::Profile;
 use super::options::AzimuthSource;
+use super::profiles::Profile;
 
 /// Observations on the first image.
-pub(super) fn observations(image: &FirstImage, profile: &Profile) -> Vec<String> {
+pub(super) fn observations(image: &FirstImage, format: Format, profile: &Profile) -> Vec<String> {
     let named = image.named_by().filter(|by| *by != profile.named_by).map(|by| {
-        let (format, expected) = (profile.format, profile.named_by.description());
+        let expected = profile.named_by.description();
         format!(
             "The files are named by {}, but {format} files by {expected}: the format may be another one.",
             by.description()

@@ -1,7 +1,6 @@
 //! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford,
 //! OORD, Boreas, MulRan (Oxford format) and FoMo.
 
-use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -13,10 +12,11 @@ use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_notes::{note_encoder, observations};
 use super::navtech_png::{self, METADATA_BYTES};
-use super::navtech_profile::{Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
+use super::profiles::{Profile, ScanTime};
 use super::row_order::{self, RowOrder};
 use super::stamp;
+use super::{Dataset, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 use std::ops::RangeInclusive;
@@ -26,9 +26,9 @@ use std::ops::RangeInclusive;
 #[derive(Debug)]
 pub(crate) struct NavtechScans {
     images: Images,
+    format: Format,
     profile: Profile,
     period_ns: i64,
-    /// The longest plausible sweep.
     max_sweep_ns: i64,
     /// True if the names of the files are times of their sweeps.
     named_by_time: bool,
@@ -43,12 +43,11 @@ const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 const MAX_SWEEP_PERIODS: i64 = 2;
 
 impl NavtechScans {
-    /// `profile` returns the defaults of the format, which may depend on the first image; `options`
-    /// take precedence.
+    /// `profile` has the defaults of the format; `options` take precedence.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
-        profile: impl FnOnce(Option<&FirstImage>) -> Profile,
+        profile: Profile,
     ) -> Result<Self, OpenError> {
         let Found {
             format,
@@ -72,7 +71,8 @@ impl NavtechScans {
             notes.extend(sentences);
         }
         let mut scans = Self {
-            profile: profile(first_image.as_ref()).with(options),
+            profile: profile.with(format, first_image.as_ref(), options),
+            format,
             period_ns: stamp::DEFAULT_TURN_NS,
             max_sweep_ns: MAX_SWEEP_NS,
             named_by_time: first_image
@@ -94,13 +94,15 @@ impl NavtechScans {
                 Some(_) => scans.notes.extend(note_encoder(image, &scans.profile)),
                 None => scans.find_encoder(image, turn_ns),
             }
-            scans.notes.extend(observations(image, &scans.profile));
+            scans
+                .notes
+                .extend(observations(image, scans.format, &scans.profile));
         }
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one. Only
-    /// says what the first image shows if that took less or more than a turn.
+    /// Takes the size of the encoder that the first images show, unless it is the usual one. If the
+    /// first image took less or more than a turn, the size is only reported.
     fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
         match encoder_counts(&[first_image.turn()], turn_ns, usual) {
@@ -149,13 +151,6 @@ impl NavtechScans {
         self.profile.azimuth_source == AzimuthSource::Encoder
     }
 
-    fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-        let rows = self.images.max_rows;
-        check_capacity("azimuths", rows, slot.azimuth_rad.len())?;
-        check_capacity("stamps", rows, slot.stamp_ns.len())?;
-        check_capacity("flags", rows, slot.flags.len())
-    }
-
     fn scan_time_ns(&self, stamp_ns: &[i64]) -> i64 {
         let n = stamp_ns.len();
         match self.profile.scan_time {
@@ -192,21 +187,6 @@ impl NavtechScans {
     }
 }
 
-pub(crate) fn check_capacity(
-    what: &'static str,
-    needed: usize,
-    actual: usize,
-) -> Result<(), ReadError> {
-    if actual < needed {
-        return Err(ReadError::SlotTooSmall {
-            what,
-            needed,
-            actual,
-        });
-    }
-    Ok(())
-}
-
 fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     let ImageSize { width, height } = images.size;
     let reason = if width <= METADATA_BYTES {
@@ -226,7 +206,7 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
 
 impl Dataset for NavtechScans {
     fn format(&self) -> Format {
-        self.profile.format
+        self.format
     }
 
     fn len(&self) -> usize {
@@ -286,7 +266,7 @@ impl Dataset for NavtechScans {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        self.check_slot(&slot)?;
+        check_capacity(self.limits(), &slot)?;
         let size = self
             .images
             .decode_rows(index, self.accepted_rows(), slot.bytes)?;

@@ -1,6 +1,6 @@
 //! Options for reading a dataset.
 
-use std::{fmt, ops::RangeInclusive};
+use std::fmt;
 
 use arrayvec::ArrayString;
 use serde::{Deserialize, Serialize};
@@ -80,47 +80,48 @@ pub struct DatasetOptions {
 
 impl DatasetOptions {
     /// Rejects values out of bounds.
-    ///
-    /// # Errors
-    /// The first of them.
     pub fn check(&self) -> Result<(), OpenError> {
-        let check = |key, value: Option<f32>, bounds: RangeInclusive<f32>, reason| match value {
-            Some(v) if !bounds.contains(&v) => Err(Self::invalid(None, key, value, reason)),
-            _ => Ok(()),
-        };
-        check(
-            "range_resolution_m",
-            self.range_resolution_m,
-            0.02..=1.5,
-            "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
-        )?;
-        check(
-            "range_offset_m",
-            self.range_offset_m,
-            -5.0..=5.0,
-            "the delays inside radars make -5 to 5 m",
-        )?;
-        check(
-            "doppler_s",
-            self.doppler_s,
-            -1.0..=1.0,
-            "it must be from -1 to 1 s",
-        )?;
-        check(
-            "azimuth_eccentricity_rad",
-            self.azimuth_eccentricity_rad,
-            -0.1..=0.1,
-            "it must be from -0.1 to 0.1 rad",
-        )?;
-        check(
-            "encoder_counts",
-            self.encoder_counts.map(f32::from),
-            16.0..=f32::INFINITY,
-            "an encoder has at least 16 counts per turn",
-        )
+        let checks = [
+            (
+                "range_resolution_m",
+                self.range_resolution_m,
+                0.02..=1.5,
+                "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
+            ),
+            (
+                "range_offset_m",
+                self.range_offset_m,
+                -5.0..=5.0,
+                "the delays inside radars make -5 to 5 m",
+            ),
+            (
+                "doppler_s",
+                self.doppler_s,
+                -1.0..=1.0,
+                "it must be from -1 to 1 s",
+            ),
+            (
+                "azimuth_eccentricity_rad",
+                self.azimuth_eccentricity_rad,
+                -0.1..=0.1,
+                "it must be from -0.1 to 0.1 rad",
+            ),
+            (
+                "encoder_counts",
+                self.encoder_counts.map(f32::from),
+                16.0..=f32::INFINITY,
+                "an encoder has at least 16 counts per turn",
+            ),
+        ];
+        let mut checks = checks.into_iter();
+        let invalid =
+            checks.find(|(_, value, bounds, _)| value.is_some_and(|it| !bounds.contains(&it)));
+        invalid.map_or(Ok(()), |(key, value, _, reason)| {
+            Err(Self::invalid(None, key, value, reason))
+        })
     }
 
-    /// Returns these options, with those of `other` where these are not set.
+    /// Returns these options; `other` supplies the ones that are not set.
     #[must_use]
     pub fn or(self, other: &Self) -> Self {
         Self {
@@ -153,23 +154,17 @@ impl DatasetOptions {
 
     /// Rejects options that require an encoder, for images without encoder counts.
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
-        if self.encoder_counts.is_some() {
-            return Err(Self::invalid(
-                Some(format),
-                "encoder_counts",
-                self.encoder_counts,
-                "its images have no encoder counts",
-            ));
+        let refuse = |key, value: Option<String>| {
+            let reason = "its images have no encoder counts";
+            Err(Self::invalid(Some(format), key, value, reason))
+        };
+        match (self.encoder_counts, self.azimuth_source) {
+            (Some(counts), _) => refuse("encoder_counts", Some(counts.to_string())),
+            (_, Some(AzimuthSource::Encoder)) => {
+                refuse("azimuth_source", Some("encoder".to_owned()))
+            }
+            _ => Ok(()),
         }
-        if self.azimuth_source == Some(AzimuthSource::Encoder) {
-            return Err(Self::invalid(
-                Some(format),
-                "azimuth_source",
-                Some("encoder"),
-                "its images have no encoder counts",
-            ));
-        }
-        Ok(())
     }
 
     fn invalid(

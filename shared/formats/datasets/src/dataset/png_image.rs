@@ -37,7 +37,7 @@ pub(crate) fn first_bytes<const N: usize>(path: &Path) -> Option<[u8; N]> {
     read_size(path).ok()?;
     let file = BufReader::new(gyre_storage::open(path).ok()?);
     let mut reader = decoder(file).read_info().ok()?;
-    // The first row of an interlaced image is that of its first pass.
+    // The first row of an interlaced image belongs to its first pass.
     if reader.info().interlaced {
         return None;
     }

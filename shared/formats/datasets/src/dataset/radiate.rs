@@ -60,9 +60,6 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
 }
 
 /// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
-///
-/// # Errors
-/// A list that cannot be read, or a line of another form.
 pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
     Ok(parse_stamps(list, &read_list(list)?)?.0)
 }
@@ -86,7 +83,7 @@ struct Segment {
     receipts: Vec<Receipt>,
 }
 
-/// Divides the frames where the time between two of them is not that of their numbers, as after a
+/// Divides the frames where the time between two of them contradicts their numbers, as after a
 /// pause or when the clock was set. A single time that is off is left out.
 fn segments(received: &[Receipt]) -> Vec<Segment> {
     let mut segments: Vec<Segment> = Vec::new();

@@ -1,5 +1,5 @@
-//! The order of images whose names are no times: that of the stamps of their first rows, unless it
-//! mixes two clocks.
+//! The order of images whose names are no times: the order of the stamps of their first rows,
+//! unless it mixes two clocks.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -15,18 +15,18 @@ const BY_TIME: &str = "The files are not named by times of their scans: they are
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \
                        since in the order of the times of their first rows scans would overlap: a clock was set.";
 
-/// The times of the first rows of images, and what is to be said of them.
+/// The times of the first rows of images, and notes on them.
 #[derive(Debug)]
 pub(crate) struct RowOrder {
-    /// ns since 1970, increasing unless a clock was set. That of an image that cannot be read is
-    /// about where it would be.
+    /// ns since 1970, increasing unless a clock was set. The time of an unreadable image is
+    /// estimated.
     pub(crate) starts_ns: Vec<i64>,
     pub(crate) notes: Vec<String>,
 }
 
 /// Orders images by the stamps of their first rows, unless that mixes two clocks, and leaves out
-/// those with the stamp of another one. Does nothing and returns `None` if their names are times of
-/// the rows, or the rows have no times.
+/// images with a repeated stamp. Does nothing and returns `None` if their names are times of the
+/// rows, or the rows have no times.
 pub(crate) fn order(images: &mut Images, first_image: &FirstImage) -> Option<RowOrder> {
     let start_ns = first_image.has_stamps().then(|| first_image.start_ns())??;
     let is_named = |name_ns: i64| (name_ns - start_ns).abs() <= MAX_INTERVAL_NS;
@@ -74,8 +74,8 @@ fn by_time(stamps: &[Option<i64>]) -> Vec<usize> {
 }
 
 /// Returns whether the order by time mixes scans of two clocks: scans of one radar cannot overlap,
-/// and there more than a few would, and more than in the order of their names. `turn_ns` is that of
-/// the first image's rows.
+/// and there more than a few would, and more than in the order of their names. `turn_ns` is the
+/// duration of the rows of the first image.
 fn is_mixed(stamps: &[Option<i64>], by_time: &[usize], turn_ns: Option<i64>) -> bool {
     let named: Vec<i64> = stamps.iter().copied().flatten().collect();
     let sorted: Vec<i64> = by_time.iter().filter_map(|index| stamps[*index]).collect();
@@ -101,7 +101,8 @@ fn without_copies(stamps: &[Option<i64>], order: Vec<usize>) -> (Vec<usize>, Vec
     order.into_iter().partition(is_first)
 }
 
-/// Gives images without a time one, a turn after that of the image before; `None` if none has one.
+/// Gives each image without a time the time of the image before plus a turn; `None` if no image has
+/// a time.
 fn filled(stamps: Vec<Option<i64>>) -> Option<Vec<i64>> {
     let known = || stamps.iter().copied().flatten();
     let turn_ns = stamp::turn_ns(known()).unwrap_or(stamp::DEFAULT_TURN_NS);

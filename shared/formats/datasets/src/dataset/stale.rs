@@ -1,10 +1,10 @@
-//! Stale rows: the last rows of an image, if they still hold what the image before had there. A
-//! host that loses azimuths of a turn fills so many rows less.
+//! Stale rows: the last rows of an image, if they still contain rows of the image before. A host
+//! that loses azimuths of a turn fills so many rows less.
 
-/// Least correlation of a stale row with the same row of the image before. It is 0.93 to 0.97 with
-/// stale ones, which were compressed anew, and mostly below 0.75 with measured ones.
+/// Least correlation of a stale row with the same row of the image before. It is 0.93 to 0.97 for
+/// stale rows that were compressed again, and mostly below 0.75 for measured rows.
 const STALE: f64 = 0.85;
-/// Share of the bins, the nearest, that are left out: what the vehicle itself reflects is the same
+/// Share of the bins, the nearest, that are left out: the echoes of the vehicle itself are the same
 /// in each turn.
 const NEAR: f64 = 0.05;
 
@@ -19,9 +19,9 @@ pub(crate) struct StaleRows {
 }
 
 impl StaleRows {
-    /// Expects stale rows that differ a little, as images were compressed with a loss; otherwise
-    /// they are the same to the bit, so that no measured one of a standing radar is taken for
-    /// stale.
+    /// Expects stale rows that differ a little, because the images had a lossy compression.
+    /// Otherwise stale rows are bitwise equal, so that measured rows of a standing radar do not
+    /// count as stale.
     pub fn of_compressed(self) -> Self {
         Self {
             is_compressed: true,
@@ -29,7 +29,7 @@ impl StaleRows {
         }
     }
 
-    /// Returns whether the rows are those of an image.
+    /// Returns whether the rows belong to an image.
     pub fn has(&self, index: usize) -> bool {
         self.of == Some(index)
     }

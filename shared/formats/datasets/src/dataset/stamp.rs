@@ -2,7 +2,6 @@
 
 use gyre_radar::median;
 
-/// Nanoseconds per second.
 pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 
 /// 2015-01-01 and 2041-01-01, s since 1970: the range of plausible times.
@@ -69,7 +68,7 @@ pub fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     median(one_turn.map(|ns| *ns as f64)).map(|ns| ns as i64)
 }
 
-/// Returns the mean of two times, ns: the time of a scan from those of its first and last row.
+/// Returns the mean of two times, ns: the time of a scan from the times of its first and last row.
 pub fn middle_ns(first_ns: i64, last_ns: i64) -> i64 {
     // Saturating, since times that a radar sends may be any.
     first_ns.saturating_add(last_ns.saturating_sub(first_ns) / 2)

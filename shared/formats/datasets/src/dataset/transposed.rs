@@ -1,7 +1,6 @@
 //! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth
 //! from straight ahead.
 
-use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
@@ -10,9 +9,9 @@ use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
-use super::navtech_scans::check_capacity;
 use super::options::{DatasetOptions, LostAzimuthOption};
 use super::stale::StaleRows;
+use super::{Dataset, check_capacity};
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
@@ -56,7 +55,8 @@ pub(crate) struct TransposedScans {
     doppler_s: f32,
     azimuth_eccentricity_rad: f32,
     scratch: Vec<u8>,
-    /// Without angles nothing else tells that the host has lost azimuths; `None`: they are ignored.
+    /// Without angles, only stale rows show that the host has lost azimuths; `None`: they are
+    /// ignored.
     pub(crate) stale: Option<StaleRows>,
 }
 
@@ -208,10 +208,7 @@ impl Dataset for TransposedScans {
             len: self.len(),
         })?;
         let (azimuths, bins) = (self.azimuths(), self.bins());
-        check_capacity("bytes", azimuths * bins, slot.bytes.len())?;
-        check_capacity("azimuths", azimuths, slot.azimuth_rad.len())?;
-        check_capacity("stamps", azimuths, slot.stamp_ns.len())?;
-        check_capacity("flags", azimuths, slot.flags.len())?;
+        check_capacity(self.limits(), &slot)?;
         // Before the image, since it is decoded into the same scratch memory.
         if let Some(before) = index.checked_sub(1)
             && self.stale.as_ref().is_some_and(|stale| !stale.has(before))

@@ -3,14 +3,17 @@
 use gyre_samples::{LocalPlane, RawFix};
 use serde::Serialize;
 
-use super::{LoggedFix, Raw};
-use crate::stretches::{between, longest_chain};
+use super::LoggedFix;
+use crate::{
+    stretches::{between, longest_chain},
+    table::Raw,
+};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
 const MAX_SPEED_MPS: f64 = 70.0;
 /// A step of fixes by less is noise, m.
 const SLACK_M: f64 = 10.0;
-/// The stated accuracy, in standard deviations, by which a step may be longer.
+/// A step may be longer by this many stated standard deviations.
 const SLACK_SIGMAS: f64 = 5.0;
 /// No receiver measures better than 1 cm with the phase of the carrier, nor is a fix compared with
 /// the radar's place better than that: within 1 ms a car drives a centimetre.
@@ -20,10 +23,10 @@ const MOST_SIGMA_M: f64 = 1e6;
 /// Stretches between jumps that are looked back over: behind so many the fixes are noise.
 const LOOK_BACK: usize = 200;
 
-/// Faults of a log. What is counted is not among its fixes, but what came out of order.
+/// Faults of a log. Counted fixes are left out unless the count states otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GnssFaults {
-    /// Rows that are none of the table, as one that was cut off.
+    /// Rows that do not fit the table, such as a truncated row.
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     #[serde(skip_serializing_if = "is_zero")]
@@ -36,12 +39,12 @@ pub struct GnssFaults {
     pub off_the_earth: usize,
     /// Fixes at latitude 0, longitude 0: what receivers write without a fix.
     pub zero: usize,
-    /// Fixes with the stamp of another one.
+    /// Fixes with a repeated stamp.
     pub repeated: usize,
     /// Fixes at the very place of the fix before, as of a frozen receiver or a standing vehicle:
     /// only the first is used.
     pub frozen: usize,
-    /// Fixes with a stamp before that of an earlier one: sorted.
+    /// Fixes with a stamp before an earlier one: sorted.
     pub out_of_order: usize,
     /// Fixes whose status the receiver does not state: used.
     pub of_unknown_status: usize,
@@ -81,7 +84,7 @@ impl GnssFaults {
         format!("none of its {all} entries is a usable fix{named}")
     }
 
-    /// Returns the counts that are not zero, with what was counted.
+    /// Returns the counts that are not zero, with their names.
     pub fn named(&self) -> Vec<(usize, &'static str)> {
         let all = [
             (self.unreadable, "unreadable"),
@@ -103,17 +106,17 @@ impl GnssFaults {
 /// The fixes that can be used, the plane that they are in, and the faults.
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
-/// Leaves out and sorts what the faults name, and counts it.
-pub(super) fn examine(raw: Raw) -> Examined {
+/// Removes and sorts faulty fixes, and counts them.
+pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
-        without_fix: raw.without_fix,
+        without_fix: raw.unmeasured,
         ..GnssFaults::default()
     };
-    let mut rows = raw.rows;
+    let mut rows = raw.entries;
     faults.not_a_number = leave_out(&mut rows, |row| row.at.iter().any(|it| !it.is_finite()));
-    if !raw.is_plane {
+    if !is_plane {
         faults.zero = leave_out(&mut rows, |row| row.at == [0.0, 0.0]);
         faults.off_the_earth = leave_out(&mut rows, |row| {
             row.at[0].abs() > 89.9 || row.at[1].abs() > 360.0
@@ -127,12 +130,12 @@ pub(super) fn examine(raw: Raw) -> Examined {
     faults.of_unknown_status = count(&|row| row.status_is_unknown);
     faults.too_certain = count(&|row| 0.0 < row.sigma_m && row.sigma_m < LEAST_SIGMA_M);
     let plane_at = |row: &RawFix| LocalPlane::new(row.geographic(), finite_or_zero(row.altitude_m));
-    let first = rows.first().filter(|_| !raw.is_plane);
+    let first = rows.first().filter(|_| !is_plane);
     let fixes = in_plane(&rows, first.map(plane_at).as_ref());
     let kept = without_jumps(&fixes);
     faults.jumps = rows.len() - kept.len();
     let rows: Vec<RawFix> = kept.into_iter().map(|k| rows[k]).collect();
-    let plane = rows.first().filter(|_| !raw.is_plane).map(plane_at);
+    let plane = rows.first().filter(|_| !is_plane).map(plane_at);
     (in_plane(&rows, plane.as_ref()), plane, faults)
 }
 
@@ -147,7 +150,7 @@ fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize 
     before - rows.len()
 }
 
-/// Sorts fixes by their stamps, each of which is used once: the one that was written first.
+/// Sorts fixes by their stamps. Of fixes with the same stamp only the first in the log is used.
 fn sort(rows: &mut Vec<RawFix>, faults: &mut GnssFaults) {
     let before = rows.len();
     let mut latest_ns = i64::MIN;

@@ -7,8 +7,11 @@ use std::{
 
 use gyre_storage as storage;
 
-use super::{GnssLog, GnssLogError, Raw, table::FixColumns};
-use crate::table::Rows;
+use super::{GnssLog, OF, table::FixColumns};
+use crate::{
+    LogError,
+    table::{Raw, Rows},
+};
 
 /// The fixes that a live receiver has sent so far: each row of their log is read once.
 pub struct ReceivedFixes {
@@ -29,13 +32,11 @@ impl ReceivedFixes {
     }
 
     /// Reads the rows that were appended since.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is no log of fixes.
-    pub fn read_on(&mut self) -> Result<(), GnssLogError> {
+    pub fn read_on(&mut self) -> Result<(), LogError> {
         let path = || self.path.clone();
         let bytes = self.appended();
-        let bytes = bytes.map_err(|source| GnssLogError::Io {
+        let bytes = bytes.map_err(|source| LogError::Io {
+            of: OF,
             path: path(),
             source,
         })?;
@@ -45,7 +46,11 @@ impl ReceivedFixes {
             None => {
                 let rows = Rows::of(&text);
                 let path = path();
-                self.rows = Some(rows.map_err(|reason| GnssLogError::Unknown { path, reason })?);
+                self.rows = Some(rows.map_err(|reason| LogError::Unknown {
+                    of: OF,
+                    path,
+                    reason,
+                })?);
             }
         }
         self.end += bytes.len() as u64;
@@ -54,13 +59,16 @@ impl ReceivedFixes {
 
     /// Returns the number of fixes so far.
     pub fn count(&self) -> usize {
-        self.rows.as_ref().map_or(0, |rows| rows.entries.len())
+        self.rows.as_ref().map_or(0, |rows| rows.raw.entries.len())
     }
 
     /// Returns the log of all that was read.
     pub fn log(&self) -> GnssLog {
-        let raw = self.rows.clone().map(Raw::from).unwrap_or_default();
-        let (log, error) = GnssLog::examined(raw, &self.path);
+        let rows = self.rows.clone();
+        let (raw, is_plane) = rows.map_or((Raw::of(Vec::new()), false), |rows| {
+            (rows.raw, rows.columns.is_plane)
+        });
+        let (log, error) = GnssLog::examined(raw, is_plane, &self.path);
         GnssLog {
             unusable: error.map(|error| error.to_string()),
             ..log

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use csv::StringRecord;
 use gyre_samples::RawFix;
-use gyre_storage as storage;
 
-use super::{GnssLogError, Raw};
+use super::OF;
 use crate::{
+    LogError,
     header::{Header, Sign, Stamp},
-    parse_seconds,
-    table::{Columns, MAX_BYTES, Rows},
+    logs, parse_seconds,
+    table::{Columns, Raw},
 };
 
 /// Columns of MulRan `gps.csv`, which has no header: stamp (ns), latitude, longitude, altitude,
@@ -43,7 +43,6 @@ const STATUS_UNKNOWN: &str = "-2";
 
 /// The remedy for a line of a trajectory.
 const TUM: &str = "a line has seconds, x and y, with spaces between";
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
 
 /// Where a table has what.
@@ -62,45 +61,22 @@ pub(super) struct FixColumns {
 #[derive(Clone)]
 enum Sigma {
     None,
-    /// Standard deviations, of which the mean square counts.
+    /// Standard deviations; their mean square is used.
     Deviations([usize; 2]),
-    /// Variances.
     Variances([usize; 2]),
 }
 
-pub(super) fn read(path: &Path) -> Result<Raw, GnssLogError> {
-    let text = storage::read_text(path, MAX_BYTES).map_err(|source| GnssLogError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
-    let is_tum = path.extension().is_some_and(|ending| ending == "tum");
-    let raw = match is_tum {
-        true => Ok(parse_tum(&text)),
-        false => Rows::of(&text).map(Raw::from),
-    };
-    raw.map_err(|reason| GnssLogError::Unknown {
-        path: path.to_owned(),
-        reason,
-    })
-}
-
-impl From<Rows<FixColumns>> for Raw {
-    fn from(rows: Rows<FixColumns>) -> Self {
-        Self {
-            is_plane: rows.columns.is_plane,
-            rows: rows.entries,
-            unreadable: rows.unreadable,
-            without_fix: rows.unmeasured,
-        }
+pub(super) fn read(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
+    if path.extension().is_some_and(|ending| ending == "tum") {
+        return Ok((parse_tum(&logs::text(path, OF)?), true));
     }
+    let rows = logs::rows::<FixColumns>(path, OF)?;
+    Ok((rows.raw, rows.columns.is_plane))
 }
 
 /// Reads the times and places of a trajectory: seconds, x, y and more.
-fn parse_tum(text: &str) -> Raw {
-    let mut raw = Raw {
-        is_plane: true,
-        ..Raw::default()
-    };
+fn parse_tum(text: &str) -> Raw<RawFix> {
+    let mut raw = Raw::of(Vec::new());
     for (number, line) in text.lines().enumerate() {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
@@ -109,7 +85,7 @@ fn parse_tum(text: &str) -> Raw {
         let stamp_ns = fields.next().and_then(parse_seconds);
         let mut coordinate = || fields.next()?.parse().ok();
         match (stamp_ns, coordinate(), coordinate()) {
-            (Some(stamp_ns), Some(x), Some(y)) => raw.rows.push(RawFix {
+            (Some(stamp_ns), Some(x), Some(y)) => raw.entries.push(RawFix {
                 stamp_ns,
                 at: [x, y],
                 ..RawFix::default()

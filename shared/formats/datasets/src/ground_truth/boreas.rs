@@ -1,5 +1,5 @@
-//! Boreas `radar_poses.csv`, or those of the lidar: poses of the sensor in east-north-up; its frame
-//! is x forward, y right, z down (roll near pi).
+//! Boreas `radar_poses.csv`, or the poses of the lidar: poses of the sensor in east-north-up; its
+//! frame is x forward, y right, z down (roll near pi).
 
 use gyre_geometry::pose;
 

@@ -82,9 +82,6 @@ fn leading_stamp(row: &str) -> Option<i64> {
 }
 
 /// Writes KITTI poses in the plane (z = 0).
-///
-/// # Errors
-/// Errors of `out`.
 pub fn write_kitti(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     for pose in &trajectory.poses {
         let (sin, cos) = pose.rotation.angle().sin_cos();

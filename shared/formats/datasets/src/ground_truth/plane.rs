@@ -32,11 +32,8 @@ const MIN_UPRIGHT: f64 = 0.7;
 const MAX_CLIMB: f64 = 0.3;
 
 impl Plane {
-    /// Returns the plane in which the sensor moves: ahead along its z axis, it is a camera. Without
-    /// headings the vertical axis is the one along which it moves least.
-    ///
-    /// # Errors
-    /// The sensor does not stay upright in any known frame.
+    /// Returns the sensor's plane of motion: a sensor that moves ahead along its z axis is a
+    /// camera. Without headings the vertical axis is the one along which it moves least.
     pub fn of(poses: &[Matrix]) -> Result<Self, String> {
         let moved = Displacement::of(poses);
         if poses.windows(2).all(|w| rotation(&w[0]) == rotation(&w[1])) {

@@ -66,8 +66,7 @@ fn matrix([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Matrix {
 
 /// Writes TUM poses with stamps in ns.
 ///
-/// # Errors
-/// `InvalidInput` for a trajectory without times; errors of `out`.
+/// A trajectory without times is `InvalidInput`.
 pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     let stamps = trajectory.stamp_ns.as_ref();
     let stamps = stamps.ok_or_else(|| {
@@ -81,9 +80,6 @@ pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()
 }
 
 /// Writes a TUM pose with its stamp in ns.
-///
-/// # Errors
-/// Errors of `out`.
 pub fn write_tum_pose(ns: i64, pose: &Pose, out: &mut impl Write) -> io::Result<()> {
     let (sin, cos) = (pose.rotation.angle() / 2.0).sin_cos();
     let (sign, size) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());

@@ -5,20 +5,19 @@ use std::f64::consts::PI;
 use csv::StringRecord;
 use gyre_samples::{Sample, SampleKind};
 
-use super::SampleColumns;
 use crate::{
     header::{Header, Stamp},
-    table,
+    table::Columns,
 };
 
 /// Where a table has what.
-pub(super) struct Columns {
+pub(super) struct GyroColumns {
     stamp: Stamp,
     rates: [usize; 3],
     /// Factor that makes the rates rad/s.
     rate_unit: f64,
     /// The unit of the rates is named nowhere.
-    unit_is_assumed: bool,
+    pub unit_is_assumed: bool,
     accelerations: Option<([usize; 3], f64)>,
 }
 
@@ -40,7 +39,6 @@ const RATE_UNITS: [(&str, f64); 11] = [
     ("_mdps", PI / 180e3),
 ];
 
-/// Names of accelerations.
 const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
     lin_acc_* a_rs_s_*";
 /// Units at the end of an acceleration's name.
@@ -53,15 +51,15 @@ const ACCELERATION_UNITS: [(&str, f64); 6] = [
     ("_mg", 9.80665e-3),
 ];
 
-/// Headers of datasets, whose rates are in rad/s though they do not say so: Boreas-RT `dmu_imu.csv`
-/// and `aeva_imu.csv`, Boreas `applanix/imu.csv`.
+/// Headers of datasets, whose rates are in rad/s although the headers do not name the unit:
+/// Boreas-RT `dmu_imu.csv` and `aeva_imu.csv`, Boreas `applanix/imu.csv`.
 const KNOWN: [&[&str]; 2] = [
     &["time", "wx", "wy", "wz", "ax", "ay", "az"],
     &[
         "gpstime", "angvel_z", "angvel_y", "angvel_x", "accelz", "accely", "accelx",
     ],
 ];
-/// FoMo `vectornav.csv` and `xsens.csv`, in which `a` are angular rates, `l` accelerations.
+/// FoMo `vectornav.csv` and `xsens.csv`: `a` are angular rates, `l` accelerations.
 const FOMO: [&str; 7] = ["t", "ax", "ay", "az", "lx", "ly", "lz"];
 /// Columns of MulRan `xsens_imu.csv`, which has no header: stamp (ns), quaternion, Euler angles,
 /// rates, accelerations, magnetic field.
@@ -69,10 +67,9 @@ const MULRAN: usize = 17;
 /// Columns of its first version, without rates.
 const MULRAN_WITHOUT_RATES: usize = 8;
 
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
-impl table::Columns for Columns {
+impl Columns for GyroColumns {
     type Entry = Sample;
 
     fn by_number(columns: usize) -> Result<Self, String> {
@@ -138,14 +135,6 @@ impl table::Columns for Columns {
         let rates = read(self.rates, self.rate_unit)?;
         let accelerations = self.accelerations.and_then(|(at, factor)| read(at, factor));
         Some(sample(stamp_ns, rates, accelerations.unwrap_or_default()))
-    }
-}
-
-impl SampleColumns for Columns {
-    const OF: SampleKind = SampleKind::Gyro;
-
-    fn unit_is_assumed(&self) -> bool {
-        self.unit_is_assumed
     }
 }
 

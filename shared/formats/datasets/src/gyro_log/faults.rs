@@ -9,12 +9,12 @@ use std::path::Path;
 use gyre_radar::median;
 use serde::Serialize;
 
-use super::{LogError, Raw};
+use crate::{LogError, table::Raw};
 use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
 const ABSURD_RADPS: f64 = 10.0;
-/// Share of absurd rates above which the unit must be another one.
+/// If the share of absurd rates is larger, the unit must be different.
 pub(crate) const ABSURD_SHARE: f64 = 0.01;
 /// Longest time between two samples that is no gap, median periods, whatever stamps round to.
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
@@ -22,10 +22,10 @@ const GAP_PERIODS: f64 = 3.0 + 1e-6;
 /// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
 const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
 
-/// Faults of a log. What is counted as left out is not in its samples.
+/// Faults of a log. Its samples do not include the ones counted as left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFaults {
-    /// Rows that are none of the table, as one that was cut off: left out.
+    /// Rows that do not fit the table, such as a truncated row: left out.
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     pub first_unreadable: usize,
@@ -35,9 +35,9 @@ pub struct LogFaults {
     pub absurd: usize,
     /// Samples that come in bursts of one stamp: spread over the time since the burst before.
     pub spread: usize,
-    /// Samples with the stamp of another one: left out.
+    /// Samples with a repeated stamp: left out.
     pub repeated: usize,
-    /// Samples with a stamp before that of an earlier one: sorted.
+    /// Samples with a stamp before an earlier one: sorted.
     pub out_of_order: usize,
     /// Samples of times for which the clock was set back, by up to a second: left out.
     pub measured_twice: usize,
@@ -100,7 +100,7 @@ impl LogFaults {
 
     /// Returns a sentence for each kind of fault of the log of a sensor.
     pub fn sentences(&self, of: SampleKind) -> Vec<String> {
-        let [values, absurd, unit] = match of {
+        let [values, absurd, unit_of] = match of {
             SampleKind::Gyro => [
                 "rates",
                 "rates beyond 10 rad/s, at which no vehicle turns",
@@ -112,67 +112,57 @@ impl LogFaults {
                 "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
             ],
         };
-        let counted = |count: usize, sentence: String| (count > 0).then_some(sentence);
+        let counted = [
+            (
+                self.unreadable,
+                format!("rows are not of its table, the first in line {}: left out.", self.first_unreadable),
+            ),
+            (
+                self.not_a_number,
+                format!("samples have no {values}, or some that are not finite: left out."),
+            ),
+            (self.absurd, format!("samples have {absurd}: left out.")),
+            (
+                self.spread,
+                "samples come in bursts of one stamp: spread evenly back to the burst before.".to_owned(),
+            ),
+            (
+                self.repeated,
+                "samples have the stamp of another one: left out.".to_owned(),
+            ),
+            (
+                self.out_of_order,
+                "samples come later than their stamps say: sorted.".to_owned(),
+            ),
+            (
+                self.measured_twice,
+                "samples are of times over which the clock was set back, and which have two measurements: left out.".to_owned(),
+            ),
+        ];
+        let counted = counted.into_iter().filter(|(count, _)| *count > 0);
+        let counted = counted.map(|(count, sentence)| format!("{count} {sentence}"));
+        let steps = (!self.clock_steps_s.is_empty()).then(|| {
+            let (steps, count) = (self.clock_steps(), self.by_clock_steps);
+            format!("{steps}: {count} samples that do not fit with the others are left out.")
+        });
         let longest = self.gaps.iter().copied();
         let longest = longest.max_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        [
-            counted(
-                self.unreadable,
-                format!("{} rows are not of its table, the first in line {}: left out.", self.unreadable, self.first_unreadable),
-            ),
-            counted(
-                self.not_a_number,
-                format!("{} samples have no {values}, or some that are not finite: left out.", self.not_a_number),
-            ),
-            counted(
-                self.absurd,
-                format!("{} samples have {absurd}: left out.", self.absurd),
-            ),
-            counted(
-                self.spread,
-                format!("{} samples come in bursts of one stamp: spread evenly back to the burst before.", self.spread),
-            ),
-            counted(
-                self.repeated,
-                format!("{} samples have the stamp of another one: left out.", self.repeated),
-            ),
-            counted(
-                self.out_of_order,
-                format!("{} samples come later than their stamps say: sorted.", self.out_of_order),
-            ),
-            counted(
-                self.measured_twice,
-                format!("{} samples are of times over which the clock was set back, and which have two measurements: left out.", self.measured_twice),
-            ),
-            counted(
-                self.clock_steps_s.len(),
-                format!(
-                    "{}: {} samples that do not fit with the others are left out.",
-                    self.clock_steps(),
-                    self.by_clock_steps
-                ),
-            ),
-            longest.map(|gap| {
-                format!(
-                    "Samples are missing in {} places, for up to {:.2} s ({:.1} s after the first).",
-                    self.gaps.len(),
-                    gap.seconds,
-                    gap.after_s
-                )
-            }),
-            counted(
-                self.bridged,
-                format!(
-                    "{} samples are missing one or two at a time: interpolated where `max_gap_s` allows it.",
-                    self.bridged
-                ),
-            ),
-            self.unit_is_assumed
-                .then(|| format!("The header names no unit {unit}.")),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let gaps = longest.map(|gap| {
+            let (places, seconds, after_s) = (self.gaps.len(), gap.seconds, gap.after_s);
+            format!(
+                "Samples are missing in {places} places, for up to {seconds:.2} s ({after_s:.1} s after the first)."
+            )
+        });
+        let bridged = (self.bridged > 0).then(|| {
+            let count = self.bridged;
+            format!(
+                "{count} samples are missing one or two at a time: interpolated where `max_gap_s` allows it."
+            )
+        });
+        let unit = self.unit_is_assumed;
+        let unit = unit.then(|| format!("The header names no unit {unit_of}."));
+        let others = [steps, gaps, bridged, unit].into_iter().flatten();
+        counted.chain(others).collect()
     }
 }
 
@@ -197,28 +187,28 @@ pub(super) const RATES: Plausible = Plausible {
     beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
 };
 
-/// Leaves out and sorts what the faults name, and counts it.
+/// Removes and sorts faulty samples, and counts them.
 pub(crate) fn examine(
-    raw: Raw,
+    raw: Raw<Sample>,
+    unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
     let unusable = |reason: String| LogError::Unusable {
-        of: plausible.of,
+        of: plausible.of.section(),
         path: path.to_owned(),
         reason,
     };
-    let rows = raw.samples.len() + raw.unmeasured + raw.unreadable.count;
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
-        unit_is_assumed: raw.unit_is_assumed,
+        unit_is_assumed,
         ..LogFaults::default()
     };
-    if let Some(reason) = raw.unreadable.are_most(rows) {
+    if let Some(reason) = raw.unreadable.are_most(raw.count()) {
         return Err(unusable(reason));
     }
-    let mut samples = raw.samples;
+    let mut samples = raw.entries;
     let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
         let before = samples.len();
         let is_bad = |sample: &Sample| {

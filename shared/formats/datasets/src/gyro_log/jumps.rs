@@ -1,4 +1,4 @@
-//! Jumps: values that change faster than those of a vehicle can.
+//! Jumps: values that change faster than the values of a vehicle can.
 
 use gyre_samples::{Sample, SampleKind};
 
@@ -18,7 +18,6 @@ const BACK_S: f64 = 0.5;
 const USUAL_SHARE: f64 = 0.95;
 const UNUSUAL: f64 = 3.0;
 
-/// Jumps of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Jumps {
     /// Samples between a jump and the one back: left out.

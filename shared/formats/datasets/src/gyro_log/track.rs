@@ -4,7 +4,7 @@ use gyre_samples::{GyroConfig, Sample, SampleKind};
 
 use super::{GyroLog, jumps};
 
-/// Samples in the vehicle's axes on the radar's clock, in the order in which they travel
+/// Samples in the vehicle's axes on the radar's clock, in the order of their transport
 /// ([`Sample::order`]).
 #[derive(Clone, Debug, Default)]
 pub struct SampleTrack(Vec<Sample>);
@@ -99,8 +99,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever axis points up, the third rate is that about it, and the axes stay
-        /// right-handed: the cross product of two vectors is that of the vectors as they were.
+        /// Whatever axis points up, the third rate is the rate about it, and the axes stay
+        /// right-handed: the cross product of two mapped vectors equals their mapped cross product.
         #[test]
         fn the_axes_are_right_handed(a in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64], b in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64]) {
             for up in AXES {
@@ -155,7 +155,7 @@ mod tests {
         )
         .unwrap();
         let config = GyroConfig {
-            late_s: 1.58,
+            delay_s: 1.58,
             up: Some(UpAxis::MinusZ),
             scale: 1.01,
             bias_radps: 0.5,

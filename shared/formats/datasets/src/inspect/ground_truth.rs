@@ -2,94 +2,143 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
+use super::Report;
 use crate::dataset::Dataset;
 use crate::ground_truth::{find_ground_truth, read_trajectory};
 use gyre_radar::median;
 use gyre_radar::trajectory::Trajectory;
-use gyre_radar::{ClockOffset, clock_offset};
+use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset};
 
 /// Tolerance of the time span, ns: without decoding, times of scans are known to a few
 /// milliseconds.
 const MARGIN_NS: i64 = 20_000_000;
 
-/// Summary of a ground truth file.
-#[derive(Clone, Debug, Serialize)]
-pub struct GroundTruthReport {
-    /// The file.
-    pub file: PathBuf,
-    /// Why it cannot be read; the fields below are empty then.
-    pub error: Option<String>,
-    /// Number of poses.
-    pub poses: usize,
-    /// Length of the path, m.
-    pub path_length_m: f64,
-    /// True if it has headings.
-    pub has_heading: bool,
-    /// First and last time, ns; `None` if it has no times.
-    pub span_ns: Option<(i64, i64)>,
-    /// Number of scans within its time span; `None` if times are unknown.
-    pub scans_covered: Option<usize>,
-    /// Median difference between the time of a scan and the nearest pose, s.
-    pub nearest_pose_s: Option<f64>,
-    /// The clock relative to the given trajectory.
-    pub clock: Option<ClockOffset>,
-}
+/// A trajectory with a shorter path stands, m.
+const STANDING_M: f64 = 0.1;
 
 /// Examines the ground truth at the usual path and all TUM files in the root, by name.
-pub(super) fn examine(
-    root: &Path,
-    dataset: &dyn Dataset,
-    trajectory: Option<&Trajectory>,
-) -> Vec<GroundTruthReport> {
-    let mut files: Vec<PathBuf> = std::fs::read_dir(root)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path())
-        .collect();
+pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Option<&Trajectory>) {
+    let entries = std::fs::read_dir(&report.root).into_iter().flatten();
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     let is_hidden = |path: &Path| {
         let name = path.file_name().unwrap_or_default();
         name.as_encoded_bytes().starts_with(b".")
     };
     let is_tum = |path: &Path| path.extension().is_some_and(|e| e == "tum") && path.is_file();
     files.retain(|path| is_tum(path) && !is_hidden(path));
-    files.extend(find_ground_truth(root));
+    files.extend(find_ground_truth(&report.root));
     files.sort();
     files.dedup();
-    let stamps: Vec<i64> = (0..dataset.len())
-        .filter_map(|i| dataset.nominal_stamp_ns(i))
-        .collect();
-    files
-        .into_iter()
-        .map(|file| examine_file(file, &stamps, trajectory))
-        .collect()
+    if files.is_empty() {
+        report.line("ground truth", "none found".to_owned());
+        report.find(
+            "No ground truth was found: odometry can run, but cannot be evaluated.".to_owned(),
+        );
+    }
+    let stamps = (0..dataset.len()).filter_map(|i| dataset.nominal_stamp_ns(i));
+    let stamps: Vec<i64> = stamps.collect();
+    let examined = files
+        .iter()
+        .map(|file| examine_file(report, file, &stamps, trajectory));
+    let figures: Vec<Value> = examined.collect();
+    report.figure("ground_truths", figures);
 }
 
+/// Adds the lines and the findings of a file, and returns its figures.
 fn examine_file(
-    file: PathBuf,
+    report: &mut Report,
+    file: &Path,
     scans_ns: &[i64],
     trajectory: Option<&Trajectory>,
-) -> GroundTruthReport {
-    let (truth, error) = match read_trajectory(&file) {
-        Ok(truth) => (truth, None),
-        Err(error) => (Trajectory::default(), Some(error.to_string())),
+) -> Value {
+    let name = report.name_of(file);
+    let truth = match read_trajectory(file) {
+        Ok(truth) => truth,
+        Err(error) => {
+            let error = error.to_string();
+            report.line("ground truth", format!("{name}: cannot be read"));
+            report.find(format!("The ground truth cannot be read: {error}."));
+            return json!({"file": file, "error": error});
+        }
     };
     let within = |(first, last): (i64, i64)| {
         let span = first.saturating_sub(MARGIN_NS)..=last.saturating_add(MARGIN_NS);
         scans_ns.iter().filter(|s| span.contains(s)).count()
     };
-    GroundTruthReport {
-        file,
-        error,
-        poses: truth.len(),
-        path_length_m: truth.path_length_m(),
-        has_heading: truth.has_heading(),
-        span_ns: truth.span_ns(),
-        scans_covered: truth.span_ns().map(within).filter(|_| !scans_ns.is_empty()),
-        nearest_pose_s: nearest_pose_s(&truth, scans_ns),
-        clock: trajectory.and_then(|given| clock_offset(given, &truth)),
+    let (span_ns, poses, path_m) = (truth.span_ns(), truth.len(), truth.path_length_m());
+    let covered = span_ns.map(within).filter(|_| !scans_ns.is_empty());
+    let nearest_s = nearest_pose_s(&truth, scans_ns);
+    let clock = trajectory.and_then(|given| clock_offset(given, &truth));
+    let span = span_ns.map_or("no times".to_owned(), |(a, b)| {
+        format!("{:.1} s", (b - a) as f64 * 1e-9)
+    });
+    let covers = covered.map_or(String::new(), |n| format!(", covers {n} scans"));
+    let nearest = nearest_s.map_or(String::new(), |s| {
+        format!(", median distance of the nearest pose {:.1} ms", s * 1e3)
+    });
+    let of_clock = match &clock {
+        Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.delay_s),
+        Some(clock) if clock.is_reliable() => format!(", clock {:+.2} s", clock.delay_s),
+        Some(_) => ", clock unknown".to_owned(),
+        None => String::new(),
+    };
+    report.line(
+        "ground truth",
+        format!("{name}: {poses} poses, {path_m:.1} m, {span}{covers}{nearest}{of_clock}"),
+    );
+    let (name, scans) = (
+        file.file_name().unwrap_or_default().to_string_lossy(),
+        report.scans,
+    );
+    if !truth.has_heading() && poses > 1 {
+        report.find(format!("{name} has positions only, no headings."));
+    }
+    if poses > 1 && path_m < STANDING_M {
+        report.find(format!(
+            "{name} stands still: all its poses are in one place."
+        ));
+    }
+    if span_ns.is_none() {
+        report.find(format!(
+            "{name} has no times: poses can be compared by index only."
+        ));
+    }
+    if let Some(n) = covered.filter(|n| *n < scans) {
+        report.find(format!("{name} covers {n} of {scans} scans."));
+    }
+    let of_clock = clock.as_ref().and_then(|clock| clock_finding(clock, &name));
+    report.findings.extend(of_clock);
+    json!({
+        "file": file,
+        "error": null,
+        "poses": poses,
+        "path_length_m": path_m,
+        "has_heading": truth.has_heading(),
+        "span_ns": span_ns,
+        "scans_covered": covered,
+        "nearest_pose_s": nearest_s,
+        "clock": clock,
+    })
+}
+
+fn clock_finding(clock: &ClockOffset, name: &str) -> Option<String> {
+    if !clock.is_reliable() {
+        return Some(format!(
+            "{name} does not correlate with the given trajectory at any offset within {MAX_OFFSET_S} s: its clock cannot be compared."
+        ));
+    }
+    let mirrored = match clock.mirrored {
+        true => " and mirrored (it turns left where the trajectory turns right)",
+        false => "",
+    };
+    match clock.agrees() {
+        true if clock.mirrored => Some(format!("The clock of {name} agrees{mirrored}.")),
+        true => None,
+        false => Some(format!(
+            "{name} is {clock} relative to the given trajectory{mirrored}."
+        )),
     }
 }
 

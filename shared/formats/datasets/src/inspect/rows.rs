@@ -1,10 +1,11 @@
 //! Rows of the scans: validity, losses, chirps, azimuth steps, and ringing near the sensor.
 
-use serde::Serialize;
+use serde_json::json;
 
+use super::Report;
 use gyre_radar::lost::stale_rows;
 use gyre_radar::median;
-use gyre_radar::scan::{PolarScan, Sense, flag};
+use gyre_radar::scan::{PolarScan, Sense, SweepGeometry, flag};
 
 /// Number of scans whose powers are averaged to detect ringing.
 const POWER_SCANS: usize = 40;
@@ -16,54 +17,23 @@ const RINGING_VARIATION: f64 = 0.3;
 /// Number of consecutive bins without ringing that end it.
 const QUIET_BINS: usize = 3;
 
-/// Knowledge of the chirp directions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Chirps {
-    /// Unknown.
-    Unknown,
-    /// Alternately rising and falling.
-    Alternating,
-    /// Known in some scans and not in others.
-    Mixed,
-}
-
 /// Summary of the rows of the scans read.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RowsReport {
-    /// Number of rows.
-    pub rows: u64,
-    /// Minimum and maximum number of rows in a scan.
-    pub in_scan: (usize, usize),
-    /// Rows that were interpolated from their neighbours.
-    pub not_measured: u64,
-    /// Rows at the end of a scan that still hold the scan before: see [`gyre_radar::lost`].
-    pub stale: u64,
-    /// Number of scans with such rows.
-    pub stale_scans: usize,
-    /// Missing rows, where the azimuth makes more than one step.
-    pub lost: u64,
-    /// Knowledge of the chirp directions.
-    pub chirps: Chirps,
-    /// Median step between azimuths, degrees.
-    pub step_deg: f64,
-    /// Minimum and maximum first azimuth, degrees.
-    pub first_azimuth_deg: (f64, f64),
-    /// Number of range bins, from the sensor outwards, with ringing.
-    pub ringing_bins: usize,
-}
-
-/// Accumulates [`RowsReport`] over scans.
 #[derive(Default)]
 pub(super) struct Survey {
     scans: usize,
+    /// Scans with known directions of the chirps.
     with_chirps: usize,
     rows: u64,
+    /// Minimum and maximum number of rows in a scan.
     in_scan: Option<(usize, usize)>,
+    /// Rows that were interpolated from their neighbours.
     not_measured: u64,
+    /// Rows at the end of a scan that still hold the scan before: see [`gyre_radar::lost`].
     stale: u64,
     stale_scans: usize,
+    /// Missing rows, where the azimuth makes more than one step.
     lost: u64,
+    /// The median step between azimuths of each scan.
     steps_rad: Vec<f64>,
     first_rad: Option<(f32, f32)>,
     power_rows: u64,
@@ -118,25 +88,93 @@ impl Survey {
         }
     }
 
-    pub(super) fn report(&self) -> RowsReport {
+    /// Returns the rows of the scan with most of them.
+    pub(super) fn most_rows(&self) -> usize {
+        self.in_scan.unwrap_or_default().1
+    }
+
+    /// Adds the figures and the printed lines.
+    pub(super) fn lines(&self, report: &mut Report, encoder_counts: Option<u16>) {
+        let source = encoder_counts.map_or("uniform".to_owned(), |counts| {
+            format!("encoder of {counts} counts per turn")
+        });
+        let step_deg = median(self.steps_rad.iter().copied()).unwrap_or(0.0);
+        let step_deg = step_deg.to_degrees();
         let (min, max) = self.first_rad.unwrap_or_default();
-        RowsReport {
-            rows: self.rows,
-            in_scan: self.in_scan.unwrap_or_default(),
-            not_measured: self.not_measured,
-            stale: self.stale,
-            stale_scans: self.stale_scans,
-            lost: self.lost,
-            chirps: match self.with_chirps {
-                0 => Chirps::Unknown,
-                n if n == self.scans => Chirps::Alternating,
-                _ => Chirps::Mixed,
-            },
-            step_deg: median(self.steps_rad.iter().copied())
-                .unwrap_or(0.0)
-                .to_degrees(),
-            first_azimuth_deg: (f64::from(min).to_degrees(), f64::from(max).to_degrees()),
-            ringing_bins: self.ringing_bins(),
+        let (min, max) = (f64::from(min).to_degrees(), f64::from(max).to_degrees());
+        let first = match max - min < 0.005 {
+            true => format!("{min:.2}"),
+            false => format!("{min:.2} to {max:.2}"),
+        };
+        report.line(
+            "azimuths",
+            format!("{source}, step {step_deg:.3} deg, first at {first} deg"),
+        );
+        report.figure("encoder_counts", encoder_counts);
+        let (chirps, words) = match self.with_chirps {
+            0 => ("unknown", "unknown"),
+            n if n == self.scans => ("alternating", "alternating"),
+            _ => ("mixed", "known in some scans"),
+        };
+        let (rows, not_measured, lost) = (self.rows, self.not_measured, self.lost);
+        report.line(
+            "rows",
+            format!("{rows}, {not_measured} not measured, {lost} lost; chirps {words}"),
+        );
+        let figures = json!({
+            "rows": rows,
+            "in_scan": self.in_scan.unwrap_or_default(),
+            "not_measured": not_measured,
+            "stale": self.stale,
+            "stale_scans": self.stale_scans,
+            "lost": lost,
+            "chirps": chirps,
+            "step_deg": step_deg,
+            "first_azimuth_deg": [min, max],
+            "ringing_bins": self.ringing_bins(),
+        });
+        report.figure("rows", figures);
+    }
+
+    /// Adds the findings.
+    pub(super) fn findings(
+        &self,
+        report: &mut Report,
+        scans_read: usize,
+        geometry: &SweepGeometry,
+    ) {
+        let (rows, not_measured, lost) = (self.rows, self.not_measured, self.lost);
+        if not_measured > 0 {
+            let percent = 100.0 * not_measured as f64 / rows.max(1) as f64;
+            report.find(format!(
+                "{not_measured} of {rows} rows ({percent:.2} %) were not measured but interpolated from their neighbours."
+            ));
+        }
+        if self.stale > 0 {
+            let (scans, stale) = (self.stale_scans, self.stale);
+            report.find(format!(
+                "{scans} of {scans_read} scans have lost azimuths, {stale} in all: the rows behind each have moved up by one, and the last rows are still those of the scan before. Odometry finds where they were lost (dataset.lost_azimuths)."
+            ));
+        }
+        let (fewest, most) = self.in_scan.unwrap_or_default();
+        if fewest < most {
+            report.find(format!(
+                "Scans have {fewest} to {most} rows: some have lost azimuths, and are read with those that there are."
+            ));
+        }
+        if lost > 0 {
+            report.find(format!("{lost} rows are lost: the azimuth jumps."));
+        }
+        if self.with_chirps > 0 && self.with_chirps < self.scans {
+            report.find("The directions of the chirps are known in some scans only.".to_owned());
+        }
+        let ringing = self.ringing_bins();
+        if ringing > 0 {
+            let to_m = ringing as f32 * geometry.range_resolution_m + geometry.range_offset_m;
+            let last = ringing - 1;
+            report.find(format!(
+                "Range bins 0 to {last} (to {to_m:.1} m) are ringing of the sensor: uniform over azimuth, and stronger than the scene; set the minimum range above that."
+            ));
         }
     }
 
@@ -160,10 +198,9 @@ impl Survey {
 /// Steps between azimuths, including that from the last to the first, positive in the sense of
 /// rotation.
 fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
-    let sign = if scan.geometry.sense == Sense::Clockwise {
-        1.0
-    } else {
-        -1.0
+    let sign = match scan.geometry.sense {
+        Sense::Clockwise => 1.0,
+        _ => -1.0,
     };
     let next = scan.azimuth_rad.iter().cycle().skip(1);
     scan.azimuth_rad.iter().zip(next).map(move |(a, b)| {

@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 
+use super::{Report, some};
 use crate::dataset::Dataset;
 use gyre_radar::median;
 
-/// Interval on the used clock from which on scans are missing, periods.
+/// A longer interval on the used clock means missing scans, periods.
 const GAP_PERIODS: f64 = 1.5;
-/// Logged interval from which on the host has stalled, periods.
+/// A longer logged interval means that the host has stalled, periods.
 const STALL_PERIODS: f64 = 1.4;
 /// Maximum interval while the host catches up after a stall, periods.
 const CATCH_UP_PERIODS: f64 = 0.97;
@@ -16,49 +17,110 @@ const AFTERWARDS: usize = 5;
 
 /// Times of the scans. Indices are from 0.
 #[derive(Clone, Debug, Serialize)]
-pub struct TimingReport {
+pub(super) struct Timing {
     /// Time of the first scan, ns since 1970.
     pub first_ns: i64,
     /// Time of the last scan, ns since 1970.
     pub last_ns: i64,
     /// Median time between scans, s; 0 for a single scan.
-    pub period_s: f64,
+    period_s: f64,
     /// RMS deviation of the logged intervals from the period, s, without gaps and stalls.
-    pub jitter_s: f64,
+    jitter_s: f64,
     /// Maximum and minimum logged interval, s.
-    pub logged_interval_s: (f64, f64),
-    /// Number of missing scans.
-    pub missing_scans: usize,
+    logged_interval_s: (f64, f64),
+    missing_scans: usize,
     /// Missing scans.
-    pub gaps: Vec<Gap>,
+    gaps: Vec<Gap>,
     /// Stalls of the host: stamps were logged late, but no scan is missing.
-    pub stalls: Vec<Stall>,
-    /// Scans whose logged stamp is before that of the previous scan.
-    pub backwards: Vec<usize>,
+    stalls: Vec<Stall>,
+    /// Scans whose logged stamp is before the stamp of the previous scan.
+    backwards: Vec<usize>,
 }
 
 /// Missing scans.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Gap {
+pub(super) struct Gap {
     /// The first scan after the gap.
-    pub scan: usize,
-    /// Number of missing scans.
-    pub missing: usize,
+    scan: usize,
+    missing: usize,
     /// Time between the scans before and after the gap, s.
-    pub seconds: f64,
+    seconds: f64,
 }
 
 /// A stall of the host.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Stall {
+pub(super) struct Stall {
     /// The first late scan.
-    pub scan: usize,
+    scan: usize,
     /// Delay of its stamp, s.
-    pub late_s: f64,
+    delay_s: f64,
+}
+
+impl Timing {
+    /// Adds the printed lines and the findings.
+    pub(super) fn add_to(&self, report: &mut Report) {
+        let (start, seconds) = (
+            self.first_ns as f64 * 1e-9,
+            (self.last_ns - self.first_ns) as f64 * 1e-9,
+        );
+        report.line(
+            "time",
+            format!("{start:.3} s since 1970, for {seconds:.3} s"),
+        );
+        let (stalls, gaps) = (self.stalls.len(), self.gaps.len());
+        let missing = self.missing_scans;
+        if self.period_s > 0.0 {
+            let ((max, min), period) = (self.logged_interval_s, self.period_s);
+            let jitter = self.jitter_s * 1e3;
+            report.line(
+                "period",
+                format!(
+                    "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
+                ),
+            );
+            report.line(
+                "gaps",
+                format!("{missing} scans missing in {gaps} places; {stalls} host stalls"),
+            );
+        }
+        if stalls > 0 {
+            let worst = self.stalls.iter().map(|s| s.delay_s).fold(0.0, f64::max);
+            let places = self
+                .stalls
+                .iter()
+                .map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s));
+            let places = some(places);
+            let times = match stalls {
+                1 => "once".to_owned(),
+                n => format!("{n} times"),
+            };
+            report.find(format!(
+                "The host stalled {times}, by up to {worst:.2} s, and caught up while the antenna turned uniformly: logged stamps are late from scans {places}."
+            ));
+        }
+        if gaps > 0 {
+            let places = self
+                .gaps
+                .iter()
+                .map(|g| format!("{} ({} missing)", g.scan, g.missing));
+            let scans = match missing {
+                1 => "scan is",
+                _ => "scans are",
+            };
+            report.find(format!(
+                "{missing} {scans} missing, before scans {}.",
+                some(places)
+            ));
+        }
+        if !self.backwards.is_empty() {
+            let places = some(self.backwards.iter().map(ToString::to_string));
+            report.find(format!("Logged time runs backwards at scans {places}."));
+        }
+    }
 }
 
 /// Examines the times of all scans; `None` if a scan has no time.
-pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
+pub(super) fn examine(dataset: &dyn Dataset) -> Option<Timing> {
     let all = 0..dataset.len();
     let used: Vec<i64> = all
         .clone()
@@ -71,10 +133,10 @@ pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
 }
 
 /// `used` are the times that the scans are read with, `logged` those recorded by the host.
-fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
+fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
     let (used_s, logged_s) = (intervals_s(used), intervals_s(logged));
     let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
-    let late_s = lateness_s(used, logged);
+    let delay_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
     for (i, (on_clock, on_host)) in used_s
         .iter()
@@ -96,13 +158,13 @@ fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
         } else if period_s > 0.0 && on_host > STALL_PERIODS * period_s {
             stalls.push(Stall {
                 scan,
-                late_s: late_s[scan].max(on_host - period_s),
+                delay_s: delay_s[scan].max(on_host - period_s),
             });
         } else if on_host < 0.0 {
             backwards.push(scan);
         }
     }
-    Some(TimingReport {
+    Some(Timing {
         first_ns: *used.first()?,
         last_ns: *used.last()?,
         period_s,
@@ -202,9 +264,9 @@ mod tests {
             assert_eq!(report.stalls.len(), 1);
             assert_eq!(report.stalls[0].scan, 10);
             assert!(
-                (report.stalls[0].late_s - 0.9).abs() < 1e-9,
+                (report.stalls[0].delay_s - 0.9).abs() < 1e-9,
                 "{}",
-                report.stalls[0].late_s
+                report.stalls[0].delay_s
             );
         }
     }

@@ -6,32 +6,28 @@ use csv::StringRecord;
 use gyre_radar::median;
 use gyre_samples::{Sample, SampleKind};
 
-use super::SPEEDS;
+use super::{OF, SPEEDS};
 use crate::{
     LogError, LogFaults,
-    gyro_log::{
-        Raw, SampleColumns,
-        faults::{ABSURD_SHARE, Plausible, examine},
-    },
+    gyro_log::faults::{ABSURD_SHARE, Plausible, examine},
     header::{Header, Stamp},
-    table::Columns,
+    table::{Columns, Rows},
 };
 
-/// Shortest time over which a speed is that of two counts: over less, ticks are too coarse.
+/// Shortest time between the two counts of a speed: over less, ticks are too coarse.
 const SPAN_NS: i64 = 90_000_000;
 
 /// Names of the ticks of one wheel, or of an axle.
 const TICKS: [&str; 4] = ["ticks", "pulses", "wheel_ticks", "encoder_ticks"];
-/// Those of two wheels of an axle, whose mean counts.
+/// Names of the ticks of two wheels of an axle; their mean is used.
 const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
     ["left_ticks", "right_ticks"],
     ["ticks_left", "ticks_right"],
     ["left_count", "right_count"],
 ];
-/// Names of the metres.
 const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
 
-/// Any count: what is plausible are the speeds.
+/// Any count is plausible: only speeds are checked.
 const COUNTS: Plausible = Plausible {
     of: SampleKind::Wheels,
     values: 2,
@@ -79,31 +75,19 @@ impl Columns for CountColumns {
     }
 }
 
-impl SampleColumns for CountColumns {
-    const OF: SampleKind = SampleKind::Wheels;
-
-    fn unit_is_assumed(&self) -> bool {
-        self.is_in_ticks
-    }
-}
-
 /// Makes speeds of counts: each is the mean of the time between two, and has the stamp of its
-/// middle. Speeds that no vehicle has, as where a counter starts anew, are left out.
-///
-/// # Errors
-/// Ticks whose length is not given, stamps that cannot be those of a sensor, and speeds of which
-/// many are those of no vehicle.
+/// middle. Speeds that no vehicle has, as after a reset of the counter, are left out.
 pub(super) fn speeds(
-    mut raw: Raw,
+    rows: Rows<CountColumns>,
     path: &Path,
     m_per_tick: Option<f64>,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
     let unusable = |reason: String| LogError::Unusable {
-        of: SampleKind::Wheels,
+        of: OF,
         path: path.to_owned(),
         reason,
     };
-    let is_in_ticks = std::mem::take(&mut raw.unit_is_assumed);
+    let is_in_ticks = rows.columns.is_in_ticks;
     let m_per_count = match is_in_ticks {
         true => m_per_tick.ok_or_else(|| {
             let missing =
@@ -112,7 +96,7 @@ pub(super) fn speeds(
         })?,
         false => 1.0,
     };
-    let (mut counts, mut faults) = examine(raw, path, &COUNTS)?;
+    let (mut counts, mut faults) = examine(rows.raw, false, path, &COUNTS)?;
     (0..2).for_each(|wheel| count_on(&mut counts, wheel));
     let mut speeds = Vec::with_capacity(counts.len());
     let mut from = counts[0];

@@ -11,7 +11,7 @@ use gyre_radar::OwnedScan;
 pub const START_US: i64 = 1_547_131_046_000_000;
 pub const PERIOD_US: i64 = 250_000;
 
-/// The folder of real data; `None`, with a message, if there is none.
+/// The folder of real data; `None`, with a message, if the folder is missing.
 pub fn real(folder: &str) -> Option<PathBuf> {
     match std::env::var_os("GYRE_DATA") {
         Some(root) => Some(Path::new(&root).join(folder)),

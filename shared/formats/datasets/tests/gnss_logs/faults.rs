@@ -1,10 +1,10 @@
-//! Faults: each is counted under its name, and what it is of is left out.
+//! Faults: each is counted under its name, and the faulty row is left out.
 
 use gyre_datasets::{GnssLog, ReceivedFixes};
 
 use super::{START_NS, read};
 
-/// A log at 10 m/s to the east, a fix a second, of which `row` may return other rows.
+/// A log at 10 m/s to the east with a fix each second; `row` may return other rows.
 fn drive(row: impl Fn(usize, i64, f64) -> Option<String>) -> GnssLog {
     let mut text = "stamp_ns,latitude_deg,longitude_deg\n".to_owned();
     for k in 0..60 {
@@ -33,7 +33,7 @@ fn each_fault_is_counted_under_its_name_and_left_out() {
         ("at 0, 0", 0..4, "0,0.0"),
         ("off the earth", 0..1, "517.0,-1.2"),
         ("repeated", 30..31, "51.7,-1.19"),
-        // That of the 9th fix.
+        // As the 9th fix.
         ("at the very place of the fix before", 10..36, frozen),
         ("jump faster than a vehicle", 10..22, "51.709,"),
         ("jump faster than a vehicle", 0..1, "40.0,"),

@@ -148,7 +148,7 @@ fn fixes_on_the_radars_clock_have_the_delay_taken_off_and_the_uncertainty_that_i
         START_NS + 1_000_000_000
     );
     let config = GnssConfig {
-        late_s: 1.58,
+        delay_s: 1.58,
         sigma_m: 7.0,
         ..GnssConfig::default()
     };

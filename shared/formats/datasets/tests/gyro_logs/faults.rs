@@ -8,7 +8,7 @@ use super::{START_NS, read};
 const MS: i64 = 1_000_000;
 const HEADER: &str = "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps";
 
-/// A log of 100 Hz whose rates tell the samples apart.
+/// A log of 100 Hz; each sample has a rate of its own.
 fn rows(count: i64) -> Vec<(i64, f64)> {
     (0..count)
         .map(|k| (START_NS + 10 * k * MS, 1e-4 * k as f64))

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
-use super::{first_scan, first_scan_with, folder, opened, options, rejected};
+use super::{first_scan_with, folder, opened, options, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
@@ -87,23 +87,6 @@ fn an_ambiguous_format_is_reported_with_its_alternative() {
 }
 
 #[test]
-fn oord_has_uniform_azimuths() {
-    let root = folder();
-    let sweep = Sweep {
-        step: 0,
-        ..Sweep::default()
-    };
-    sweep.write(
-        &root
-            .path()
-            .join(format!("Navtech_CTS350-X_Radar/{START_US}.png")),
-    );
-    let scan = first_scan(root.path()).unwrap();
-    assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
-    assert_eq!(scan.geometry.range_resolution_m, 0.0438);
-}
-
-#[test]
 fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
     let root = folder();
     let end = |k: i64| (START_US + k * PERIOD_US) * 1000;
@@ -123,7 +106,7 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
         (Format::Mulran, true)
     );
     let scan = read(dataset.as_mut(), 2).unwrap();
-    // The name is the time of the last of 40 columns, the first of which is at half a step.
+    // The name is the time of the last of 40 columns; the first column is at half a step.
     assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
     assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
     assert!(

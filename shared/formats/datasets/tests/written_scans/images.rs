@@ -196,29 +196,6 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
 }
 
 #[test]
-fn a_truncated_or_corrupt_image_gives_an_error_and_no_panic() {
-    let root = folder();
-    let files = write_oxford(root.path(), 2);
-    let whole = fs::read(&files[1]).unwrap();
-    let mut dataset = opened(root.path());
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    for length in (0..whole.len() - 12).step_by(7) {
-        fs::write(&files[1], &whole[..length]).unwrap();
-        assert!(
-            dataset.read(1, scan.slot()).is_err(),
-            "{length} of {} bytes",
-            whole.len()
-        );
-    }
-    for place in 0..whole.len() {
-        let mut damaged = whole.clone();
-        damaged[place] ^= 0x55;
-        fs::write(&files[1], damaged).unwrap();
-        let _ = dataset.read(1, scan.slot());
-    }
-}
-
-#[test]
 fn an_unknown_chunk_is_reported_in_plain_words() {
     let root = folder();
     let file = write_oxford(root.path(), 1).remove(0);

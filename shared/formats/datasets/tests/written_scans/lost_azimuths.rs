@@ -1,4 +1,4 @@
-//! Azimuths that the host has lost, in images whose rows say neither their angle nor their time.
+//! Azimuths that the host has lost, in images whose rows have neither an angle nor a time.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn power(scan: usize, azimuth: usize, bin: usize) -> u8 {
     ((number as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8
 }
 
-/// Replaces images, transposed, by ones whose last columns are those of the image before.
+/// Transposes images, and replaces their last columns by the last columns of the image before.
 fn write_images(paths: &[PathBuf]) {
     let mut before = vec![0; AZIMUTHS * BINS];
     for (scan, path) in paths.iter().enumerate() {
@@ -55,7 +55,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
         write_images(&images);
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format);
-        // In any order: the last columns of scan 1 are those of scan 0.
+        // In any order: the last columns of scan 1 equal the last columns of scan 0.
         for index in [0, 1, 2, 3, 4, 1, 0, 2] {
             let lost = LOST[index];
             let scan = read(dataset.as_mut(), index).unwrap();
@@ -77,7 +77,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
     }
 }
 
-/// Where rows carry times, a stale one has that of the turn before.
+/// If rows carry times, a stale row has a time of the turn before.
 #[test]
 fn a_stale_row_with_a_time_makes_no_scan() {
     for name in ["Navtech_CTS350-X_Radar", "radar"] {

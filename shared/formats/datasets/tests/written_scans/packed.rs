@@ -93,7 +93,8 @@ fn a_folder_with_the_files_and_names_of_another_dataset_is_that() {
         let error = opened(format).err().unwrap().to_string();
         assert!(error.contains("looks like oxford"), "{error}");
     }
-    // Its files alone, or its names alone, may be those of a recording of one's own.
+    // Its files without its names, or its names without its files, may belong to a recording of the
+    // user's own.
     assert_eq!(opened(Format::Oxford).unwrap().len(), 2);
     fs::remove_file(root.path().join("a/radar.timestamps")).unwrap();
     assert_eq!(opened(Format::Boreas).unwrap().len(), 2);

@@ -1,4 +1,4 @@
-//! Folders in which not every image is a scan, or images are not named by times.
+//! Folders with images that are not scans, or with images whose names are not times.
 
 use std::fs;
 use std::path::Path;
@@ -109,18 +109,14 @@ fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
     fs::copy(images.join("scan2.png"), images.join("scan2 (1).png")).unwrap();
     fs::write(images.join("scan4.png"), "damaged").unwrap();
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
-    let (findings, timing) = (report.findings.join(" "), report.timing.unwrap());
-    assert_eq!(
-        (
-            report.scans,
-            report.unreadable.len(),
-            report.unreadable[0].scan
-        ),
-        (6, 1, 3)
-    );
-    assert!((timing.period_s - 0.25).abs() < 1e-9, "{}", timing.period_s);
+    let (findings, timing) = (report.findings.join(" "), &report.figures["timing"]);
+    let unreadable = report.figures["unreadable"].as_array().unwrap();
+    assert_eq!((report.scans, unreadable.len()), (6, 1));
+    assert_eq!(unreadable[0]["scan"], 3);
+    assert!((timing["period_s"].as_f64().unwrap() - 0.25).abs() < 1e-9);
     // The damaged image takes the place of one of the two that are missing.
-    assert_eq!((timing.missing_scans, timing.gaps[0].scan), (1, 4));
+    assert_eq!(timing["missing_scans"], 1);
+    assert_eq!(timing["gaps"][0]["scan"], 4);
     assert!(
         findings.contains("ordered by the times of their first rows"),
         "{findings}"
@@ -131,11 +127,8 @@ fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
         ),
         "{findings}"
     );
-    assert!(
-        !report.stamp_meaning.contains("named"),
-        "{}",
-        report.stamp_meaning
-    );
+    let meaning = &report.figures["stamp_meaning"];
+    assert!(!meaning.as_str().unwrap().contains("named"), "{meaning}");
 }
 
 #[test]
@@ -208,7 +201,8 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
             assert_eq!(scan.view().row(rows - 1)[5], Sweep::power(rows - 1, 5));
         }
         let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
-        assert_eq!((report.azimuths, report.rows.in_scan), (40, (38, 40)));
+        assert_eq!(report.figures["azimuths"], 40);
+        assert_eq!(report.figures["rows"]["in_scan"][0], 38);
         assert!(
             report
                 .findings

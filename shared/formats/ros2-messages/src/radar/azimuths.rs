@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl RadarFftDataMsg {
-    /// Returns the azimuth as the radar sent it. Its angle is that of the encoder:
+    /// Returns the azimuth as the radar sent it. The angle comes from the encoder, because
     /// [`RadarFftDataMsg::angle`] is wrong.
     pub fn azimuth(&self) -> Azimuth<'_> {
         Azimuth {
@@ -22,9 +22,6 @@ impl RadarFftDataMsg {
 
 impl RadarFftDataMessage {
     /// Returns the azimuth as the radar sent it.
-    ///
-    /// # Errors
-    /// A number that has not the bytes of its type.
     pub fn azimuth(&self) -> Result<Azimuth<'_>, BadMessage> {
         Ok(Azimuth {
             sweep_counter: u16::from_be_bytes(number::<Self, 2>(

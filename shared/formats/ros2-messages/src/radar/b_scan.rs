@@ -10,13 +10,8 @@ const SECOND_NS: u64 = 1_000_000_000;
 /// A message that is no scan.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadScan {
-    /// Powers that are not one byte a bin.
     #[error("its pixels are `{encoding}`, expected `8UC1` or `mono8`")]
-    Encoding {
-        /// The encoding given.
-        encoding: String,
-    },
-    /// Sizes that contradict each other.
+    Encoding { encoding: String },
     #[error(
         "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
     )]
@@ -30,7 +25,6 @@ pub enum BadScan {
         /// Columns.
         width: u32,
     },
-    /// Values beside the image that do not fit it.
     #[error(
         "it has {rows} rows of powers, but {encoders} encoder values and {stamps} times, and needs one of each for a row"
     )]
@@ -39,7 +33,6 @@ pub enum BadScan {
         rows: usize,
         /// Encoder values.
         encoders: usize,
-        /// Times.
         stamps: usize,
     },
 }
@@ -47,22 +40,18 @@ pub enum BadScan {
 /// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedAzimuth<'a> {
-    /// The azimuth.
     pub azimuth: Azimuth<'a>,
     /// When it was received, ns, if the message is received when the turn has ended.
     pub arrived_ns: i64,
 }
 
 impl RadarBScanMsg {
-    /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the
-    /// image where the encoder's counts are no multiple of the azimuths, and leaves other rows out)
-    /// are none. The driver's first turn may have none at all: where the first azimuth that it
+    /// Returns the azimuths in order. Rows that the driver has not written are left out: its index
+    /// overruns the image where the encoder's counts are no multiple of the azimuths, and skips
+    /// other rows. The driver's first turn may have none at all: where the first azimuth that it
     /// receives has encoder count 0, it publishes the turn before that.
     ///
-    /// `arrived_ns` is the host's time at which the message was received.
-    ///
-    /// # Errors
-    /// An image that is not of powers, or values that do not fit it.
+    /// `arrived_ns` is the host's time of receipt of the message.
     pub fn rows<'a>(
         &'a self,
         radar: &Configuration,
@@ -106,8 +95,8 @@ impl RadarBScanMsg {
     }
 }
 
-/// Returns the unit of the times of rows: the one in which they advance most nearly as the radar
-/// turns.
+/// Returns the unit of the times of rows: the unit that makes the times advance most nearly as the
+/// radar turns.
 fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
     let mut written = encoders.iter().zip(stamps).filter(|(_, stamp)| **stamp > 0);
     let (Some(first), Some(last)) = (written.next(), written.next_back()) else {
@@ -127,9 +116,6 @@ fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
 impl Image {
     /// Returns the azimuths of a `b_scan_image`, which has neither encoder values nor times: they
     /// are evenly spaced, and a turn ends when the image is received.
-    ///
-    /// # Errors
-    /// An image that is not of powers.
     pub fn rows(
         &self,
         radar: &Configuration,
@@ -167,7 +153,7 @@ struct PowerImage<'a> {
     height: usize,
     width: usize,
     step: usize,
-    /// Rows by which the image is turned.
+    /// The rotation of the image, in rows.
     offset: usize,
 }
 
@@ -200,7 +186,6 @@ impl<'a> PowerImage<'a> {
         })
     }
 
-    /// Returns the powers of an azimuth.
     fn row(&self, azimuth: usize) -> &'a [u8] {
         let row = (azimuth + self.offset) % self.height;
         &self.data[row * self.step..][..self.width]

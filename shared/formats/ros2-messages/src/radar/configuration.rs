@@ -21,9 +21,6 @@ const MAX_TURNS_PER_S: u16 = 50;
 
 impl RadarConfigurationMsg {
     /// Returns the radar's description of itself.
-    ///
-    /// # Errors
-    /// A depth of a bin that no radar has.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         Ok(Configuration {
             azimuth_samples: self.azimuth_samples,
@@ -55,9 +52,6 @@ impl RadarConfigurationMsg {
 
 impl RadarConfigurationMessage {
     /// Returns the radar's description of itself.
-    ///
-    /// # Errors
-    /// A number that has not the bytes of its type, or a depth of a bin that no radar has.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         let short = |field, bytes: &[u8]| {
             Ok::<u16, BadMessage>(u16::from_be_bytes(number::<Self, 2>(field, bytes)?))

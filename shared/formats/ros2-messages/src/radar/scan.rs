@@ -25,9 +25,9 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Returns the encoder of which the angles of a scan are: `known`, or the one that is found;
-    /// the finest possible for angles that are of none. One of which all angles are counts to the
-    /// bit goes before others.
+    /// Returns the encoder of the angles of a scan: `known`, or the one that is found; the finest
+    /// possible for angles that are of none. An encoder that matches all angles to the bit has
+    /// priority.
     pub fn of(azimuth_rad: &[f32], known: Option<u16>) -> Self {
         let rows = u16::try_from(azimuth_rad.len()).unwrap_or(u16::MAX);
         let even = [Some(rows), rows.checked_mul(2), rows.checked_mul(4)];
@@ -61,7 +61,7 @@ fn angle(count: u16, counts: u16) -> f64 {
     f64::from(count) * (TAU / f64::from(counts))
 }
 
-/// Returns whether an angle is that of a count, as readers compute it.
+/// Returns whether an angle belongs to a count, as readers compute it.
 fn is_count(azimuth_rad: f32, counts: u16) -> bool {
     angle(count(azimuth_rad, counts), counts) as f32 == azimuth_rad
 }

@@ -8,8 +8,7 @@ use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
 /// The given length of the path over that by the scans: beyond, it is of another drive, or scans
 /// are missing.
 const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
-/// Share of the path by which that in both directions of time differs, at least: the error of its
-/// length.
+/// Least relative difference of the path between both directions of time: the error of its length.
 const PATH_ERROR: f64 = 1e-3;
 
 /// A constant that the configuration has a key for.
@@ -19,15 +18,14 @@ pub struct Constant {
     pub key: &'static str,
     /// The name for a person.
     pub name: &'static str,
-    /// The unit in which it is printed.
+    /// The unit for printing it.
     pub unit: &'static str,
     /// The factor to the printed unit.
     pub scale: f64,
-    /// The configured value.
     pub configured: f64,
     /// The value by the drive.
     pub found: Estimate,
-    /// The standard deviation from which on a drive says no more about it than is known of any
+    /// The standard deviation above which a drive adds nothing to the prior knowledge about any
     /// radar.
     pub(super) useful_sigma: f64,
     /// The solution has settled, so that the value can be trusted.
@@ -39,13 +37,13 @@ pub struct Constant {
 }
 
 impl Constant {
-    /// Returns whether the drive says more about it than was known.
+    /// Returns whether the drive adds knowledge.
     pub fn is_determined(&self) -> bool {
         self.has_settled && self.found.sigma < self.useful_sigma
     }
 
-    /// Returns the mean of what several drives of one radar say. It is proposed if they determine
-    /// it together, and none of them rejects what it determines alone.
+    /// Returns the mean over several drives of one radar. It is proposed if they determine it
+    /// together, and none of them rejects its own estimate.
     pub(super) fn mean(&self, others: &[&Self]) -> Self {
         let drives = || iter::once(&self).chain(others);
         let found = others
@@ -72,7 +70,7 @@ impl Constant {
     }
 }
 
-/// Puts what was found of a fact beside its configured value.
+/// Puts the estimate of a fact beside its configured value.
 pub(super) fn constant(
     key: &'static str,
     name: &'static str,
@@ -123,10 +121,8 @@ pub(super) fn constant(
     }
 }
 
-/// The range resolution from the length of the path, or why the drive cannot tell it.
-///
-/// # Errors
-/// A length that is not of this drive.
+/// The range resolution from the length of the path, or the reason why the drive cannot determine
+/// it.
 pub(super) fn resolution(
     path_m: f64,
     configured: &Configured,

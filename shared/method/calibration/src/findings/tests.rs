@@ -102,8 +102,8 @@ fn several_drives_tell_together_what_none_tells_alone() {
         "of the drives -0.5000 \u{b1} 0.2500; -0.4000 \u{b1} 0.2500"
     );
     assert!((both.change()[Fact::RangeOffset as usize] + 0.35).abs() < 1e-12);
-    // What a drive determines alone and rejects is rejected for all, as is what fits all together
-    // less well.
+    // An estimate that one drive rejects is rejected for all, as is an estimate that fits all
+    // together less well.
     let rejecting = of(-0.5, 0.1, None);
     let rejected = Found::mean(&rejecting, &[&drives[1]]);
     assert!(!rejected.constants[0].is_proposed);

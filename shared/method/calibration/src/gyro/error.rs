@@ -1,4 +1,4 @@
-//! Why a drive does not tell the clock and the axes of a gyro.
+//! Why a drive does not determine the clock and the axes of a gyro.
 
 use thiserror::Error;
 
@@ -8,10 +8,8 @@ use super::{
 };
 use crate::Estimate;
 
-/// Why nothing was found.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GyroError {
-    /// The times of the log are not those of the scans.
     #[error(
         "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} turns of a second, and {needed} are needed: {}",
         begins(*begins_s)
@@ -24,49 +22,39 @@ pub enum GyroError {
         /// From the first scan to the first sample, s.
         begins_s: Option<f64>,
     },
-    /// Two offsets or axes fit about as well.
     #[error(
         "the gyro turns as the radar best {best}, but about as well {rival}: the drive is too straight or too short, its turns repeat, or the log is of another drive"
     )]
     Ambiguous {
         /// The best offset and axis.
         best: Candidate,
-        /// Another one.
         rival: Candidate,
     },
-    /// The least squares do not end near the peak.
     #[error(
         "the offset of the clocks is not determined: parts of the drive lead to different ones"
     )]
     Unsettled,
-    /// The drive turns too little.
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s and the scale {:.2} \u{b1} {:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
-        late_s.value, late_s.sigma, scale.value, scale.sigma
+        delay_s.value, delay_s.sigma, scale.value, scale.sigma
     )]
     Straight {
         /// The offset, s.
-        late_s: Estimate,
-        /// The scale.
+        delay_s: Estimate,
         scale: Estimate,
     },
-    /// The rates have another unit.
     #[error(
         "the radar turns {scale:.4} times as much as the gyro measures: {}",
         unit(*scale)
     )]
-    Scale {
-        /// The scale.
-        scale: f64,
-    },
-    /// Drives of one gyro that contradict each other.
+    Scale { scale: f64 },
     #[error(
         "one drive says that {one} points up, another that {other} does: these are not logs of one gyro as it is mounted"
     )]
     Axes {
         /// The axis of one drive.
         one: &'static str,
-        /// The axis of another one.
+        /// The axis of the other drive.
         other: &'static str,
     },
 }
@@ -90,13 +78,12 @@ impl GyroError {
 
 /// An offset with an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("about {axis} with late_s = {late_s:.2} (correlation {correlation:.2})")]
+#[error("about {axis} with delay_s = {delay_s:.2} (correlation {correlation:.2})")]
 pub struct Candidate {
     /// The axis that points up.
     pub axis: &'static str,
     /// The offset, s.
-    pub late_s: f64,
-    /// The correlation.
+    pub delay_s: f64,
     pub correlation: f64,
 }
 
@@ -104,7 +91,7 @@ impl From<Peak> for Candidate {
     fn from(peak: Peak) -> Self {
         Self {
             axis: peak.up().name(),
-            late_s: peak.late_s,
+            delay_s: peak.delay_s,
             correlation: peak.correlation.abs(),
         }
     }

@@ -15,7 +15,7 @@ const CONVERGED_S: f64 = 1e-6;
 const USUAL_SIGMAS: f64 = 3.0;
 /// Standard deviation over the median of the absolute deviation, of a normal distribution.
 const OF_MEDIAN: f64 = 1.4826;
-/// An offset farther than this from the peak is another one, s.
+/// An offset farther than this from the peak counts as different, s.
 const NEAR_S: f64 = 1.0;
 
 /// Scale, bias (rad/s), offset (s), drift (s/s):
@@ -37,8 +37,8 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Fits the turns around a peak; `None` if they do not determine the parameters, or another
-    /// offset than that of the peak.
+    /// Fits the turns around a peak; `None` if they do not determine the parameters, or determine a
+    /// different offset than the peak's.
     ///
     /// Speeds have no bias: without one it stays zero.
     pub(crate) fn new(
@@ -51,9 +51,9 @@ impl Fit {
             ([true, has_bias, true, false], [true, has_bias, true, true]);
         let sign = peak.correlation.signum();
         let covered = |turn: &&Turn| {
-            let late_s = peak.late_s;
+            let delay_s = peak.delay_s;
             angles
-                .between(turn.from_s + late_s, turn.to_s + late_s)
+                .between(turn.from_s + delay_s, turn.to_s + delay_s)
                 .is_some()
         };
         let turns: Vec<Turn> = turns.iter().filter(covered).copied().collect();
@@ -62,7 +62,7 @@ impl Fit {
             axis: peak.axis,
             sign,
             middle_s: turns.get(turns.len() / 2)?.from_s,
-            late_s: peak.late_s,
+            delay_s: peak.delay_s,
         };
         let count = turns.len();
         let block = |k: usize| k * BLOCKS / count;
@@ -104,16 +104,15 @@ struct Problem<'a> {
     angles: &'a Angles,
     axis: usize,
     sign: f64,
-    /// The time at which the offset is that of the parameters, s.
+    /// The time when the offset equals the parameter, s.
     middle_s: f64,
     /// The offset to begin with, s.
-    late_s: f64,
+    delay_s: f64,
 }
 
 impl Problem<'_> {
-    /// Solves for the parameters that are free.
     fn solve(&self, turns: &[Turn], free: Free) -> Option<Parameters> {
-        let mut at = Parameters::new(1.0, 0.0, self.late_s, 0.0);
+        let mut at = Parameters::new(1.0, 0.0, self.delay_s, 0.0);
         for _ in 0..ROUNDS {
             let rows = self.rows(turns, &at);
             let sigma = OF_MEDIAN * median(rows.iter().map(|(residual, _)| residual.abs()))?;
@@ -131,7 +130,7 @@ impl Problem<'_> {
             }
             let step = normal.cholesky()?.solve(&right);
             at += step;
-            if (at[2] - self.late_s).abs() > NEAR_S {
+            if (at[2] - self.delay_s).abs() > NEAR_S {
                 return None;
             }
             if step[2].abs() < CONVERGED_S {
@@ -143,12 +142,12 @@ impl Problem<'_> {
 
     /// The residual of each turn, and its slopes by the parameters.
     fn rows(&self, turns: &[Turn], at: &Parameters) -> Vec<(f64, Parameters)> {
-        let [scale, bias, late_s, drift] = (*at).into();
+        let [scale, bias, delay_s, drift] = (*at).into();
         let row = |turn: &Turn| {
-            let late_s = late_s + drift * (turn.from_s - self.middle_s);
+            let delay_s = delay_s + drift * (turn.from_s - self.middle_s);
             let turned = self
                 .angles
-                .between(turn.from_s + late_s, turn.to_s + late_s)?;
+                .between(turn.from_s + delay_s, turn.to_s + delay_s)?;
             let angle = self.sign * turned.angle[self.axis];
             let time_s = turn.to_s - turn.from_s;
             let by_late = scale * self.sign * turned.by_late[self.axis];

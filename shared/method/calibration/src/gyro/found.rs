@@ -7,7 +7,7 @@ use gyre_samples::{GyroConfig, UpAxis};
 use super::GyroError;
 use crate::Estimate;
 
-/// A scale that is known less well says no more than the default does.
+/// A scale that is less certain adds nothing to the default.
 const USEFUL_SCALE_SIGMA: f64 = 0.01;
 /// A drift that differs from none by so many standard deviations is one.
 const DRIFT_SIGMAS: f64 = 3.0;
@@ -19,9 +19,9 @@ const WRONG_SIGMAS: f64 = 3.0;
 pub struct GyroCalibration {
     /// The axis that points up.
     pub up: UpAxis,
-    /// Time by which the stamps of the gyro are late, s.
-    pub late_s: Estimate,
-    /// That of each half of the drive, where it tells it, s.
+    /// The delay of the gyro's stamps, s.
+    pub delay_s: Estimate,
+    /// The delay in each half of the drive, if the half determines it, s.
     pub halves_s: [Option<f64>; 2],
     /// Change of that time, s/s.
     pub drift: Estimate,
@@ -29,17 +29,14 @@ pub struct GyroCalibration {
     pub scale: Estimate,
     /// Bias, rad/s: scaled rate less true one.
     pub bias_radps: Estimate,
-    /// Correlation of the turns with those of the radar.
+    /// Correlation of the turns with the radar's.
     pub correlation: f64,
     /// Number of turns that were compared, of a second each.
     pub turns: usize,
 }
 
 impl GyroCalibration {
-    /// Returns the mean of what drives of one gyro say, each weighted by its uncertainty.
-    ///
-    /// # Errors
-    /// Another axis points up in one of them.
+    /// Returns the mean over drives of one gyro, each weighted by its uncertainty.
     pub fn mean(&self, others: &[Self]) -> Result<Self, GyroError> {
         let mut mean = self.clone();
         for other in others {
@@ -49,7 +46,7 @@ impl GyroCalibration {
                     other: other.up.name(),
                 });
             }
-            mean.late_s = mean.late_s.combined(&other.late_s);
+            mean.delay_s = mean.delay_s.combined(&other.delay_s);
             mean.drift = mean.drift.combined(&other.drift);
             mean.scale = mean.scale.combined(&other.scale);
             mean.bias_radps = mean.bias_radps.combined(&other.bias_radps);
@@ -60,19 +57,19 @@ impl GyroCalibration {
         Ok(mean)
     }
 
-    /// Returns whether the clock of the gyro drifts against that of the radar.
+    /// Returns whether the clock of the gyro drifts against the radar's.
     pub fn drifts(&self) -> bool {
         self.drift.value.abs() > DRIFT_SIGMAS * self.drift.sigma
     }
 
-    /// Returns whether the drive says more about the scale than is known of any gyro.
+    /// Returns whether the drive adds to the prior knowledge about the scale of any gyro.
     fn tells_scale(&self) -> bool {
         self.scale.sigma < USEFUL_SCALE_SIGMA
     }
 
     /// Returns the section `[gyro]`, with the log if it does not lie beside the scans.
     pub fn toml(&self, file: Option<&Path>) -> String {
-        let (late, scale, bias) = (self.late_s, self.scale, self.bias_radps);
+        let (late, scale, bias) = (self.delay_s, self.scale, self.bias_radps);
         let mut text = match file.map(|file| toml::Value::from(file.display().to_string())) {
             Some(file) => format!("\n[gyro]\nkind = \"log\"\nfile = {file}\n"),
             None => "\n[gyro]\nkind = \"auto\"\n".to_owned(),
@@ -84,7 +81,7 @@ impl GyroCalibration {
             self.turns
         );
         text += &format!(
-            "late_s = {:.4}\ntime_sigma_s = {:.4}\n",
+            "delay_s = {:.4}\ntime_sigma_s = {:.4}\n",
             late.value,
             late.sigma.max(1e-4)
         );
@@ -104,7 +101,7 @@ impl GyroCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside what is configured if a gyro is used.
+    /// Returns the lines of a table, beside the configured values if a gyro is used.
     pub fn table(&self, configured: &GyroConfig) -> String {
         let verdict = |value: f64, found: &Estimate| match configured.is_used() {
             false => String::new(),
@@ -121,7 +118,7 @@ impl GyroCalibration {
             ),
             false => String::new(),
         };
-        let (late, scale, drift) = (&self.late_s, &self.scale, &self.drift);
+        let (late, scale, drift) = (&self.delay_s, &self.scale, &self.drift);
         let halves = match self.halves_s {
             [Some(first), Some(second)] => {
                 format!(
@@ -131,7 +128,7 @@ impl GyroCalibration {
             _ => String::new(),
         };
         let drifts = match self.drifts() {
-            true => ": one late_s does not do for a long drive",
+            true => ": one delay_s does not do for a long drive",
             false => "",
         };
         let tells = match self.tells_scale() {
@@ -145,7 +142,7 @@ impl GyroCalibration {
             ),
             format!(
                 "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} {halves}drift {:.0} \u{b1} {:.0} ppm{drifts}",
-                "gyro, late by", late.value, late.sigma, verdict(configured.late_s, late), "",
+                "gyro, late by", late.value, late.sigma, verdict(configured.delay_s, late), "",
                 drift.value * 1e6, drift.sigma * 1e6
             ),
             format!("{:<21} {:.4} \u{b1} {:.4}{tells}", "gyro, scale", scale.value, scale.sigma),

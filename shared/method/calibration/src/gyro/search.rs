@@ -1,4 +1,4 @@
-//! The axis and the offset at which the gyro turns as the radar.
+//! The axis and the offset that make the gyro turn as the radar.
 
 use gyre_samples::UpAxis;
 
@@ -21,7 +21,7 @@ pub(crate) const MIN_TURNS: usize = 36;
 const MIN_SHARE: f64 = 0.6;
 /// Time after which a turn is independent of another, baselines.
 const INDEPENDENT: f64 = 2.0;
-/// Logarithm of the likelihood by which the best offset must exceed any other.
+/// Least excess of the best offset's log-likelihood over any other's.
 const MIN_EVIDENCE: f64 = 5.0;
 /// Range of the delays that are searched in a run, s: buffers and stalling hosts cause them.
 const MAX_DELAY_S: f64 = 10.0;
@@ -29,7 +29,7 @@ const MAX_DELAY_S: f64 = 10.0;
 /// The axis and the offset that fit best.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Peak {
-    pub(crate) late_s: f64,
+    pub(crate) delay_s: f64,
     pub(crate) axis: usize,
     /// Of the radar's turns and the angles about the axis.
     pub(crate) correlation: f64,
@@ -52,21 +52,21 @@ impl Peak {
 
     /// Returns whether it is about another axis, or farther than a peak is wide.
     fn is_other(&self, peak: &Self) -> bool {
-        peak.axis != self.axis || (peak.late_s - self.late_s).abs() > PEAK_S
+        peak.axis != self.axis || (peak.delay_s - self.delay_s).abs() > PEAK_S
     }
 
     /// The highest correlation within a step.
     fn refined(&self, turns: &[Turn], angles: &Angles) -> Self {
-        let near = (-FINE..=FINE).map(|k| self.late_s + STEP_S * f64::from(k) / f64::from(FINE));
-        let near = near.map(|late_s| correlations(turns, angles, late_s)[self.axis]);
+        let near = (-FINE..=FINE).map(|k| self.delay_s + STEP_S * f64::from(k) / f64::from(FINE));
+        let near = near.map(|delay_s| correlations(turns, angles, delay_s)[self.axis]);
         let covered = near.filter(|peak| 10 * peak.turns >= 9 * self.turns);
         covered
             .max_by(|a, b| a.correlation.abs().total_cmp(&b.correlation.abs()))
             .unwrap_or(*self)
     }
 
-    /// The logarithm of the likelihood of this peak over that of another one, by so many turns that
-    /// are independent.
+    /// The logarithm of the likelihood ratio of this peak to another, for this number of
+    /// independent turns.
     fn evidence(&self, other: &Self, independent: f64) -> f64 {
         let unexplained = |peak: &Self| (1.0 - peak.correlation.powi(2)).max(1e-12);
         0.5 * independent * (unexplained(other) / unexplained(self)).ln()
@@ -87,7 +87,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
     let steps = (MAX_LATE_S / STEP_S) as i32;
     let offsets = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
     let mut peaks: Vec<Peak> = offsets
-        .flat_map(|late_s| correlations(turns, angles, late_s))
+        .flat_map(|delay_s| correlations(turns, angles, delay_s))
         .collect();
     let most = peaks.iter().map(|peak| peak.turns).max().unwrap_or(0);
     if most < MIN_TURNS {
@@ -102,7 +102,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
             highest.push(peak);
         }
     }
-    // Between the steps each may be higher, and another one the best.
+    // Between the steps each may be higher, and a different one the best.
     let mut refined = highest
         .iter()
         .map(|peak| peak.refined(turns, angles))
@@ -121,7 +121,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
 pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
     let steps = (MAX_DELAY_S / STEP_S) as i32;
     let delays = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
-    let peaks = delays.map(|late_s| correlations(turns, angles, late_s)[2]);
+    let peaks = delays.map(|delay_s| correlations(turns, angles, delay_s)[2]);
     let peaks: Vec<Peak> = peaks.filter(|peak| peak.turns >= MIN_TURNS).collect();
     let strength = |peak: &Peak| peak.correlation.abs();
     let best = *peaks
@@ -132,12 +132,12 @@ pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
     let fitting = peaks
         .into_iter()
         .filter(|it| it.correlation > 0.0 && fits(it));
-    let nearest = fitting.min_by(|a, b| a.late_s.abs().total_cmp(&b.late_s.abs()));
+    let nearest = fitting.min_by(|a, b| a.delay_s.abs().total_cmp(&b.delay_s.abs()));
     nearest.filter(|_| !fits(&Peak::default()))
 }
 
-/// The number of turns that are independent of each other, each as far as it turns: a straight road
-/// tells nothing, and one bend looks like any other.
+/// The number of independent turns, each weighted by its angle: a straight road determines nothing,
+/// and one bend looks like any other.
 fn independent(turns: &[Turn]) -> f64 {
     let count = turns.len() as f64;
     let mean = turns.iter().map(|turn| turn.amount).sum::<f64>() / count;
@@ -150,9 +150,9 @@ fn independent(turns: &[Turn]) -> f64 {
 }
 
 /// The correlations with the angles about each axis at one offset.
-fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
+fn correlations(turns: &[Turn], angles: &Angles, delay_s: f64) -> [Peak; 3] {
     let common = turns.iter().filter_map(|turn| {
-        let turned = angles.between(turn.from_s + late_s, turn.to_s + late_s)?;
+        let turned = angles.between(turn.from_s + delay_s, turn.to_s + delay_s)?;
         Some((turn.amount, turned.angle))
     });
     let common: Vec<_> = common.collect();
@@ -169,9 +169,9 @@ fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
         }
         let correlation = products / (yaws * angles).sqrt();
         Peak {
-            late_s,
+            delay_s,
             axis,
-            // Of what does not turn there is none.
+            // A series that does not turn has no correlation.
             correlation: if correlation.is_finite() {
                 correlation
             } else {

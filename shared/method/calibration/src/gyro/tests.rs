@@ -20,7 +20,7 @@ const AXES: [UpAxis; 6] = [
 #[derive(Clone, Debug)]
 struct Simulated {
     up: UpAxis,
-    late_s: f64,
+    delay_s: f64,
     scale: f64,
     bias_radps: f64,
     drift: f64,
@@ -38,7 +38,7 @@ impl Default for Simulated {
     fn default() -> Self {
         Self {
             up: UpAxis::MinusZ,
-            late_s: 1.58,
+            delay_s: 1.58,
             scale: 1.01,
             bias_radps: 2e-3,
             drift: 0.0,
@@ -94,9 +94,9 @@ impl Simulated {
             };
             let sign = self.up.in_vehicle([1.0; 3])[2];
             values[axis] = sign * measured + 2e-3 * noise(self.seed + 9, place);
-            let late_s = self.late_s + self.drift * (time_s - self.duration_s / 2.0);
+            let delay_s = self.delay_s + self.drift * (time_s - self.duration_s / 2.0);
             Sample {
-                stamp_ns: START_NS + ((time_s + late_s) * 1e9).round() as i64,
+                stamp_ns: START_NS + ((time_s + delay_s) * 1e9).round() as i64,
                 kind: SampleKind::Gyro as u32,
                 reserved: 0,
                 values,
@@ -140,18 +140,18 @@ proptest! {
     /// uncertainties, which are small.
     #[test]
     fn clock_axis_scale_and_bias_are_found(
-        up in prop::sample::select(&AXES[..]), late_s in -100.0..100.0f64, scale in 0.97..1.03f64,
+        up in prop::sample::select(&AXES[..]), delay_s in -100.0..100.0f64, scale in 0.97..1.03f64,
         bias_radps in -0.01..0.01f64, seed in 1u64..1000,
     ) {
-        let drive = Simulated { up, late_s, scale, bias_radps, seed, ..Simulated::default() };
+        let drive = Simulated { up, delay_s, scale, bias_radps, seed, ..Simulated::default() };
         let found = drive.calibrated().unwrap();
         prop_assert_eq!(found.up, up);
-        assert_within(found.late_s, late_s, 0.02, "late_s");
+        assert_within(found.delay_s, delay_s, 0.02, "delay_s");
         assert_within(found.scale, scale, 0.01, "scale");
         assert_within(found.bias_radps, bias_radps, 1e-3, "bias");
         prop_assert!(!found.drifts(), "{:?}", found.drift);
         for half in found.halves_s {
-            prop_assert!((half.unwrap() - late_s).abs() < 0.05, "{:?}", found.halves_s);
+            prop_assert!((half.unwrap() - delay_s).abs() < 0.05, "{:?}", found.halves_s);
         }
     }
 }
@@ -170,7 +170,7 @@ fn a_clock_that_drifts_is_told() {
     assert!((second - first - 0.075).abs() < 0.02, "{first} {second}");
     let table = found.table(&GyroConfig::default());
     assert!(
-        table.contains("one late_s does not do for a long drive"),
+        table.contains("one delay_s does not do for a long drive"),
         "{table}"
     );
 }
@@ -191,7 +191,7 @@ fn stalls_of_the_log_are_left_out_and_not_interpolated() {
         found.turns,
         whole.turns
     );
-    assert_within(found.late_s, 1.58, 0.02, "late_s");
+    assert_within(found.delay_s, 1.58, 0.02, "delay_s");
     assert_within(found.scale, 1.01, 0.01, "scale");
 }
 
@@ -211,7 +211,7 @@ fn the_log_of_another_drive_is_refused() {
         );
     }
     let later = Simulated {
-        late_s: 3600.0,
+        delay_s: 3600.0,
         ..Simulated::default()
     };
     let refused = later.calibrated().unwrap_err();
@@ -258,7 +258,7 @@ fn a_straight_or_short_drive_is_refused() {
 fn a_drive_whose_turns_repeat_is_refused_whatever_the_offset() {
     for late_ms in [0, 70, 120, 700, 1580] {
         let drive = Simulated {
-            late_s: 1e-3 * f64::from(late_ms),
+            delay_s: 1e-3 * f64::from(late_ms),
             repeats_s: Some(8.03),
             ..Simulated::default()
         };
@@ -292,7 +292,7 @@ fn the_section_is_a_configuration_of_what_was_found() {
     let table: toml::Table = found.toml(None).parse().unwrap();
     let config: GyroConfig = table["gyro"].clone().try_into().unwrap();
     assert_eq!(config.up, Some(UpAxis::MinusZ));
-    assert!((config.late_s - 1.58).abs() < 0.02 && (config.scale - 1.01).abs() < 0.01);
+    assert!((config.delay_s - 1.58).abs() < 0.02 && (config.scale - 1.01).abs() < 0.01);
     assert!((config.bias_radps - 2e-3).abs() < 1e-3);
     assert_eq!(
         config.bias_sigma_radps,
@@ -305,7 +305,7 @@ fn the_section_is_a_configuration_of_what_was_found() {
     assert_eq!(config.file.as_deref(), Some(path));
     // Beside a configuration with another delay.
     let configured = GyroConfig {
-        late_s: 0.0,
+        delay_s: 0.0,
         ..config
     };
     let table = found.table(&configured);
@@ -329,10 +329,10 @@ fn drives_of_one_gyro_are_combined_if_they_name_one_axis() {
     let (one, two) = (found(UpAxis::MinusZ, 1), found(UpAxis::MinusZ, 2));
     let mean = one.mean(std::slice::from_ref(&two)).unwrap();
     assert_within(
-        mean.late_s,
+        mean.delay_s,
         1.58,
-        one.late_s.sigma.max(two.late_s.sigma),
-        "late_s",
+        one.delay_s.sigma.max(two.delay_s.sigma),
+        "delay_s",
     );
     assert_eq!(mean.turns, one.turns + two.turns);
     let refused = one.mean(&[found(UpAxis::Z, 2)]).unwrap_err();

@@ -14,7 +14,7 @@ pub(crate) struct Turn {
 }
 
 /// The turns from each scan to the first that is [`BASELINE_S`] later, from those since the scan
-/// before; `starts` says where the chain of motions begins anew.
+/// before; `starts` marks where the chain of motions restarts.
 pub(crate) fn turns(stamps: &[i64], steps: &[f64], starts: &[bool]) -> Vec<Turn> {
     let since = |k: usize| (stamps[k] - stamps[0]) as f64 * 1e-9;
     let ends = (0..stamps.len()).map(|from| {

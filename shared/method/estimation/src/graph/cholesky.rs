@@ -31,7 +31,7 @@ pub(super) struct Cholesky {
 /// A block of the matrix, left of the diagonal in the order of elimination.
 struct Entry {
     column: usize,
-    /// Number of the block among those of the matrix.
+    /// Number of the block within the matrix.
     number: usize,
     /// The block is stored with its row as the column.
     is_transposed: bool,
@@ -50,11 +50,8 @@ impl<T> Lists<T> {
 }
 
 impl Cholesky {
-    /// Finds the structure of the factor of a matrix of `blocks` x `blocks` blocks, of which
-    /// `pairs` are not zero: columns and rows below the diagonal, sorted.
-    ///
-    /// # Errors
-    /// The factor does not fit into memory.
+    /// Finds the structure of the factor of a matrix of `blocks` x `blocks` blocks, where `pairs`
+    /// are not zero: columns and rows below the diagonal, sorted.
     pub fn new(blocks: usize, pairs: &[[usize; 2]]) -> Result<Self, TryReserveError> {
         let [order, place] = elimination_order(blocks, pairs);
         let left = left_of_diagonal(pairs, &place);
@@ -97,7 +94,7 @@ impl Cholesky {
     }
 
     /// Computes a row of the factor from the row of the matrix, and returns what remains of its
-    /// block on the diagonal. `ends` are those of the columns so far.
+    /// block on the diagonal. `ends` are the ends of the columns so far.
     fn eliminate(
         &mut self,
         step: usize,
@@ -174,7 +171,7 @@ fn elimination_order(blocks: usize, pairs: &[[usize; 2]]) -> [Vec<usize>; 2] {
     let rows: Vec<_> = pattern.iter().map(|[_, row]| *row).collect();
     match amd::order(blocks, &starts, &rows, &amd::Control::default()) {
         Ok((order, place, _)) => [order, place],
-        // Refused are patterns that are none. Every order is right, and this one needs more memory.
+        // Invalid patterns are rejected. Every order is right, and this one needs more memory.
         Err(_) => [(0..blocks).collect(), (0..blocks).collect()],
     }
 }
@@ -201,8 +198,8 @@ fn left_of_diagonal(pairs: &[[usize; 2]], place: &[usize]) -> Lists<Entry> {
     }
 }
 
-/// Returns the columns of each row of the factor: those of the matrix, and from each of them all up
-/// the elimination tree.
+/// Returns the columns of each row of the factor: the columns of the matrix, and from each of them
+/// all up the elimination tree.
 fn fill(left: &Lists<Entry>) -> Lists<usize> {
     let steps = left.starts.len() - 1;
     let mut parents = vec![usize::MAX; steps];

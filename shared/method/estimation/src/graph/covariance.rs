@@ -12,13 +12,9 @@ use crate::relative::Relative;
 impl PoseGraph {
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
     ///
-    /// The covariance is that of the present constraints, linearised at the present poses: exact
-    /// after [`PoseGraph::solve`], and that of dead reckoning for keyframes added since. The first
-    /// call after a change factorises the equations; each call solves them for three right-hand
-    /// sides.
-    ///
-    /// # Errors
-    /// There is no such keyframe, or the constraints do not determine the poses.
+    /// The covariance follows from the present constraints, linearised at the present poses: exact
+    /// after [`PoseGraph::solve`], and dead reckoning for keyframes added since. The first call
+    /// after a change factorises the equations; each call solves them for three right-hand sides.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(keyframe, self.state.poses.len())?;
         let covariance = self.project(&[(keyframe, Matrix3::identity())])?;
@@ -31,9 +27,6 @@ impl PoseGraph {
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial
     /// guess of their registration, as
     /// [`TrajectoryFilter::predict`](crate::TrajectoryFilter::predict).
-    ///
-    /// # Errors
-    /// As [`PoseGraph::pose`].
     pub fn predict(&mut self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(from.max(to), self.state.poses.len())?;
         let relative = Relative::predict(&self.state.poses[from], &self.state.poses[to]);

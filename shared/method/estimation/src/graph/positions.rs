@@ -1,5 +1,5 @@
-//! Measured positions of keyframes in a frame of their own, as those of GNSS, and the pose of the
-//! graph's frame in it.
+//! Measured positions of keyframes in a frame of their own, for example by GNSS, and the pose of
+//! the graph's frame in it.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix2x3, Matrix3, Vector2};
@@ -30,15 +30,14 @@ pub struct Position {
     pub position_m: Vector2<f64>,
     /// Variance along each axis, m².
     pub variance_m2: f64,
-    /// The factor of its information, above 0 up to 1: less than 1 if its error depends on those of
-    /// others.
+    /// The factor of its information, above 0 up to 1: less than 1 if its error depends on other
+    /// errors.
     pub share: f64,
 }
 
-/// A position with what the last solution makes of it.
+/// A position with its weight in the last solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPosition {
-    /// The measurement.
     pub position: Position,
     /// Squared normalised difference from the estimate; 2 is expected of a right one.
     pub chi_square: f64,
@@ -51,7 +50,6 @@ pub(super) struct Measured {
     it: Position,
     /// The kernel's weight.
     pub(super) weight: f64,
-    /// It contradicts the others.
     is_refused: bool,
 }
 
@@ -64,7 +62,6 @@ impl Measured {
         [self.it.keyframe, keyframes]
     }
 
-    /// Weighs it by the kernel.
     pub(super) fn weigh(&mut self, kernel: &Kernel, chi_square: f64) {
         self.weight = match self.is_refused {
             true => 0.0,
@@ -123,11 +120,7 @@ impl Measured {
 
 impl PoseGraph {
     /// Takes a measured position. Positions move no pose until [`PoseGraph::solve`], nor before
-    /// they tell the heading of the frame.
-    ///
-    /// # Errors
-    /// An unknown keyframe, values that are not finite, a variance or a share that is not above
-    /// zero.
+    /// they determine the heading of the frame.
     pub fn measure(&mut self, position: Position) -> Result<(), EstimationError> {
         let keyframe = position.keyframe;
         keyframe_exists(keyframe, self.state.poses.len())?;
@@ -156,15 +149,12 @@ impl PoseGraph {
     }
 
     /// Returns the pose of the graph's frame in the frame of the positions; `None` if they do not
-    /// tell it.
+    /// determine it.
     pub fn frame(&self) -> Option<Pose> {
         self.state.frame
     }
 
     /// Returns that pose with its covariance.
-    ///
-    /// # Errors
-    /// The constraints do not determine it.
     pub fn uncertain_frame(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let Some(motion) = self.state.frame else {
             return Ok(None);
@@ -174,8 +164,8 @@ impl PoseGraph {
         Ok(Some(UncertainMotion { motion, covariance }))
     }
 
-    /// Returns all positions in the order in which they came; none have weight before the frame is
-    /// known.
+    /// Returns all positions in the order of arrival; before the frame is known, their weight is
+    /// zero.
     pub fn positions(&self) -> impl Iterator<Item = WeightedPosition> + '_ {
         let State { poses, frame } = &self.state;
         self.positions.iter().map(move |measured| WeightedPosition {
@@ -198,11 +188,8 @@ impl PoseGraph {
 
     /// Weighs the positions against each other and the rest, from poses that know nothing of them:
     /// graduated non-convexity (Yang et al., RA-L 2020). With a wide kernel all count alike, and
-    /// the poses follow most of them; as it narrows those that contradict lose their weight. What
-    /// is beyond the gate at the end is not used.
-    ///
-    /// # Errors
-    /// The equations have no solution.
+    /// the poses follow most of them; as it narrows those that contradict lose their weight.
+    /// Positions beyond the gate at the end are not used.
     pub(super) fn choose_positions(&mut self) -> Result<(), EstimationError> {
         for measured in &mut self.positions {
             (measured.weight, measured.is_refused) = (1.0, false);
@@ -253,7 +240,7 @@ struct Pair {
     position: Vector2<f64>,
 }
 
-/// Returns the pose of the poses' frame in that of the positions that fits best, by weighted least
+/// Returns the pose of the poses' frame in the positions' frame that fits best, by weighted least
 /// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
 ///
 /// # Panics

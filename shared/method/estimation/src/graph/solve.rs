@@ -36,12 +36,8 @@ impl PoseGraph {
     ///
     /// New loops start with the weight of their test against the odometry, so that a long drift
     /// does not speak against the loop that corrects it; then the kernel decides. With many loops
-    /// the result can depend on the order in which they came and on when the graph was solved
-    /// between: [`PoseGraph::solve_anew`] depends on neither.
-    ///
-    /// # Errors
-    /// The equations have no solution within the range of numbers, or do not fit into memory. The
-    /// poses are then those before.
+    /// the result can depend on the order of arrival and on the times of intermediate solutions:
+    /// [`PoseGraph::solve_anew`] depends on neither. On an error the poses are unchanged.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.state.clone();
         self.place_frame();
@@ -59,10 +55,7 @@ impl PoseGraph {
     }
 
     /// Solves the graph from the odometry alone. The result depends on the constraints, and not on
-    /// the order in which loops came.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::solve`].
+    /// the order of arrival of loops.
     pub fn solve_anew(&mut self) -> Result<Solution, EstimationError> {
         for edge in &self.odometry {
             let [from, to] = edge.ends;
@@ -158,7 +151,7 @@ impl PoseGraph {
         Ok((self.options.max_iterations, false))
     }
 
-    /// Returns a state whose cost is not above `cost`, with their cost; `None` if there are none
+    /// Returns a state whose cost is not above `cost`, with their cost; `None` without such a state
     /// nearby. Adapts the trust radius.
     fn step(
         &mut self,
@@ -244,8 +237,8 @@ impl PoseGraph {
         Ok(side)
     }
 
-    /// Returns the sum of the squared normalised residuals in a state, those of loops and positions
-    /// weighted.
+    /// Returns the sum of the squared normalised residuals in a state, with weights for loops and
+    /// positions.
     pub(super) fn chi_square(&self, State { poses, frame }: &State, weights: Weights) -> f64 {
         let odometry = self.odometry.iter().map(|edge| edge.chi_square(poses));
         let loops = self.loops.iter().map(|closing| {

@@ -8,7 +8,7 @@ use super::cholesky::Cholesky;
 use super::edge::{Ends, Linear};
 
 /// A symmetric system of equations with three rows a pose and a block for each pair of poses that
-/// share an edge, of which the lower triangle is stored. Pose 0 is fixed and has no rows.
+/// share an edge; only the lower triangle is stored. Pose 0 is fixed and has no rows.
 pub(super) struct System {
     /// Of each edge in the order given: the number of the block below the diagonal. `None` for an
     /// edge of pose 0.
@@ -22,9 +22,6 @@ pub(super) struct System {
 
 impl System {
     /// Finds the structure of the matrix and of its factor.
-    ///
-    /// # Errors
-    /// The factor does not fit into memory.
     pub fn new(poses: usize, edges: &[Ends]) -> Result<Self, TryReserveError> {
         let blocks = poses - 1;
         let of_edges: Vec<_> = edges.iter().map(pair).collect();
@@ -58,7 +55,7 @@ impl System {
         self.diagonal.fill(Matrix3::zeros());
     }
 
-    /// Adds what an edge adds to the equations, times `weight`.
+    /// Adds an edge to the equations, times `weight`.
     pub fn add(
         &mut self,
         edge: usize,

@@ -1,12 +1,11 @@
 //! The descriptor of a place.
 
-use gyre_fourier::Complex32;
+use gyre_radar::fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
 use super::{CELL_M, PLANNED, RASTER_CELLS};
 
-/// Radii of a descriptor.
 pub(super) const RADII: usize = 40;
 /// Harmonics over half a turn that a descriptor keeps, from the first on.
 pub(super) const HARMONICS: usize = 64;
@@ -25,7 +24,6 @@ const SIEVE_FULL: f32 = 0.64;
 pub struct Descriptor {
     /// Radius after radius the real parts of all harmonics, then the imaginary parts.
     pub(super) spectrum: Vec<i8>,
-    /// Amplitudes, radius after radius.
     pub(super) sieve: Vec<u8>,
 }
 
@@ -89,7 +87,6 @@ impl Default for Describer {
 }
 
 impl Describer {
-    /// Plans the transforms.
     pub fn new() -> Self {
         let config = RotationConfig {
             // Lengths along the angle are padded fourfold, so that the spectrum's structure is
@@ -111,7 +108,8 @@ impl Describer {
         }
     }
 
-    /// Computes the descriptor of a submap. That of an empty one is zero, and similar to none.
+    /// Computes the descriptor of a submap. The descriptor of an empty submap is zero, and similar
+    /// to no other.
     pub fn describe(&mut self, submap: &Submap, out: &mut Descriptor) {
         submap.draw(CELL_M, self.raster.view_mut()).expect(PLANNED);
         let raster = self.raster.view();

@@ -14,7 +14,7 @@ use super::descriptor::SPECTRUM_BYTES;
 use super::{Descriptor, PlaceIndex};
 
 const MARK: [u8; 8] = *b"GYREPLCS";
-/// Increases with every change of the layout or of what the descriptors mean.
+/// Increases with every change of the layout or of the meaning of descriptors.
 const VERSION: u32 = 1;
 const SIZES: [u32; 2] = [Descriptor::SIEVE_BYTES as u32, SPECTRUM_BYTES as u32];
 const HEADER_BYTES: usize = MARK.len() + 4 + 8 + 8;
@@ -24,53 +24,30 @@ const CHECKSUM_BYTES: usize = 4;
 /// A file of places that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum PlaceFileError {
-    /// The file cannot be written.
     #[error("cannot write the places to {path}: {source}")]
     Write {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file cannot be read.
     #[error("cannot read the places in {path}: {source}")]
     Read {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file is something else.
     #[error("{path} is not a file of places")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file was written by another version.
+    Foreign { path: PathBuf },
     #[error(
         "{path} has version {version} of places, but this program reads version {VERSION}: build the places again from their keyframes"
     )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The version.
-        version: u32,
-    },
-    /// The file is damaged.
+    Version { path: PathBuf, version: u32 },
     #[error("{path} is damaged: {reason}; build the places again from their keyframes")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
+    Damaged { path: PathBuf, reason: String },
 }
 
 impl PlaceIndex {
     /// Writes all places to a file, which is replaced only once it is complete.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), PlaceFileError> {
         let error = |source| PlaceFileError::Write {
             path: path.to_owned(),
@@ -111,9 +88,6 @@ impl PlaceIndex {
     }
 
     /// Reads the places of a file.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is something else, has another version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, PlaceFileError> {
         let read = |source| PlaceFileError::Read {
             path: path.to_owned(),

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal};
 use gyre_geometry::wrap_angle;
+use gyre_radar::fourier::{Complex32, ComplexToReal};
 use gyre_scan_matching::{Peak, line_peak};
 use gyre_simd::simd;
 
@@ -24,12 +24,12 @@ pub struct Candidate {
     pub place: usize,
     /// Correlation coefficient of the descriptors at the best angle.
     pub score: f64,
-    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: the descriptors
-    /// cannot tell it from half a turn more.
+    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: descriptors are
+    /// ambiguous by half a turn.
     pub yaw_rad: f64,
 }
 
-/// A place whose path does not continue that of the place before.
+/// A place whose path does not continue from the place before.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
@@ -57,7 +57,6 @@ pub struct PlaceIndex {
     pub(super) places: Vec<PathPoint>,
     pub(super) sieves: Vec<u8>,
     pub(super) spectra: Vec<i8>,
-    /// Norm of each spectrum.
     norms: Vec<f32>,
     query: Query,
 }
@@ -100,9 +99,7 @@ impl PlaceIndex {
     }
 
     /// Adds a place, `path_m` metres along the path. Returns its number.
-    ///
-    /// # Errors
-    /// A path that is not finite or shorter than that of the place before; the index is as it was.
+    /// On an error the index is unchanged.
     pub fn insert(
         &mut self,
         id: u64,
@@ -121,7 +118,6 @@ impl PlaceIndex {
         Ok(self.places.len() - 1)
     }
 
-    /// Returns the number of places.
     pub fn len(&self) -> usize {
         self.places.len()
     }
@@ -136,7 +132,6 @@ impl PlaceIndex {
         self.places.get(place).map(|place| (place.id, place.path_m))
     }
 
-    /// Returns the descriptor of a place.
     pub fn descriptor(&self, place: usize) -> Option<Descriptor> {
         let (sieves, spectra) = (Descriptor::SIEVE_BYTES, SPECTRUM_BYTES);
         (place < self.len()).then(|| Descriptor {
@@ -151,8 +146,7 @@ impl PlaceIndex {
     }
 
     /// Finds the places among the first `eligible` ones that look most similar: at most 32, the
-    /// best first. Of places that lie less than `apart_m` along the path from a better one none is
-    /// returned.
+    /// best first. Places less than `apart_m` along the path from a better one are left out.
     pub fn query(
         &mut self,
         descriptor: &Descriptor,
@@ -172,7 +166,7 @@ impl PlaceIndex {
     }
 
     /// Ranks all places by their whole descriptors, the best first, each at the best `angles`
-    /// angles: for a query that must not miss its place, such as a scan of which half is hidden. It
+    /// angles: for a query that must not miss its place, such as a scan that is half hidden. It
     /// takes some microseconds a place.
     pub fn rank_all(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
         let places = 0..self.places.len() as u32;
@@ -190,7 +184,7 @@ impl PlaceIndex {
 
 impl Query {
     fn new(places: usize) -> Self {
-        let inverse = gyre_fourier::real_inverse(ANGLES);
+        let inverse = gyre_radar::fourier::real_inverse(ANGLES);
         Self {
             distances: Vec::with_capacity(places),
             cross: inverse.make_input_vec(),

@@ -9,7 +9,7 @@ use gyre_geometry::Pose;
 pub const MAX_NEIGHBOURS: usize = 8;
 /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
 pub const SUBMAP_REACH_M: f64 = 10.0;
-/// Distance and rotation from the last keyframe at which a scan becomes a keyframe, m and degrees.
+/// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
 const DISTANCE_M: f64 = 2.0;
 const ANGLE_DEG: f64 = 15.0;
 

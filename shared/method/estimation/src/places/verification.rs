@@ -37,16 +37,14 @@ pub enum VerificationOutcome {
     Undetermined,
 }
 
-/// A verified candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verification {
-    /// The verdict.
     pub outcome: VerificationOutcome,
     /// The pose of the queried keyframe in the frame of the found one, with its covariance; only as
     /// searched, with a covariance of zero, if the outcome is `LowCorrelation` before the
     /// alignment, or `Undetermined`.
     pub motion: UncertainMotion,
-    /// Masked correlation of the submaps at the motion; that of the search if there was no
+    /// Masked correlation of the submaps at the motion; the search's correlation without an
     /// alignment.
     pub correlation: f64,
     /// Correlation on whole cells at the candidate's angle, of the best translation and of the
@@ -55,11 +53,11 @@ pub struct Verification {
     pub searched: f64,
     /// See [`Self::searched`].
     pub runner_up: f64,
-    /// The yaw is half a turn from that of the candidate.
+    /// The yaw differs from the candidate's by half a turn.
     pub half_turn: bool,
 }
 
-/// Registers the submap of a query with those of candidates.
+/// Registers the submap of a query with the submaps of candidates.
 ///
 /// Planned once; nothing is allocated afterwards.
 pub struct LoopVerifier {
@@ -71,8 +69,8 @@ pub struct LoopVerifier {
 }
 
 impl LoopVerifier {
-    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is that of the
-    /// odometry: its cells and reach, and the scales of its covariance.
+    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is the
+    /// refinement of the odometry: its cells and reach, and the scales of its covariance.
     ///
     /// # Errors
     /// The first value of `refinement` that is out of its bounds.
@@ -91,7 +89,7 @@ impl LoopVerifier {
         })
     }
 
-    /// Registers the submap of the query, `later`, with that of the candidate, `earlier`.
+    /// Registers the submap of the query, `later`, with the submap of the candidate, `earlier`.
     pub fn verify(
         &mut self,
         later: &Submap,

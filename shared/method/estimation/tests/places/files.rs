@@ -30,7 +30,7 @@ fn saved(path: &Path) -> PlaceIndex {
     index
 }
 
-/// The sentence with which a file is refused.
+/// The error message for an invalid file.
 fn refused(path: &Path, bytes: &[u8]) -> String {
     fs::write(path, bytes).unwrap();
     PlaceIndex::load(path).err().unwrap().to_string()

@@ -3,5 +3,5 @@
 mod descriptors;
 mod files;
 mod loops;
-mod scenes;
+pub mod scenes;
 mod simulated_street;

@@ -21,7 +21,7 @@ const PROJECTED_CRS: u16 = 3072;
 const LINEAR_UNITS: u16 = 3076;
 const METRE: u16 = 9001;
 const LOCAL: &str = "Gyre map frame|";
-/// The tag in which GDAL keeps the names of bands, and these.
+/// The tag that GDAL uses for the names of bands, and these names.
 const GDAL_METADATA: Tag = Tag::Unknown(42_112);
 const BANDS: &str = "<GDALMetadata>\
     <Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">evidence</Item>\
@@ -31,10 +31,6 @@ const BANDS: &str = "<GDALMetadata>\
 /// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as
 /// opacity (see [`Cell`](crate::Cell)). With an origin it is in the UTM zone of that, turned by the
 /// heading; without, in metres of the map frame.
-///
-/// # Errors
-/// A file that cannot be written, an origin that is not on the earth, and a map that is empty or
-/// too large.
 pub fn write_geotiff(
     path: &Path,
     source: &mut impl TileSource,
@@ -68,7 +64,8 @@ pub fn write_geotiff(
         tags.write_tag(Tag::GeoAsciiParamsTag, LOCAL)
             .map_err(failed)?;
     }
-    // The encoder compresses what it gets as a whole, and not what it gets strip by strip.
+    // The encoder compresses data that it gets as a whole, and not data that it gets strip by
+    // strip.
     let mut pixels = Vec::with_capacity(2 * columns * rows);
     strips::for_each(source, &extent, |cells| {
         pixels.extend_from_slice(bytemuck::cast_slice(cells));

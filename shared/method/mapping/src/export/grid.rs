@@ -26,11 +26,8 @@ pub struct Grid {
 }
 
 /// Returns a map as a grid in the frame of its tiles: the grid has no rotation, since Nav2 ignores
-/// it. Blocks of 2 x 2, 4 x 4 and so on become one cell where it would have more than a million:
-/// occupied if one of them is, free if one is and none is occupied.
-///
-/// # Errors
-/// A tile that cannot be read, and a map without a keyframe.
+/// it. Blocks of 2 x 2, 4 x 4 and so on become one cell if the grid would have more than a million
+/// cells: occupied if one of them is occupied, free if one is free and no other is occupied.
 pub fn grid(source: &mut impl TileSource) -> Result<Grid, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let block = block(extent);
@@ -59,7 +56,7 @@ pub fn grid(source: &mut impl TileSource) -> Result<Grid, MapError> {
     })
 }
 
-/// The side of the blocks of cells, a power of two, at most that of a tile.
+/// The side of the blocks of cells, a power of two, at most the side of a tile.
 fn block(extent: TileExtent) -> usize {
     let [columns, rows] = extent.cells();
     let mut block = 1;

@@ -13,9 +13,6 @@ const FREE: u8 = 254;
 const UNKNOWN: u8 = 205;
 
 /// Writes `map.pgm` and `map.yaml` into `folder`.
-///
-/// # Errors
-/// A folder that cannot be written, and a map that is empty or too large.
 pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
     let extent = strips::extent(source, "PGM")?;
     let [columns, rows] = extent.cells();

@@ -14,11 +14,8 @@ use crate::{
 const MAX_ZOOM: u32 = 20;
 
 /// Writes `Z/X/Y.png` into `folder`, X to the right and Y down from the map's upper left corner,
-/// and `tiles.json` with what a viewer needs to know. The deepest level has the map's own cells;
+/// and `tiles.json` with the data that a viewer needs. The deepest level has the map's own cells;
 /// each level above half as many a side. Unknown places are transparent.
-///
-/// # Errors
-/// A folder that cannot be written, and a map that is empty.
 pub fn write_web_tiles(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
     let tiles = source.tiles();
     let extent = TileExtent::of(&tiles).ok_or(MapError::Empty)?;
@@ -42,10 +39,17 @@ pub fn write_web_tiles(folder: &Path, source: &mut impl TileSource) -> Result<()
     pyramid.build(0, 0, 0)?;
     let cell_m = pyramid.source.cell_m();
     let top = extent.corner_m(cell_m).y + (rows * TILE_CELLS) as f64 * cell_m;
-    let json = format!(
-        "{{\n  \"tiles\": [\"{{z}}/{{x}}/{{y}}.png\"],\n  \"minzoom\": 0,\n  \"maxzoom\": {zoom},\n  \"tile_size\": {TILE_CELLS},\n  \"left_m\": {:.3},\n  \"top_m\": {top:.3},\n  \"metres_per_pixel_at_maxzoom\": {cell_m}\n}}\n",
-        extent.corner_m(cell_m).x
-    );
+    let rounded = |metres: f64| (metres * 1e3).round() / 1e3;
+    let json = serde_json::json!({
+        "tiles": ["{z}/{x}/{y}.png"],
+        "minzoom": 0,
+        "maxzoom": zoom,
+        "tile_size": TILE_CELLS,
+        "left_m": rounded(extent.corner_m(cell_m).x),
+        "top_m": rounded(top),
+        "metres_per_pixel_at_maxzoom": cell_m,
+    });
+    let json = format!("{json:#}\n");
     Ok(gyre_storage::write(&folder.join("tiles.json"), json)?)
 }
 
@@ -100,7 +104,7 @@ impl<S: TileSource> Pyramid<'_, S> {
     }
 }
 
-/// Draws a tile at half its size into a quarter of another one.
+/// Draws a tile at half its size into a quarter of a coarser tile.
 fn halve(part: &TileImage, whole: &mut TileImage, [left, top]: [usize; 2]) {
     let half = TILE_CELLS / 2;
     for (row, pair) in part.cells.chunks_exact(2 * TILE_CELLS).enumerate() {

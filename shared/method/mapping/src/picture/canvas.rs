@@ -17,7 +17,6 @@ pub type Colour = [u8; 3];
 #[derive(Clone, Copy)]
 pub struct Pen {
     pub colour: Colour,
-    /// Units of the canvas.
     pub width: f32,
     /// 0 to 1.
     pub opacity: f32,
@@ -34,7 +33,7 @@ impl Pen {
 }
 
 const GLYPHS: RasterHeight = RasterHeight::Size32;
-/// Lengths in units, of which a picture is at least so many wide.
+/// Least width of a picture, in units of length.
 const MIN_WIDTH: f32 = 900.0;
 const FOOTER: f32 = 44.0;
 const MARGIN: f32 = 20.0;
@@ -48,7 +47,7 @@ const UNIT_SIDE: f32 = 1300.0;
 /// A picture that is being drawn.
 pub struct Canvas {
     pixmap: Pixmap,
-    /// Pixels of a unit: what is drawn has the same share of every picture.
+    /// Pixels of a unit: drawn elements have the same share of every picture.
     unit: f32,
     view: View,
     /// Row of the middle of the footer.
@@ -73,9 +72,6 @@ impl View {
 
 impl Canvas {
     /// Draws the ground, with room for a footer.
-    ///
-    /// # Errors
-    /// A picture that is too large.
     pub fn over(ground: &Ground) -> Result<Self, MapError> {
         let height = ground.height();
         let unit = (ground.width.max(height) as f32 / UNIT_SIDE).max(1.0);
@@ -130,7 +126,6 @@ impl Canvas {
             .collect()
     }
 
-    /// Draws lines through points.
     pub fn lines<P: AsRef<[(f32, f32)]>>(&mut self, lines: impl IntoIterator<Item = P>, pen: Pen) {
         let mut builder = PathBuilder::new();
         for line in lines {
@@ -232,7 +227,7 @@ impl Canvas {
     }
 }
 
-/// Adds a line but for the points that are too near to the one before to be told apart.
+/// Adds a line without the points that are indistinguishably near to the one before.
 fn add_line(builder: &mut PathBuilder, points: &[(f32, f32)]) {
     let mut points = points
         .iter()

@@ -1,15 +1,14 @@
-//! The cells of a picture: a map at a size that can be looked at, without what was never seen
-//! around it.
+//! The cells of a picture: a map at a size fit for viewing, cropped to its seen part.
 
 use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource, pixels};
 use nalgebra::Vector2;
 
 /// Longest side of a picture, px.
 const MAX_SIDE: usize = 4096;
-/// Opacity from which a cell counts as seen: of one look from nearby.
+/// Least opacity of a seen cell: one look from nearby.
 const SEEN: u8 = 32;
 
-/// The cells of a picture, row after row, that of the highest y first.
+/// The cells of a picture, row after row, from the highest y down.
 pub struct Ground {
     pub width: usize,
     pub cells: Vec<Cell>,
@@ -20,10 +19,6 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Reads a map.
-    ///
-    /// # Errors
-    /// A tile that cannot be read, and more tiles a side than pixels.
     pub fn read(source: &mut impl TileSource, extent: &TileExtent) -> Result<Self, MapError> {
         let [columns, rows] = extent.cells();
         // A power of two, so that a tile has a whole number of blocks.
@@ -68,7 +63,7 @@ impl Ground {
         self.cells.len() / self.width
     }
 
-    /// Cuts off columns and rows around what was seen.
+    /// Cuts off columns and rows around the seen part.
     fn cropped(self) -> Self {
         let is_seen = |cell: &Cell| cell.looked >= SEEN;
         let rows = || self.cells.chunks_exact(self.width);

@@ -1,4 +1,4 @@
-//! Keyframes that see what a test puts before them.
+//! Keyframes with simulated points of a scene.
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex};

@@ -5,12 +5,12 @@ use rten_onnx::onnx::{AttributeProto, AttributeType, GraphProto, ModelProto, Nod
 
 use super::tensors::{Attributes, Constants};
 
-/// The operators that fold cells, as PyTorch exports them. Where layers are quantised, their values
-/// are quantised anew between them, which changes none.
+/// The operators that fold cells, as PyTorch exports them. If layers are quantised, their values
+/// are quantised again between them, which changes no value.
 const FOLDING: [&str; 4] = ["Unsqueeze", "Reshape", "Transpose", "Reshape"];
 
 /// Returns a network in ONNX that computes the same, with one operator for the cells that are
-/// folded; `None` if there are none.
+/// folded; `None` without such cells.
 pub fn folded(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut file = ModelProto::parse_buf(bytes).ok()?;
     fold(file.graph.as_mut()?)?;

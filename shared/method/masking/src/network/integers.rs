@@ -29,7 +29,7 @@ pub(super) struct Integers {
     output: Output,
 }
 
-/// A step from images to another one, by their numbers.
+/// A step from images to an image, by their numbers.
 #[derive(Debug)]
 enum Step {
     /// The raster in steps of `step`.
@@ -76,7 +76,7 @@ struct Output {
 }
 
 impl Integers {
-    /// Reads a network that has only these steps, for one raster; `None` of another one.
+    /// Reads a network that has only these steps, for one raster; `None` for any other network.
     pub fn read(graph: &GraphProto) -> Option<Self> {
         graph::read(graph)
     }
@@ -149,7 +149,7 @@ fn gather(from: &Image, places: &[u32], to: &mut Image) {
     }
 }
 
-/// Borrows an image to read and another one to write.
+/// Borrows an image to read and a different one to write.
 fn two(images: &mut [Image], from: usize, to: usize) -> (&Image, &mut Image) {
     // Each step writes an image that did not exist before it.
     let (before, rest) = images.split_at_mut(to);

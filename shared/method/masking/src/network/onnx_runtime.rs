@@ -11,8 +11,8 @@ use ort::{
 };
 
 use super::{NetworkError, fill, fold};
+use crate::networks::{one_line, runtime};
 use crate::{Backend, MaskingConfig, Provider, model::Model};
-use gyre_networks::{one_line, runtime};
 
 /// A session of ONNX Runtime.
 #[derive(Debug)]

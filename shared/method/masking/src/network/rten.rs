@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use gyre_networks::one_line;
+use crate::networks::one_line;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3};
 use rten::{ModelOptions, RunOptions, ThreadPool, Value};
 use rten_onnx::onnx::{
@@ -16,7 +16,7 @@ use rten_onnx::onnx::{
 use super::{NetworkError, fill};
 use crate::{Backend, model::Model};
 
-/// The newest operators with which the models of `models/` agree with ONNX Runtime.
+/// The newest operator version where the models of `models/` agree with ONNX Runtime.
 const OPSET: i64 = 26;
 
 /// A network. One thread computes it.

@@ -12,7 +12,6 @@ pub struct Constants<'a>(HashMap<&'a str, &'a TensorProto>);
 /// Quantised weights with their scales, one for each output. All their zeros are 0.
 #[derive(Clone)]
 pub struct Weights {
-    /// Integers.
     pub values: Vec<f32>,
     pub shape: Vec<usize>,
     pub scales: Vec<f32>,
@@ -59,7 +58,7 @@ impl<'a> Constants<'a> {
         })
     }
 
-    /// Returns the values of a constant of any type; those of a network of 8 bits are exact.
+    /// Returns the values of a constant of any type; values of a network of 8 bits are exact.
     fn values(&self, name: &str) -> Option<Vec<f64>> {
         let tensor = self.0.get(name)?;
         let raw = tensor.raw_data.as_ref().map(|raw| raw.borrow());

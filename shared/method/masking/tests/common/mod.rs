@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use gyre_geometry::Twist;
+use gyre_masking::networks::runtime;
 use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_networks::runtime;
 use gyre_radar::{
     OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
 };
@@ -87,7 +87,7 @@ pub fn masker(config: &MaskingConfig) -> Masker {
     Masker::new(&raster(), &PointsConfig::default(), config).unwrap()
 }
 
-/// A scan in which neighbouring powers differ, for a seed.
+/// A scan with different neighbouring powers, for a seed.
 pub fn scan(seed: usize) -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * BINS,

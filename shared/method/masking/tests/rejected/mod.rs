@@ -9,8 +9,8 @@ use std::{
 };
 
 use crate::common::{backends, card, learned, learned_by, raster, runtime_is_installed};
+use gyre_masking::networks::runtime::INSTALL;
 use gyre_masking::{Backend, MaskingConfig, Provider, model::Card, network::Network};
-use gyre_networks::runtime::INSTALL;
 use gyre_radar::{RasterConfig, Sampling};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;

@@ -13,23 +13,22 @@ const VOTING_STEP: usize = 3;
 /// Peaks are searched within so many cells of the shift that is expected, round by round: the vote
 /// is a cell off at most, in each direction.
 const WINDOWS: [f64; 6] = [3.0, 3.0, 2.0, 2.0, 2.0, 2.0];
-/// Standard deviations at which a bearing has no weight: with normal errors the least squares are
-/// 95 % as good as those of all.
+/// Standard deviations beyond which a bearing has no weight: with normal errors the efficiency is
+/// 95 % of unweighted least squares.
 const CUTOFF: f64 = 4.685;
 /// Standard deviation over median absolute value of normal errors.
 const SIGMA_OF_MEDIAN: f64 = 1.4826;
-/// The least standard deviation of a shift, cells: finer steps than that are those of rounding.
+/// The least standard deviation of a shift, cells: smaller steps are rounding.
 const MIN_SIGMA_CELLS: f64 = 0.02;
-/// The least number of bearings that tell a velocity.
+/// The least number of bearings that determine a velocity.
 const MIN_BEARINGS: usize = 20;
 /// The highest peak of so many of them must be at the velocity. One in twenty is by chance.
 const MIN_AGREEING: f64 = 0.25;
-/// Cells from it at which a highest peak is at the velocity.
+/// Greatest distance of a highest peak from the velocity, cells.
 const AGREES_CELLS: f64 = 1.5;
-/// Azimuths apart from each other at which errors are independent: a vehicle 20 m away covers ten.
+/// Distance of azimuths with independent errors: a vehicle 20 m away covers ten.
 const DEPENDENT_AZIMUTHS: usize = 10;
 
-/// Fits velocities.
 #[derive(Debug, Default)]
 pub(super) struct Fit {
     seen: Vec<Seen>,
@@ -37,12 +36,12 @@ pub(super) struct Fit {
     sizes: Vec<f64>,
 }
 
-/// The approach that a bearing says.
+/// The approach at a bearing.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     azimuth: usize,
     direction: Vector2<f64>,
-    /// Approach as seen less that of the velocity, m/s.
+    /// Measured approach less the fitted velocity's, m/s.
     residual_mps: f64,
     /// By the height of its peak.
     weight: f64,
@@ -83,7 +82,7 @@ impl Fit {
         })
     }
 
-    /// Looks up what each row says near a velocity.
+    /// Looks up the approach at each row near a velocity.
     fn look(&mut self, rows: &[RowShifts], velocity: &Vector2<f64>, window: f64) {
         self.seen.clear();
         self.seen.reserve(rows.len());
@@ -99,7 +98,7 @@ impl Fit {
         }));
     }
 
-    /// The residual from which on a bearing has no weight, m/s.
+    /// The residual beyond which a bearing has no weight, m/s.
     fn cutoff_mps(&mut self, rows: &[RowShifts]) -> f64 {
         self.sizes.clear();
         let sizes = self.seen.iter().map(|seen| seen.residual_mps.abs());
@@ -125,9 +124,9 @@ impl Fit {
         step.iter().all(|it| it.is_finite()).then_some(step)
     }
 
-    /// The covariance of the fit, from the scatter of its bearings, of which neighbours err alike:
-    /// the sandwich of the M-estimate with Newey and West's (1987) weights over the azimuths
-    /// between two of them.
+    /// The covariance of the fit, from the scatter of its bearings, whose errors are correlated
+    /// between neighbours: the sandwich of the M-estimate with Newey and West's (1987) weights over
+    /// the azimuths between two of them.
     fn covariance(&self, cutoff_mps: f64) -> Option<Matrix2<f64>> {
         let (mut information, mut scatter) = (Matrix2::zeros(), Matrix2::zeros());
         let influence = |seen: &Seen| {
@@ -156,7 +155,7 @@ impl Fit {
     }
 }
 
-/// Returns the velocity at which the correlations of all rows sum up to most.
+/// Returns the velocity with the highest sum of the correlations of all rows.
 fn vote(rows: &[RowShifts]) -> Vector2<f64> {
     let cell_mps = rows[0].mps_per_lag.abs();
     let reach = REACH as i32;

@@ -3,7 +3,7 @@
 
 use crate::scan::PolarScan;
 
-/// Cells by which echoes can be shifted, either way.
+/// Largest shift of echoes in cells, either way.
 pub(super) const REACH: usize = 31;
 /// Shifts of both ways and none, rounded up to whole vectors.
 pub(super) const WIDTH: usize = 64;
@@ -11,9 +11,8 @@ pub(super) const WIDTH: usize = 64;
 const MAX_SPEED_MPS: f32 = 40.0;
 /// Farther echoes are left out, m.
 const MAX_RANGE_M: f32 = 100.0;
-/// Power above the median of all powers from which on an echo counts, in steps of half a decibel:
-/// noise, whose power is distributed exponentially, exceeds its median by 10 dB once in a thousand
-/// bins.
+/// Least power of an echo above the median of all powers, in steps of half a decibel: noise, whose
+/// power is distributed exponentially, exceeds its median by 10 dB once in a thousand bins.
 const ABOVE_MEDIAN: u8 = 20;
 /// Every so-many-th row and bin of the scan is enough for the median. Odd, so that rows are of both
 /// chirps.
@@ -22,8 +21,8 @@ const MEDIAN_STEP: usize = 5;
 /// Nearer echoes are of the radar itself: its ringing, m.
 const RINGING_M: f32 = 2.5;
 
-/// The cells of all rows. Each has some before and behind it, for its neighbours alone: where both
-/// ended at one range, that of a wall would seem to stand still.
+/// The cells of all rows. Each row has some cells before and behind it, only for its neighbours: if
+/// all ended at one range, a wall there would seem to stand still.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     layout: Layout,

@@ -11,9 +11,9 @@ use crate::scan::{PolarScan, Sense};
 
 /// Shifts that are looked at.
 pub(super) const LAGS: usize = 2 * REACH + 1;
-/// The mean of so many shifts on either side, about a metre, is taken off the correlation: of walls
-/// along the beam it is wide, at places of their own, and only what the chirps both see of the same
-/// scatterers is narrow.
+/// The mean of this many shifts on either side, about a metre, is subtracted from the correlation.
+/// Walls along the beam, at places of their own, correlate broadly; only the scatterers that both
+/// chirps see correlate narrowly.
 const MEAN_LAGS: usize = 8;
 /// The least height of a peak, of at most 1, and the least of one over the highest of its row.
 const MIN_HEIGHT: f32 = 0.05;
@@ -33,8 +33,8 @@ pub(super) struct RowShifts {
     pub azimuth: usize,
     /// Unit vector of the bearing, x forward and y left.
     pub direction: Vector2<f64>,
-    /// Closing speed by which the neighbours' echoes are one cell farther, m/s; negative for
-    /// falling chirps.
+    /// Closing speed that moves the neighbours' echoes one cell farther, m/s; negative for falling
+    /// chirps.
     pub mps_per_lag: f64,
     /// Correlation by shift, at most 1, less the mean about it.
     correlation: [f32; WIDTH],
@@ -159,7 +159,7 @@ fn mps_per_lag(scan: &PolarScan<'_>, cell_m: f32, azimuth: usize) -> f64 {
     f64::from(cell_m) / (coefficient(azimuth) - beside)
 }
 
-/// Sums the products of the cells of a row with those of its neighbours, over all shifts of these:
+/// Sums the products of the cells of a row with its neighbours' cells, over all shifts of these:
 /// they begin [`REACH`] cells before the row.
 #[simd]
 fn correlate(row: &[f32], beside: &[f32], sums: &mut [f32; WIDTH]) {

@@ -33,7 +33,7 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Scatterers at random bearings, of which those in a sector move with a velocity.
+/// Scatterers at random bearings, with a velocity for all in one sector.
 fn scene(count: usize, seed: u64, moving: (f64, Vector2<f64>)) -> Vec<Scatterer> {
     let mut next = random(seed);
     let scatterer = |_| {
@@ -131,7 +131,8 @@ proptest! {
         prop_assert!(off.norm() < expected, "off by {off} with {expected}");
     }
 
-    /// A coefficient with the other sign says the same: the chirps say which shifts which way.
+    /// A coefficient with the other sign gives the same result, because the chirps determine the
+    /// direction of each shift.
     #[test]
     fn the_sign_is_that_of_the_chirps(ahead in 3.0..30.0f64, seed: u64) {
         let mut scan = measured(&ras6(Sense::Clockwise), &scene(200, seed, (0.0, Vector2::zeros())), Vector2::new(ahead, 0.0));

@@ -9,7 +9,7 @@ use gyre_simd::simd;
 use super::{LostAzimuths, MAX_GAPS, MAX_LOST, MAX_SINGLE, echoes::Echoes, prediction::Prediction};
 use passes::{pass_backward, pass_forward};
 
-/// Azimuths by which the whole scan may be turned against a prediction, to either side.
+/// Largest turn of the whole scan against a prediction, in azimuths to either side.
 const TURN: usize = 3;
 /// Steps of that turn for each azimuth.
 const STEPS: usize = 2;
@@ -21,7 +21,7 @@ const BESIDE: usize = 1;
 const LEAST_NOISE: f32 = 1e-3;
 /// Likelihood of a row that is not as predicted, whatever number it has: of something that moves.
 const OUTLIER: f32 = 1e-3;
-/// Logarithm of a likelihood, relative to the highest of a row, that is none.
+/// Logarithm of a negligible likelihood, relative to the highest of a row.
 const LEAST_LOGARITHM: f32 = -20.0;
 /// Numbers of lost azimuths before a row, from none to all, if they are placed one by one.
 const FEW: usize = MAX_SINGLE + 1;
@@ -31,8 +31,8 @@ const TOGETHER: f64 = 2.0;
 const OF_BURST: f32 = 4.0;
 /// Logarithm of a likelihood, relative to another, beside which nothing is left of it.
 const NEGLIGIBLE: f64 = -30.0;
-/// Turns of the scan, a value for each: those of [`TURN`], and some that fill a multiple of what a
-/// processor takes at once.
+/// Turns of the scan, a value for each: as many as [`TURN`] allows, and padding up to a multiple of
+/// the processor's vector width.
 type Turns<T> = [T; TURNS.next_multiple_of(8)];
 const TURNS: usize = 2 * TURN * STEPS + 1;
 
@@ -77,13 +77,12 @@ impl Places {
 }
 
 impl Alignment {
-    /// Begins with a scan.
     pub fn begin(&mut self) {
         self.places.likelihood = f64::NEG_INFINITY;
         self.noise = 0.0;
     }
 
-    /// Adds what a prediction says of where `count` azimuths of the scan were lost.
+    /// Adds the evidence of a prediction about the places of `count` lost azimuths of the scan.
     pub fn add(&mut self, prediction: &Prediction, scan: &Echoes, count: usize) {
         self.places.moments.resize(count, [0.0; 2]);
         match count {
@@ -95,7 +94,7 @@ impl Alignment {
         }
     }
 
-    /// Compares rows with `WIDTH` azimuths: `MOST_STEPS` steps, of which `HALF` lie amid two
+    /// Compares rows with `WIDTH` azimuths: in `MOST_STEPS` steps, with `HALF` of them amid two
     /// azimuths.
     fn add_numbers<
         const WIDTH: usize,
@@ -228,7 +227,7 @@ struct Weights {
     gain: f32,
     /// The gain over the noise.
     scale: f32,
-    /// Steps with which a row is compared.
+    /// Steps for comparing a row.
     steps: usize,
 }
 
@@ -298,8 +297,8 @@ fn amid<const WIDTH: usize>(scores: &[f32; WIDTH], k: usize) -> f32 {
         + AMID[3] * scores[k + 3]
 }
 
-/// Returns e to the power of a number from -87 to 0, with a relative error below 2e-7. That of the
-/// C library takes one number at a time.
+/// Returns e to the power of a number from -87 to 0, with a relative error below 2e-7. The function
+/// of the C library takes one number at a time.
 #[inline(always)]
 fn exponential(x: f32) -> f32 {
     use std::f32::consts::LOG2_E;
@@ -330,12 +329,12 @@ fn exponential(x: f32) -> f32 {
     sum * f32::from_bits(power)
 }
 
-/// Azimuths with which a row is compared.
+/// Azimuths for comparing a row.
 const fn azimuths(count: usize) -> usize {
     count + 2 + 2 * (TURN + BESIDE)
 }
 
-/// The `k`-th azimuth with which a row is compared.
+/// The `k`-th azimuth for comparing a row.
 #[inline(always)]
 const fn azimuth(row: usize, k: usize) -> isize {
     (row + k) as isize - (TURN + BESIDE) as isize

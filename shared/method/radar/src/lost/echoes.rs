@@ -7,7 +7,7 @@ use gyre_simd::simd;
 use super::LostAzimuths;
 use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
 
-/// Depth of a cell, m: about that of a pulse's echo on a wall.
+/// Depth of a cell, m: about a pulse's echo on a wall.
 const CELL_M: f32 = 0.7;
 /// Least range of a cell, m: nearer is the vehicle.
 const NEAR_M: f32 = 4.0;
@@ -116,8 +116,8 @@ impl Echoes {
         }
     }
 
-    /// Sets the echoes to those of the rows, at their azimuths. An azimuth that was lost has half
-    /// the power of the rows on both sides.
+    /// Sets the echoes to the echoes of the rows, at their azimuths. An azimuth that was lost has
+    /// half the power of the rows on both sides.
     pub fn place(&mut self, rows: &Self, lost: &LostAzimuths) {
         self.begin(rows.layout);
         for row in rows.rows() {

@@ -12,7 +12,7 @@ use crate::{
     scan::{PolarScan, Sense},
 };
 
-/// Range at which the time between two looks in one direction is determined, m.
+/// Range for determining the time between two looks in one direction, m.
 const TYPICAL_M: f32 = 30.0;
 /// Azimuths before the turn and beyond it that a prediction has.
 const BEFORE: usize = 8;
@@ -49,8 +49,8 @@ impl Motion {
         }
     }
 
-    /// Returns the sensor at the time when it sees again what it saw in a direction, of which it
-    /// takes sine and cosine.
+    /// Returns the sensor at the time of its next look at a thing that it saw in a direction, given
+    /// as sine and cosine.
     fn seen_from(&self, [sin, cos]: [f32; 2]) -> Moved {
         let after = |later_s: f64| {
             let at_m = self.pose.translation.vector + self.velocity_mps * later_s;
@@ -78,8 +78,8 @@ struct Moved {
 }
 
 impl Moved {
-    /// Returns by how much further along the turn the sensor sees what it saw in that direction at
-    /// a range, rad, and its range, m.
+    /// Returns the displacement along the turn, rad, of a thing that the sensor saw in that
+    /// direction at a range, and its range, m.
     #[inline(always)]
     fn sees(&self, range_m: f32) -> (f32, f32) {
         let along = (range_m - self.x_m * self.cos - self.y_m * self.sin).max(0.1);

@@ -3,8 +3,9 @@
 use super::{LostAzimuths, stale_rows};
 use crate::scan::PolarScan;
 
-/// Writes the powers of a scan, azimuth x range bin: those of each measured row at its azimuth, and
-/// between two rows those of both by their distance. `lost` has as many as the scan has stale rows.
+/// Writes the powers of a scan, azimuth x range bin: the powers of each measured row at its
+/// azimuth, and between two rows an interpolation of both by their distance. `lost` has as many as
+/// the scan has stale rows.
 pub fn repair(scan: &PolarScan<'_>, lost: &LostAzimuths, into: &mut [u8]) {
     let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
     let measured = azimuths - stale_rows(scan);

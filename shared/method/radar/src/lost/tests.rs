@@ -54,8 +54,8 @@ fn scan(world: &[[f64; 2]], twist: &Twist, start_s: f64) -> OwnedScan {
     scan
 }
 
-/// Loses azimuths as the host does: the rows behind move up, and the last ones are those of the
-/// scan before. Returns the rows before which they were lost.
+/// Loses azimuths as the host does: the rows behind move up, and the last rows keep the scan
+/// before. Returns the rows before which they were lost.
 fn lose(scan: &mut OwnedScan, before: &OwnedScan, azimuths: &[usize]) -> Vec<u16> {
     let kept = (0..AZIMUTHS).filter(|azimuth| !azimuths.contains(azimuth));
     let mut bytes: Vec<u8> = kept
@@ -70,7 +70,7 @@ fn lose(scan: &mut OwnedScan, before: &OwnedScan, azimuths: &[usize]) -> Vec<u16
         .collect()
 }
 
-/// Places of which each is known.
+/// Places that are all known.
 fn certain(rows: &[u16]) -> LostAzimuths {
     LostAzimuths::between(rows.iter().map(|row| [*row; 2]))
 }

@@ -7,7 +7,6 @@ use std::f32::consts::{PI, TAU};
 /// Cells per test for emptiness.
 const BLOCK: usize = 16;
 
-/// A local maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Peak {
     pub azimuth: u16,

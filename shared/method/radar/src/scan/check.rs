@@ -8,63 +8,50 @@ use std::ops::RangeInclusive;
 /// is displaced by less than a cell of a raster.
 const MAX_STEP_BACK_NS: i64 = 5_000_000;
 
-/// An inconsistent scan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScanError {
-    /// A slice is shorter than the geometry requires.
     #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
     Length {
-        /// The slice.
         what: &'static str,
         /// Elements required by the geometry.
         expected: usize,
-        /// Elements present.
         actual: usize,
     },
-    /// A number of the geometry is out of bounds.
     #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
     Geometry {
-        /// The number.
         what: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: RangeInclusive<f64>,
     },
-    /// A stamp is before that of an earlier row.
     #[error(
         "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
     )]
     StampOrder {
         /// The row, from 0.
         row: usize,
-        /// Time by which it is earlier, s.
+        /// Difference to the earlier stamp, s.
         back_s: f64,
     },
-    /// Stamps are farther apart than a sweep takes.
     #[error(
         "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
     StampSpan {
         /// The row, from 0.
         row: usize,
-        /// The stamp minus that of the first row, s.
+        /// The stamp minus the stamp of the first row, s.
         after_s: f64,
         /// The longest sweep, s.
         max_s: f64,
     },
-    /// The stamp of the scan is not one of its sweep.
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
     StampApart {
-        /// Stamp of the scan minus that of the first row, s.
+        /// Stamp of the scan minus the stamp of the first row, s.
         apart_s: f64,
     },
-    /// The angle of an azimuth is not finite.
     #[error("azimuth {index} of the scan is at {value} rad")]
     Azimuth {
         /// The row.
         index: usize,
-        /// The angle.
         value: f32,
     },
 }
@@ -72,9 +59,6 @@ pub enum ScanError {
 impl PolarScan<'_> {
     /// Checks that the slices are as long as the geometry requires, and that every number is within
     /// its bounds.
-    ///
-    /// # Errors
-    /// Returns the first inconsistency.
     pub fn check(&self) -> Result<(), ScanError> {
         let geometry = &self.geometry;
         check_length("azimuth table", self.azimuth_rad.len(), geometry.azimuths)?;
@@ -124,11 +108,8 @@ impl PolarScan<'_> {
         }
     }
 
-    /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan
-    /// that passes [`PolarScan::check`].
-    ///
-    /// # Errors
-    /// Returns the first row that is not of the sweep.
+    /// Checks that the times of the rows, and the scan's own, form one sweep. For a scan that
+    /// passes [`PolarScan::check`].
     pub fn check_times(&self) -> Result<(), ScanError> {
         let stamps = &self.stamp_ns[..self.geometry.azimuths];
         check_sweep(stamps, MAX_INTERVAL_NS)?;
@@ -146,9 +127,6 @@ impl PolarScan<'_> {
 }
 
 /// Checks that the times of the rows, ns, do not decrease, and span at most `max_sweep_ns`.
-///
-/// # Errors
-/// If they do not, with the row.
 pub fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError> {
     let Some(first) = stamp_ns.first().copied() else {
         return Ok(());

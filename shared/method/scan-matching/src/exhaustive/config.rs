@@ -49,10 +49,6 @@ impl ExhaustiveConfig {
         }
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("exhaustive");
         let fits = self.reach_deg > 0.0 && self.reach_deg <= 180.0;

@@ -29,7 +29,6 @@ const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
 pub(super) struct Alignment {
     /// Pose of the points' frame in the map.
     pub pose: Pose,
-    /// The normal equations there.
     pub normal: NormalEquations,
 }
 
@@ -37,11 +36,11 @@ pub(super) struct Alignment {
 /// cost never rises.
 ///
 /// Gauss-Newton takes the residuals for small. Here a point's residual 1 - M is large everywhere,
-/// so the cost is curved several times as much as the information says, and a whole step goes too
-/// far. The parabola through the cost and its slope before a step and the cost after it gives the
-/// share of the step at which the cost is least. That share is nearly the same from step to step,
-/// so each step takes the share that the one before would have needed, at one evaluation of the
-/// cost a step.
+/// so the cost is curved several times as much as the information implies, and a whole step is too
+/// long. The parabola through the cost and its slope before a step and the cost after it gives the
+/// share of the step with the least cost. That share is nearly the same from step to step, so each
+/// step takes the share that the one before would have needed, at one evaluation of the cost a
+/// step.
 pub(super) fn align(
     map: &MapView<'_>,
     points: &DeskewedPoints,
@@ -105,8 +104,7 @@ fn gauss_newton_step(normal: &NormalEquations) -> Option<Vector3<f64>> {
     step.iter().all(|s| s.is_finite()).then_some(step)
 }
 
-/// Returns the share of a step at which the parabola through the costs before and after it is
-/// least.
+/// Returns the share of a step that minimises the parabola through the costs before and after it.
 fn best_share(before: &NormalEquations, step: &Vector3<f64>, after: &NormalEquations) -> f64 {
     let (least, most) = SHARE_FACTORS;
     let descent = 2.0 * before.right_hand_side.dot(step);

@@ -1,14 +1,15 @@
 //! Along walls without structure, as in a tunnel: the radar sees where they are, but not how far
 //! the vehicle drives.
 //!
-//! The place along them is the predicted one, by wheels, by Doppler or at constant velocity, with
-//! the covariance of that; across them and of the heading the radar tells as elsewhere. Until the
-//! search, which compares two scans and no map, contradicts the prediction, the place is that of
-//! the match, or at constant velocity the mean of prediction and search.
+//! The place along them is predicted, by wheels, by Doppler or at constant velocity, with the
+//! prediction's covariance; across them, and for the heading, the radar determines the pose as
+//! elsewhere. Until the search, which compares two scans and no map, contradicts the prediction,
+//! the place comes from the match, or at constant velocity from the mean of prediction and search.
 //!
-//! At constant velocity the way is a guess, and keyframes that lie so share no structure behind the
-//! walls either. So the search says how far the vehicle would have come instead: where keyframes
-//! that lie as it says share structure, the walls have ended, and a new map starts.
+//! At constant velocity the displacement is a guess, and keyframes that are placed by guesses share
+//! no structure behind the walls either. So the displacement by the search is recorded, too. If
+//! keyframes placed by the search overlap enough to constrain the position, the walls have ended,
+//! and a new map starts.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{UnitVector2, Vector2};
@@ -25,9 +26,9 @@ use super::{
 pub(super) struct Match {
     /// Pose in the map, with the covariance of the motion to it.
     pub registered: UncertainMotion,
-    /// The direction along the axes of the map in which nothing determines the place.
+    /// The direction along the axes of the map that leaves the place undetermined.
     pub undetermined: Option<UnitVector2<f64>>,
-    /// Way by which the search leads beyond a place that is a guess, m.
+    /// Displacement by the search beyond a predicted place, m.
     pub ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
     pub leaves_map: bool,
@@ -35,8 +36,8 @@ pub(super) struct Match {
 
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
-    /// plausible. In a direction in which nothing determines the place the predicted one is taken,
-    /// or the mean of prediction and search: that becomes the best match, and has to be plausible.
+    /// plausible. In an undetermined direction the place is the predicted one, or the mean of
+    /// prediction and search: that becomes the best match, and has to be plausible.
     pub(super) fn plausible_match(
         &mut self,
         scan: &Scan<'_>,
@@ -104,7 +105,9 @@ impl Refiner {
         }
         let of_search = self.step_m(scan).powi(2);
         found.registered = match best.guess {
-            InitialGuess::AlongWalls => self.slid(scan, found.registered, along, uncertainty),
+            InitialGuess::AlongWalls => {
+                self.with_predicted_place(scan, found.registered, along, uncertainty)
+            }
             // Without its map nothing takes back an error of the place.
             _ if found.leaves_map => self.placed(found.registered, along, of_search, 1.0),
             _ => self.placed(found.registered, along, of_search, self.drift_share()),
@@ -112,8 +115,8 @@ impl Refiner {
         Some(found)
     }
 
-    /// Returns whether walls that were driven along by guesses have ended: keyframes that lie to
-    /// each other as the search says share structure that determines the place by the search.
+    /// Returns whether the walls along a stretch of guesses have ended: keyframes placed by the
+    /// search overlap enough to constrain the position.
     fn sees_by_search(&mut self, scan: &Scan<'_>, place: &Pose) -> bool {
         if self.state.sliding == 0 {
             return false;
@@ -123,9 +126,10 @@ impl Refiner {
             .is_some_and(|weakest| !weakest.is_doubtful())
     }
 
-    /// Returns the direction along the axes of the map in which the place of a registered pose is
+    /// Returns the direction along the axes of the map that leaves the place of a registered pose
     /// undetermined, if there is one. In one that is doubtful wheels or Doppler decide. While the
-    /// search is asked, there is none where match, search and prediction are near each other.
+    /// search is used, the place counts as determined if match, search and prediction are near each
+    /// other.
     pub(super) fn undetermined(
         &self,
         scan: &Scan<'_>,
@@ -156,9 +160,8 @@ impl Refiner {
         self.state.along_walls == 0
     }
 
-    /// Returns whether a pose is near the predicted one in a direction. In a tunnel that of the
-    /// match soon is metres away, and some scans later that of the search too. Elsewhere both stay
-    /// near.
+    /// Returns whether a pose is near the predicted one in a direction. In a tunnel the match's
+    /// pose soon is metres away, and some scans later the search's, too. Elsewhere both stay near.
     fn is_near(&self, pose: &Pose, scan: &Scan<'_>, along: UnitVector2<f64>) -> bool {
         let [predicted, _] = self.state.predict(&scan.step);
         let apart = pose.translation.vector - predicted.translation.vector;
@@ -166,7 +169,7 @@ impl Refiner {
     }
 
     /// Returns how much farther than predicted a vehicle drives if it accelerates, m: since the
-    /// last refined scan, or since the scan before if the way is measured.
+    /// last refined scan, or since the scan before if the displacement is measured.
     fn step_m(&self, scan: &Scan<'_>) -> f64 {
         let age_s = match (scan.step.distance, &self.state.anchors[0]) {
             (None, Some(anchor)) => anchor.age_s,
@@ -180,9 +183,9 @@ impl Refiner {
         self.config.acceleration_mps2 * time_s.powi(2)
     }
 
-    /// Returns a registered pose with the covariance that the prediction has in a direction in
-    /// which nothing else tells the place: by wheels, by Doppler, or at constant velocity.
-    fn slid(
+    /// Returns a registered pose with the prediction's covariance in an undetermined direction: by
+    /// wheels, by Doppler, or at constant velocity.
+    fn with_predicted_place(
         &self,
         scan: &Scan<'_>,
         registered: UncertainMotion,
@@ -194,7 +197,7 @@ impl Refiner {
             None => self.state.sliding,
         };
         let ahead = self.state.pose.rotation.inverse() * along.into_inner();
-        let variance = uncertainty.of_sliding(ahead, sliding);
+        let variance = uncertainty.of_predicted_place(ahead, sliding);
         self.placed(registered, along, variance, self.drift_share())
     }
 
@@ -202,8 +205,8 @@ impl Refiner {
         uncertainty::drift_share(self.map.len(), &self.config)
     }
 
-    /// Returns a registered pose with this variance in a direction of the map, m², all of which
-    /// accumulates, where of a covariance this share does.
+    /// Returns a registered pose with this variance in a direction of the map, m². All of this
+    /// variance accumulates, but only this share of a covariance.
     fn placed(
         &self,
         registered: UncertainMotion,
@@ -223,14 +226,14 @@ impl Refiner {
     }
 
     /// Takes a scan whose place along the walls is the predicted one.
-    pub(super) fn slide(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
+    pub(super) fn propagate_along_walls(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
         self.state.along_walls = self.state.along_walls.saturating_add(1);
         self.state.sliding = match scan.step.distance {
             Some(_) => 0,
             None => self.state.sliding.saturating_add(1),
         };
         self.each_distance(registered, |state, measured, driven, _| {
-            state.slide_along(measured, driven);
+            state.propagate_along_walls(measured, driven);
         });
     }
 }

@@ -8,7 +8,7 @@ use crate::config::{ConfigError, Section};
 pub(super) const JITTER_M: f64 = 0.8;
 /// Tolerance of the limit of yaw acceleration for the noise of matches, degrees.
 pub(super) const JITTER_DEG: f64 = 3.0;
-/// Cell size of the coarse map, on which registration starts, over that of the fine map.
+/// Cell size of the coarse map, where registration starts, over the cell size of the fine map.
 pub(super) const COARSE: f64 = 3.0;
 
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
@@ -42,8 +42,8 @@ pub struct RefinementConfig {
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
     /// Standard deviation of the drift of a map of k keyframes with each motion, over 2 / (k + 1)
-    /// of that of the motion. The share (drift_scale x 2 / (k + 1))² of the covariance accumulates,
-    /// at most all of it; the next motion takes back the rest.
+    /// of the motion's standard deviation. The share (drift_scale x 2 / (k + 1))² of the covariance
+    /// accumulates, at most all of it; the next motion takes back the rest.
     pub drift_scale: f64,
     /// Standard deviation of the scale that all motions of a drive share: how well the range
     /// resolution is known.
@@ -86,10 +86,6 @@ impl Default for RefinementConfig {
 }
 
 impl RefinementConfig {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("refinement");
         section.within("keyframes", self.keyframes, 1..=64, "1 to 64")?;

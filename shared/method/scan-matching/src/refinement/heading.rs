@@ -1,10 +1,11 @@
 //! The heading by gyro and radar together: a Kalman filter over the heading against the map, the
-//! bias of the gyro and its scale, and the lean of the radar.
+//! bias of the gyro and its scale, and the yaw bias of registration.
 //!
 //! The gyro predicts the heading of the next scan, and registration measures it against the map.
-//! While the vehicle stands the map stays, so that the bias is seen well. While it drives, the map
-//! is made anew of its own scans and follows a bias that is wrong; and a small steady error of
-//! registration, the *lean*, drags the map along as a bias would. The covariance knows both.
+//! While the vehicle stands the map stays, so that the bias is observed well. While it drives, the
+//! map is rebuilt from its own scans and follows a wrong bias; and a small steady error of
+//! registration, the *yaw bias*, drags the map along as a gyro bias would. The covariance includes
+//! both.
 
 use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
@@ -13,24 +14,25 @@ use nalgebra::{Matrix4, RowVector4, Vector4};
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
 /// one of them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
-/// Standard deviation of the lean, rad, and the time over which it changes, s. A map that lags by
-/// 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on six simulated roads.
-const LEAN_SIGMA_RAD: f64 = 4e-5;
-const LEAN_TIME_S: f64 = 60.0;
-/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s.
-/// It is what the best bias and scale leave of the turns in 4 to 16 s on six simulated roads, whose
-/// gradient is 2.6 % RMS along and across.
+/// Standard deviation of the yaw bias of registration, rad, and the time over which it changes, s.
+/// A map that lags by 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on
+/// six simulated roads.
+const YAW_BIAS_SIGMA_RAD: f64 = 4e-5;
+const YAW_BIAS_TIME_S: f64 = 60.0;
+/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
+/// the residual of the best bias and scale in the turns over 4 to 16 s on six simulated roads,
+/// whose gradient is 2.6 % RMS along and across.
 const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Time over which an error of the bias counts as new, s: for covariances of motions, which are
 /// composed as if independent.
 const BIAS_TIME_S: f64 = 30.0;
-/// Angle over which an error of the scale counts as new, rad: that of a bend.
+/// Angle after which an error of the scale counts as new, rad: a bend.
 const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
 /// The states, in the order of the covariance.
 const HEADING: usize = 0;
 const BIAS: usize = 1;
-const LEAN: usize = 2;
+const YAW_BIAS: usize = 2;
 const SCALE: usize = 3;
 /// The part that each has in a registered heading against the predicted one.
 const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
@@ -41,17 +43,18 @@ pub struct Heading {
     /// Bias of the gyro, rad/s.
     pub bias_radps: f64,
     /// Steady error of registered headings, rad.
-    pub lean_rad: f64,
+    pub yaw_bias_rad: f64,
     /// True turn over the one that is measured, but for the bias. With one that the gyro cannot
     /// have ([`GyroConfig::allows_scale`]) it is not used any more.
     pub scale: f64,
-    /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
+    /// Covariance of the errors of the heading against the map, the bias, the yaw bias and the
+    /// scale.
     pub covariance: Matrix4<f64>,
-    /// The verdict of the last registered heading on that of the gyro.
+    /// The verdict of the last registered heading on the gyro's.
     pub verdict: Verdict,
 }
 
-/// The verdict of a registered heading on that of the gyro.
+/// The verdict of a registered heading on the gyro's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Verdict {
     /// Noise can bring both so far apart.
@@ -94,9 +97,9 @@ pub(super) struct PredictedTurn {
 }
 
 impl PredictedTurn {
-    /// Returns the variance after a time, s, and an angle, rad, in which all turns were the gyro's,
-    /// such that those of all of them add up, rad². The errors of bias and scale are those of all:
-    /// their squares grow with the squares of the time and of the angle.
+    /// Returns the variance after a time, s, and an angle, rad, with all turns by the gyro, such
+    /// that the variances of all turns add up, rad². The errors of bias and scale are common to
+    /// all: their squares grow with the squares of the time and of the angle.
     pub fn variance_after_rad2(&self, [time_s, angle_rad]: [f64; 2]) -> f64 {
         self.noise_rad2
             + self.bias_radps2 * grown(self.interval_s, time_s)
@@ -125,17 +128,17 @@ impl Heading {
     /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
         let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
-        let variances = Vector4::new(0.0, bias, LEAN_SIGMA_RAD.powi(2), scale);
+        let variances = Vector4::new(0.0, bias, YAW_BIAS_SIGMA_RAD.powi(2), scale);
         Self {
             bias_radps: config.bias_radps,
-            lean_rad: 0.0,
+            yaw_bias_rad: 0.0,
             scale: 1.0,
             covariance: Matrix4::from_diagonal(&variances),
             verdict: Verdict::Agrees,
         }
     }
 
-    /// Returns what is known of the bias.
+    /// Returns the estimate of the bias.
     pub(super) fn bias(&self) -> GyroBias {
         GyroBias {
             rate_radps: self.bias_radps,
@@ -153,7 +156,7 @@ impl Heading {
         (step[(HEADING, BIAS)], step[(HEADING, SCALE)]) = (-time_s, turn.yaw_rad);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(HEADING, HEADING)] += turn_rad2;
-        self.wait(time_s, config);
+        self.propagate(time_s, config);
         let bias_radps2 = self.covariance[(BIAS, BIAS)];
         let scale_variance = self.covariance[(SCALE, SCALE)];
         let angle_rad = turn.yaw_rad.abs();
@@ -170,54 +173,55 @@ impl Heading {
         }
     }
 
-    /// Lets a time pass whose turn the gyro has not measured: bias and lean change, and the heading
-    /// is another one. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) says which.
-    pub(super) fn wait(&mut self, time_s: f64, config: &GyroConfig) {
-        let kept = (-time_s / LEAN_TIME_S).exp();
+    /// Propagates the state over a time without a gyro measurement of the turn: the gyro's bias and
+    /// the yaw bias change, and so does the heading. Either [`reset_to`](Self::reset_to) or
+    /// [`inflate`](Self::inflate) sets the heading.
+    pub(super) fn propagate(&mut self, time_s: f64, config: &GyroConfig) {
+        let kept = (-time_s / YAW_BIAS_TIME_S).exp();
         let step = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, kept, 1.0));
         self.covariance = step * self.covariance * step;
         self.covariance[(BIAS, BIAS)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
-        self.covariance[(LEAN, LEAN)] += LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
-        self.lean_rad *= kept;
+        self.covariance[(YAW_BIAS, YAW_BIAS)] += YAW_BIAS_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
+        self.yaw_bias_rad *= kept;
     }
 
     /// Takes the heading of a pose that was registered with the map, whatever it was before: the
     /// gyro has not measured the turn. That is the correction of a prediction without any
-    /// certainty, so that the lean alone is taken off. The error is that of the lean, which the
-    /// bias may share, and the noise of registration. The place moves along as in
-    /// [`weigh`](Self::weigh).
-    pub(super) fn adopt(
+    /// certainty, so that only the yaw bias is taken off. The error is the yaw bias's, which the
+    /// bias may share, plus the noise of registration. The place moves along as in
+    /// [`update`](Self::update).
+    pub(super) fn reset_to(
         &mut self,
         registered: &UncertainMotion,
         previous: &Pose,
     ) -> UncertainMotion {
         let variance_rad2 = registered.covariance[(2, 2)];
         let mut step = Matrix4::identity();
-        (step[(HEADING, HEADING)], step[(HEADING, LEAN)]) = (0.0, -1.0);
+        (step[(HEADING, HEADING)], step[(HEADING, YAW_BIAS)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(HEADING, HEADING)] += variance_rad2;
         UncertainMotion {
-            motion: turned(registered, previous, -self.lean_rad),
+            motion: turned(registered, previous, -self.yaw_bias_rad),
             ..*registered
         }
     }
 
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
     /// the motions before, with this variance.
-    pub(super) fn guess(&mut self, variance_rad2: f64) {
+    pub(super) fn inflate(&mut self, variance_rad2: f64) {
         self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
-    /// Returns what a registered heading says of the predicted one, where single matches err by up
-    /// to `jitter_rad`.
-    pub(super) fn judge(
+    /// Compares a registered heading with the predicted one, where single matches err by up to
+    /// `jitter_rad`.
+    pub(super) fn gate(
         &self,
         registered: &UncertainMotion,
         previous: &Pose,
         turn: &PredictedTurn,
         jitter_rad: f64,
     ) -> Verdict {
-        let apart_rad = turn.apart_rad(registered, previous) - self.lean_rad;
+        let apart_rad = turn.apart_rad(registered, previous) - self.yaw_bias_rad;
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
         if apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)]) {
             Verdict::Agrees
@@ -229,9 +233,9 @@ impl Heading {
     }
 
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
-    /// place moves along as far as its error depends on that of the heading. `previous` is the pose
-    /// of the scan before, `drift_share` the share of the covariance that accumulates.
-    pub(super) fn weigh(
+    /// place moves along as far as its error depends on the heading's. `previous` is the pose of
+    /// the scan before, `drift_share` the share of the covariance that accumulates.
+    pub(super) fn update(
         &mut self,
         registered: &UncertainMotion,
         previous: &Pose,
@@ -256,9 +260,9 @@ impl Heading {
     fn correct(&mut self, apart_rad: f64, variance_rad2: f64) -> f64 {
         let across = self.covariance * SEEN.transpose();
         let gain = across / ((SEEN * across)[0] + variance_rad2);
-        let step = gain * (apart_rad - self.lean_rad);
+        let step = gain * (apart_rad - self.yaw_bias_rad);
         self.bias_radps += step[BIAS];
-        self.lean_rad += step[LEAN];
+        self.yaw_bias_rad += step[YAW_BIAS];
         self.scale += step[SCALE];
         // Joseph's form stays symmetric and positive.
         let kept = Matrix4::identity() - gain * SEEN;
@@ -267,23 +271,24 @@ impl Heading {
         step[HEADING]
     }
 
-    /// A new map starts with the scan before: its heading is that of the map.
+    /// A new map starts with the scan before: its heading is the map's.
     pub(super) fn start_map(&mut self) {
         let step = Matrix4::from_diagonal(&Vector4::new(0.0, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;
     }
 
-    /// The map has a new keyframe, one of `keyframes`: its heading follows that of the scans.
-    pub(super) fn follow(&mut self, keyframes: usize) {
+    /// The map has a new keyframe, one of `keyframes`: its heading follows the heading of the
+    /// scans.
+    pub(super) fn add_keyframe(&mut self, keyframes: usize) {
         let kept = 1.0 - 2.0 / (keyframes as f64 + 1.0);
         let step = Matrix4::from_diagonal(&Vector4::new(kept, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;
     }
 }
 
-/// The pose that was registered, turned by an angle: the place moves along as far as its error
-/// depends on that of the heading. Its covariance is along the axes of the scan before, whose pose
-/// is `previous`, and the pose along those of the map.
+/// The registered pose, turned by an angle: the place moves along as far as its error depends on
+/// the heading's. Its covariance is along the axes of the scan before, whose pose is `previous`,
+/// and the pose along the axes of the map.
 fn turned(registered: &UncertainMotion, previous: &Pose, angle_rad: f64) -> Pose {
     let covariance = registered.covariance;
     let step = covariance.column(2) * (angle_rad / covariance[(2, 2)]);

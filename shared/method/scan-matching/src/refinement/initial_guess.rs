@@ -8,14 +8,13 @@ const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
 /// The initial guess that an alignment started from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InitialGuess {
-    /// Constant velocity.
     Prediction,
     /// The motion that the search found; along walls also the mean of that and the prediction.
     Search,
     /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
     YawOffset,
     /// The prediction, whose place along walls without structure stays: the radar does not see how
-    /// far the vehicle has driven. The wheels say it, or the motions before.
+    /// far the vehicle has driven. The wheels or the motions before determine it.
     AlongWalls,
 }
 

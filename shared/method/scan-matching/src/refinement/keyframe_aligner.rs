@@ -32,9 +32,6 @@ pub struct KeyframeAligner {
 impl KeyframeAligner {
     /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and
     /// reach of the map, and the scales of the covariance.
-    ///
-    /// # Errors
-    /// The first key of `config` that is out of its bounds.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         let config = RefinementConfig {
             keyframes: 1,

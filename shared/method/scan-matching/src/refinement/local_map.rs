@@ -13,14 +13,13 @@ use super::{
     points::DeskewedPoints,
 };
 
-/// Distance and rotation from the last keyframe at which a scan becomes a keyframe, m and degrees.
+/// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
 const KEYFRAME_DISTANCE_M: f64 = 1.5;
 const KEYFRAME_ANGLE_DEG: f64 = 3.0;
 
 /// A scan that is part of the local map.
 #[derive(Debug, Clone)]
 pub struct Keyframe {
-    /// Number of the scan.
     pub id: u64,
     /// Pose in the first scan's frame.
     pub pose: Pose,
@@ -155,7 +154,7 @@ impl LocalMap {
         self.coarse.view()
     }
 
-    /// Returns whether `pose` is far enough from the last keyframe for another one, also by the
+    /// Returns whether `pose` is far enough from the last keyframe for a new one, also by the
     /// search.
     pub fn needs_keyframe(&self, pose: &Pose, ahead_m: Vector2<f64>) -> bool {
         self.used.back().is_none_or(|last| {
@@ -174,8 +173,8 @@ mod tests {
 
     use super::*;
 
-    /// Keyframes come and go, the map is cleared and filled again: the sum is that of the keyframes
-    /// in it.
+    /// Keyframes come and go, the map is cleared and filled again: the sum equals the sum of its
+    /// keyframes.
     #[test]
     fn the_sum_is_that_of_the_keyframes_in_the_map() {
         let config = RefinementConfig {

@@ -13,13 +13,14 @@ use super::points::DeskewedPoints;
 /// Weights of a Gaussian blur with a standard deviation of one cell, at distances of 0 to 3 cells.
 const BLUR: [f32; 4] = [0.399_050_3, 0.242_036_2, 0.054_005_58, 0.004_433_048];
 const BLUR_REACH: usize = 3;
-/// Cells along an axis over which a point is spread: it lies between two, each of which is blurred.
+/// Cells along an axis over which a point is spread: it is between two cells, which are both
+/// blurred.
 const SPREAD: usize = 2 * BLUR_REACH + 2;
 /// Cells that are worked on together.
 const CHUNK: usize = 16;
 // A row of a point's cells lies within two chunks.
 const _: () = assert!(SPREAD <= CHUNK + 1);
-/// The farthest cell from the origin: what a damaged checkpoint says may be any number.
+/// The farthest cell from the origin: a damaged checkpoint may contain any number.
 const FARTHEST: f64 = 1e15;
 /// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
@@ -177,8 +178,8 @@ impl MapLevel {
         self.combine(image, [[0, 0], [self.n, self.n]], subtract);
     }
 
-    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the
-    /// sum has already: newly covered cells are summed anew.
+    /// Moves the sum to the square of a new image, and adds it. `others` are all images in the sum:
+    /// newly covered cells are summed again.
     pub fn add_newest<'a>(
         &mut self,
         newest: &Image,
@@ -277,7 +278,6 @@ fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
     if by >= 0 { n - count..n } else { 0..count }
 }
 
-/// Where points are drawn.
 struct Drawing {
     /// Of the scan, in map coordinates.
     pose: Pose,
@@ -337,7 +337,7 @@ fn shares(behind: f32) -> [f32; SPREAD] {
     std::array::from_fn(|cell| (1.0 - behind) * NEAR[cell] + behind * BEHIND[cell])
 }
 
-/// Returns the mean of the values that are drawn, weighted by themselves; 1 if there are none.
+/// Returns the mean of the drawn values, weighted by themselves; 1 without values.
 #[simd]
 fn mean(drawing: &[f32], drawn: &[bool]) -> f32 {
     let (mut sum, mut squares) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK]);
@@ -438,7 +438,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever way the vehicle takes, back over what has left the square too.
+        /// Wherever the vehicle drives, even back over places that have left the square.
         #[test]
         fn a_sum_that_is_kept_up_is_the_sum_of_all_images(
             steps in proptest::collection::vec((-120.0..120.0, -30.0..30.0), 1..12),

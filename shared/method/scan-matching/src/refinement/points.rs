@@ -154,7 +154,7 @@ mod tests {
                 pose = pose * half * Isometry2::new(Vector2::new(v[0], v[1]) * dt, 0.0) * half;
             }
             let expected = pose * Point2::new(at[0], at[1]);
-            // The chord is taken as long as the arc: off by the turn squared over 24.
+            // The chord is assumed as long as the arc: off by the turn squared over 24.
             let slack = 1e-3 + (v[0].hypot(v[1]) * t.abs()) * (rate * t).powi(2) / 20.0;
             prop_assert!((f64::from(points.x_m[0]) - expected.x).abs() < slack);
             prop_assert!((f64::from(points.y_m[0]) - expected.y).abs() < slack);

@@ -41,7 +41,7 @@ pub(super) struct Registration<'a> {
     pub map: &'a LocalMap,
     pub state: &'a TrackerState,
     pub config: &'a RefinementConfig,
-    /// Memory for the deskewed points: afterwards those of the last alignment.
+    /// Memory for the deskewed points: afterwards the points of the last alignment.
     pub points: &'a mut DeskewedPoints,
 }
 

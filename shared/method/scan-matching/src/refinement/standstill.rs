@@ -1,11 +1,10 @@
 //! Standstill: holds the pose of a standing vehicle, whose estimates jitter about one place.
 //!
-//! Estimates are compared with an anchor, at first one of them. If those of a second are within
-//! their noise of it, the vehicle stands: its pose is held, and the anchor becomes the mean of the
-//! estimates. One that is farther from it than noise goes says that the vehicle has moved. The
-//! motion is then the whole displacement from the held pose, so that nothing of a slow motion is
-//! lost. Only reported poses are held: registration, prediction and the map go on with the
-//! estimates.
+//! Estimates are compared with an anchor, at first one of them. If the estimates of a second are
+//! within their noise of it, the vehicle stands: its pose is held, and the anchor becomes the mean
+//! of the estimates. An estimate beyond the noise means that the vehicle has moved. The motion is
+//! then the whole displacement from the held pose, so that nothing of a slow motion is lost. Only
+//! reported poses are held: registration, prediction and the map continue with the estimates.
 
 #[cfg(test)]
 mod tests;
@@ -29,7 +28,7 @@ const MIN_TIME_S: f64 = 0.95;
 const MEAN_SCANS: u32 = 16;
 /// Number of scans whose jitter the mean covers; older ones fade.
 const JITTER_SCANS: u32 = 64;
-/// The covariance, which says what jitter to expect, counts as much as so many scans.
+/// The covariance, which predicts the jitter, has the weight of this many scans.
 const PRIOR_SCANS: f64 = 8.0;
 /// Bounds how far jitter can widen the limit.
 const MAX_JITTER: f64 = 4.0;
@@ -46,8 +45,7 @@ pub struct Standstill {
     pub scans: u32,
     /// Time since the first of them, s.
     pub time_s: f64,
-    /// Mean squared jitter from scan to scan while the vehicle stood, over what the covariances
-    /// say.
+    /// Mean squared jitter from scan to scan while the vehicle stood, relative to the covariances.
     pub jitter: f64,
     /// Number of scans in that mean.
     pub jitter_scans: u32,
@@ -61,7 +59,7 @@ pub(super) struct Estimate {
     /// The estimate of the scan before.
     pub previous: Pose,
     pub outcome: Outcome,
-    /// Wheels, Doppler or the gyro say that the vehicle has moved since the scan before.
+    /// Wheels, Doppler or the gyro measure a motion since the scan before.
     pub moves: bool,
     /// Time since the scan before, s.
     pub interval_s: f64,
@@ -136,8 +134,8 @@ impl Standstill {
         }
     }
 
-    /// Returns whether the vehicle is no longer at the anchor. A prediction cannot tell, and
-    /// continues what was, unless another sensor says that it moves.
+    /// Returns whether the vehicle is no longer at the anchor. A prediction cannot decide, and
+    /// continues the previous state, unless another sensor measures a motion.
     fn is_left_by(&self, estimate: &Estimate) -> bool {
         match estimate.outcome {
             Outcome::Predicted => estimate.moves || !self.stands(),
@@ -149,7 +147,7 @@ impl Standstill {
         }
     }
 
-    /// The squared distance, in variances, to which jitter alone can come.
+    /// The largest squared distance, in variances, by jitter alone.
     fn limit(&self) -> f64 {
         if self.stands() {
             self.standing_limit()
@@ -190,11 +188,11 @@ impl Standstill {
         }
     }
 
-    /// The variance of a reported motion over that of the estimate's.
+    /// The variance of a reported motion relative to the estimate's.
     ///
-    /// A motion can hide until it comes to the limit, whose variance per coordinate is `hidden`. Of
-    /// a vehicle that has stood for n scans, about one in n is the one in which it drives off. The
-    /// motion that ends a standstill takes in what had been hidden.
+    /// A motion can hide until it comes to the limit, whose variance per coordinate is `hidden`. If
+    /// a vehicle has stood for n scans, it drives off in one of about n scans. The motion that ends
+    /// a standstill takes in what had been hidden.
     fn covariance_factor(&self, before: &Self) -> f64 {
         let hidden = self.standing_limit() / DEGREES_OF_FREEDOM;
         if self.stands() {

@@ -1,11 +1,11 @@
-//! The direction in which nothing that stands still determines a pose: along the walls of a tunnel,
-//! which look the same everywhere.
+//! The direction that standing structure leaves undetermined: along the walls of a tunnel, which
+//! look the same everywhere.
 //!
-//! The information matrix of an alignment does not tell. Speckle gives each keyframe gradients of
-//! its own, some of which are left in the mean of all keyframes, and their squares count as
-//! information. But the gradients by speckle of one keyframe are independent of those of another,
-//! while what stands still gives all keyframes the same ones. So the products of gradients of
-//! different keyframes are the information by structure: that of speckle alone is zero in the mean.
+//! The information matrix of an alignment does not show it. Speckle gives each keyframe gradients
+//! of its own. Some of them remain in the mean of all keyframes, and their squares count as
+//! information. But the speckle gradients of different keyframes are independent, while standing
+//! structure gives all keyframes the same gradients. So the products of gradients of different
+//! keyframes are the information by structure, since speckle contributes zero in the mean.
 
 use gyre_geometry::Pose;
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen, UnitVector2, Vector2, Vector3};
@@ -17,16 +17,16 @@ const MIN_KEYFRAMES: usize = 4;
 /// Share of the information along a direction that is by structure, below which the direction is
 /// undetermined: most of what seems to determine it is speckle.
 const MIN_SHARE: f64 = 0.5;
-/// The information by structure along the weakest direction over that along the strongest, below
-/// which the direction is undetermined: the match that is taken is often another one, metres away.
+/// The information by structure along the weakest direction, relative to the strongest, below which
+/// the direction is undetermined: the match is then often metres away from the true place.
 const MIN_RATIO: f64 = 0.2;
 /// The same, below which another sensor that contradicts is right, and below which a direction
 /// stays undetermined.
 const SAFE_RATIO: f64 = 0.4;
-/// So many points of a scan are enough to tell.
+/// This many points of a scan suffice for the decision.
 const POINTS: usize = 400;
 
-/// The direction in which structure determines the place of a scan least.
+/// The direction with the least information by structure about the place of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WeakestDirection {
     /// Along the axes of the map.
@@ -38,9 +38,9 @@ pub(super) struct WeakestDirection {
 }
 
 impl WeakestDirection {
-    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell,
-    /// and where there is so much information in all directions that it is not examined, which
-    /// saves the time.
+    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes for a
+    /// decision, or if there is so much information in all directions that it is not examined,
+    /// which saves the time.
     pub fn of(map: &LocalMap, points: &DeskewedPoints, alignment: &Alignment) -> Option<Self> {
         let all = SymmetricEigen::new(of_place(&alignment.normal.information)?).eigenvalues;
         if map.len() < MIN_KEYFRAMES || all.min() >= SAFE_RATIO * all.max() {
@@ -49,8 +49,8 @@ impl WeakestDirection {
         Self::at(map, points, &alignment.pose, |_| Vector2::zeros())
     }
 
-    /// Finds it for a scan that is where the search says, in a map whose keyframes lie to each
-    /// other as the search says: it is [`Keyframe::ahead_m`](super::Keyframe::ahead_m) beyond them.
+    /// Finds it for a scan placed by the search, in a map whose keyframes are placed by the search:
+    /// the scan is [`Keyframe::ahead_m`](super::Keyframe::ahead_m) beyond them.
     pub fn by_search(
         map: &LocalMap,
         points: &DeskewedPoints,
@@ -82,21 +82,21 @@ impl WeakestDirection {
         })
     }
 
-    /// Returns whether nothing that stands still determines the place along it. What is not a
-    /// number, of a scan without structure, is not.
+    /// Returns whether nothing that stands still determines the place along it. A scan without
+    /// structure gives a value that is not a number, and is undetermined.
     pub fn is_undetermined(&self) -> bool {
         self.share < MIN_SHARE || self.ratio < MIN_RATIO
     }
 
-    /// Returns whether the match can be another one along it: where another sensor contradicts it,
-    /// or the scan before was undetermined.
+    /// Returns whether the match can be wrong along it: another sensor contradicts it, or the scan
+    /// before was undetermined.
     pub fn is_doubtful(&self) -> bool {
         self.is_undetermined() || self.ratio < SAFE_RATIO
     }
 }
 
-/// The information about the place of a matrix over place and heading, with a heading that is known
-/// as well as the scan says it.
+/// The information about the place in a matrix over place and heading, with the heading's
+/// uncertainty from the scan.
 fn of_place(information: &Matrix3<f64>) -> Option<Matrix2<f64>> {
     without_heading(information, information[(2, 2)])
 }
@@ -107,7 +107,7 @@ fn without_heading(information: &Matrix3<f64>, heading: f64) -> Option<Matrix2<f
     place.iter().all(|it| it.is_finite()).then_some(place)
 }
 
-/// The information over (x, y, yaw) by the mean of the keyframes, as that of
+/// The information over (x, y, yaw) by the mean of the keyframes, as in
 /// [`super::normal_equations`], from some of the points.
 struct Informations {
     whole: Matrix3<f64>,
@@ -152,7 +152,7 @@ impl Informations {
     /// if all products were of these.
     fn by_structure(&self) -> Option<Matrix2<f64>> {
         let shared = (self.whole - self.of_squares) * (self.keyframes / (self.keyframes - 1.0));
-        // The heading is known: the walls themselves tell it.
+        // The heading is known, because the walls determine it.
         without_heading(&shared, self.whole[(2, 2)])
     }
 }

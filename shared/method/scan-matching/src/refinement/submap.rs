@@ -32,7 +32,7 @@ impl Submap {
         }
     }
 
-    /// Starts anew with the keyframe in the middle. `twist` is its velocity during the sweep.
+    /// Restarts with the keyframe in the middle. `twist` is its velocity during the sweep.
     pub fn start(&mut self, points: &[SparsePoint], twist: &Twist) {
         self.keyframe.deskew(points, twist);
         self.all.clear();
@@ -66,9 +66,6 @@ impl Submap {
     /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the
     /// weights of the points in it, each shared bilinearly between four cells of `cell_m` metres.
     /// Points outside are left out.
-    ///
-    /// # Errors
-    /// If the raster is not square or not in standard layout.
     pub fn draw(&self, cell_m: f64, mut raster: ArrayViewMut2<'_, f32>) -> Result<(), ShapeError> {
         const WHAT: &str = "raster of a submap";
         let n = raster.nrows();
@@ -112,7 +109,7 @@ mod tests {
         let mut submap = Submap::default();
         submap.start(&[point(9.0, 9.0)], &Twist::default());
         let quarter = std::f64::consts::FRAC_PI_2;
-        // A quarter turn to the left, 2 m ahead: what is 3 m ahead there is 2 m ahead and 3 m to
+        // A quarter turn to the left, 2 m ahead: a point 3 m ahead there is 2 m ahead and 3 m to
         // the left here.
         submap.start(&[point(4.0, -1.0)], &Twist::default());
         submap.add(

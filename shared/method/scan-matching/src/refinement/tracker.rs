@@ -35,9 +35,9 @@ pub struct TrackerState {
     /// Number of scans in a row, but for predicted ones, whose place along walls without structure
     /// was the predicted one.
     pub along_walls: u32,
-    /// Number of the last of these at constant velocity: nothing says how far.
+    /// Number of the last of these at constant velocity, whose distance is unknown.
     pub sliding: u32,
-    /// Way by which the search has led beyond such guesses, m, along the axes of the map.
+    /// Displacement by the search beyond such guesses, m, along the axes of the map.
     pub ahead_m: Vector2<f64>,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
@@ -46,7 +46,7 @@ pub struct TrackerState {
     /// The scale of the wheels, and the like; `None` until they have measured a distance.
     pub wheels: Option<WheelState>,
     /// The scale of the velocity by Doppler, and the like; `None` until two scans in a row have
-    /// said it.
+    /// determined it.
     pub doppler: Option<WheelState>,
 }
 
@@ -62,14 +62,14 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Returns whether wheels, Doppler or the gyro say that the vehicle has moved.
+    /// Returns whether wheels, Doppler or the gyro measure a motion.
     pub fn moves(&self) -> bool {
         self.distance.is_some_and(|it| it.is_certain())
             || self.turn.is_some_and(|it| it.is_certain())
     }
 }
 
-/// A refined scan from which the next poses are predicted.
+/// A refined scan for predicting the next poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     /// Pose in the first scan's frame.
@@ -149,7 +149,8 @@ impl Anchor {
 
 impl TrackerState {
     /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
-    /// if there is none. With wheels or Doppler the first is as far from the last pose as they say.
+    /// without an anchor. With wheels or Doppler, the distance from the last pose to the first is
+    /// the measured one.
     pub(super) fn predict(&self, step: &Step) -> [Pose; 2] {
         let heading = self.heading_at(step);
         let from = |anchor: &Anchor| anchor.predict(step.interval_s, heading);
@@ -175,7 +176,7 @@ impl TrackerState {
     }
 
     /// The velocity during a scan at `pose`: the mean since the newest anchor, or since the last
-    /// pose if there is none; the gyro's yaw rate, if there is one.
+    /// pose without an anchor; with a gyro, its yaw rate.
     pub(super) fn twist_to(&self, pose: &Pose, step: &Step) -> Twist {
         let mean = self.mean_twist_to(pose, step.interval_s);
         Twist {
@@ -208,8 +209,8 @@ impl TrackerState {
                 .any(|anchor| anchor.can_reach(pose, interval_s, heading, jitter_share, config))
     }
 
-    /// Leaves the map: a new one starts with the last scan, or a later one. Where wheels have led
-    /// to that, the scans of the map say nothing more of where the vehicle can be.
+    /// Leaves the map: a new one starts with the last scan, or a later one. If wheels have led to
+    /// that, the scans of the map do not constrain the vehicle's position any more.
     pub(super) fn leave_map(&mut self) {
         self.heading.iter_mut().for_each(Heading::start_map);
         let distances = [&mut self.wheels, &mut self.doppler];
@@ -234,7 +235,7 @@ impl TrackerState {
         let interval_s = step.interval_s;
         match outcome {
             Outcome::Refined => self.push_anchor(pose, step, config),
-            Outcome::Predicted if step.distance.is_some() => self.carry_anchor(pose, step),
+            Outcome::Predicted if step.distance.is_some() => self.move_anchor(pose, step),
             _ => self
                 .anchors
                 .iter_mut()
@@ -258,9 +259,9 @@ impl TrackerState {
         self.pose = pose;
     }
 
-    /// Makes `pose`, to which wheels lead, the newest anchor. The last refined scan stays behind
-    /// it, in case they slip meanwhile.
-    fn carry_anchor(&mut self, pose: Pose, step: &Step) {
+    /// Makes `pose`, predicted by wheels, the newest anchor. The last refined scan stays behind it,
+    /// in case they slip meanwhile.
+    fn move_anchor(&mut self, pose: Pose, step: &Step) {
         let interval_s = step.interval_s;
         let twist = self.mean_twist_to(&pose, interval_s);
         let [first, second] = self.anchors;
@@ -277,8 +278,8 @@ impl TrackerState {
         self.anchors = [Some(carried), aged];
     }
 
-    /// Makes `pose` the newest anchor. An anchor from which it cannot be reached was wrong and is
-    /// dropped.
+    /// Makes `pose` the newest anchor. An anchor is wrong and dropped if `pose` is out of its
+    /// reach.
     fn push_anchor(&mut self, pose: Pose, step: &Step, config: &RefinementConfig) {
         let (interval_s, heading) = (step.interval_s, self.heading_at(step));
         let valid = self

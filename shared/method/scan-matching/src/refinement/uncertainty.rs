@@ -21,7 +21,7 @@ pub(super) const WEAK_FACTOR: f64 = 4.0;
 /// since edges of a pose graph need a covariance that has an inverse.
 const MIN_DRIFT_SHARE: f64 = 1e-3;
 
-/// The uncertainty of a motion by what comes before its scan: the map, and the predictions since
+/// The uncertainty of a motion due to the time before its scan: the map, and the predictions since
 /// the last match.
 pub(super) struct Uncertainty {
     /// The covariance of a prediction over the scan's interval, behind a match.
@@ -32,7 +32,7 @@ pub(super) struct Uncertainty {
     predictions: u32,
     /// The covariance of all of these.
     of_predictions: Matrix3<f64>,
-    /// The share of a match's covariance by which the map drifts.
+    /// The share of a match's covariance that makes the map drift.
     of_map: f64,
 }
 
@@ -70,10 +70,10 @@ impl Uncertainty {
         self.of_prediction
     }
 
-    /// Returns the variance of the prediction in a direction in which nothing else tells the place,
-    /// such that those of a row of such scans add up; `before` of them at constant velocity, whose
-    /// error is that of all.
-    pub fn of_sliding(&self, along: Vector2<f64>, before: u32) -> f64 {
+    /// Returns the variance of the prediction in an otherwise undetermined direction, such that the
+    /// variances of consecutive scans add up; `before` of them are at constant velocity, whose
+    /// error is common to all.
+    pub fn of_predicted_place(&self, along: Vector2<f64>, before: u32) -> f64 {
         let place = self.of_step.fixed_view::<2, 2>(0, 0);
         let variance = (along.transpose() * place * along)[0];
         variance * grown(1.0, f64::from(before))
@@ -124,7 +124,7 @@ pub(super) fn of_alignment(
 ) -> Option<Matrix3<f64>> {
     let inverse = alignment.normal.information.try_inverse()?;
     let mean_squared_residual = alignment.normal.cost / points.total_weight();
-    // From the map's axes to those of the previous scan.
+    // From the map's axes to the axes of the previous scan.
     let turn = previous
         .rotation
         .inverse()
@@ -151,13 +151,13 @@ pub(super) fn by_azimuths(alignment: &Alignment, variance_rad2: f64) -> Matrix3<
     Matrix3::from_diagonal(&Vector3::new(sideways, sideways, variance_rad2))
 }
 
-/// The share of a match's covariance by which a map of `keyframes` drifts.
+/// The share of a match's covariance that makes a map of `keyframes` drift.
 ///
 /// A scan becomes one of the map's k keyframes with the noise of its registration, and the map's
 /// mean follows. A mean of k values that keeps up with itself in this way is a random walk, whose
-/// steps are 2 / (k + 1) of the noise. What a vehicle has passed drops out of the mean earlier, and
-/// neighbouring scans err alike: hence the factor. A slow vehicle, not all of whose scans become
-/// keyframes, drifts less in simulation, but not on real drives.
+/// steps are 2 / (k + 1) of the noise. Places that a vehicle has passed drop out of the mean
+/// earlier, and errors of neighbouring scans are correlated: hence the factor. A slow vehicle, not
+/// all of whose scans become keyframes, drifts less in simulation, but not on real drives.
 pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
     let step = config.drift_scale * 2.0 / (keyframes as f64 + 1.0);
     step.powi(2).min(1.0)
@@ -165,7 +165,7 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
 /// limits; of its turn, by the gyro if there is one; of its distance, by wheels or Doppler. An
-/// error of the velocity is that of all predictions in a row: its part is `grown`.
+/// error of the velocity is common to all predictions in a row: its part is `grown`.
 fn of_prediction(
     state: &TrackerState,
     step: &Step,
@@ -182,7 +182,9 @@ fn of_prediction(
         config.yaw_acceleration_degps2.to_radians(),
     );
     if let Some(distance) = &step.distance {
-        let by_gyro = step.turn.map(|it| it.variance_after_rad2(distance.dead));
+        let by_gyro = step
+            .turn
+            .map(|it| it.variance_after_rad2(distance.since_match));
         let yaw_rad = state.predicted_turn_rad(step);
         return distance
             .motion([yaw_rad, by_gyro.map_or(turn, |it| it.min(turn))])
@@ -213,7 +215,7 @@ mod tests {
         assert!((share(10) - 4.0 / 121.0).abs() < 1e-12);
     }
 
-    /// Points all around with gradients of any direction; those of a sector are turned by an
+    /// Points all around with gradients of any direction; the points of one sector are turned by an
     /// angle, and the pose is fitted. Over sectors in all directions this is the covariance that is
     /// stated for the variance of the mean angle.
     #[test]
@@ -258,8 +260,8 @@ mod tests {
         }
     }
 
-    /// Poses that are each the mean of the last ten, with noise of their own: what is left of the
-    /// noise after a long time.
+    /// Poses that are each the mean of the last ten, with noise of their own: the remaining noise
+    /// after a long time.
     #[test]
     fn a_mean_that_keeps_up_with_itself_drifts_by_two_over_k_plus_one_of_the_noise() {
         const KEYFRAMES: usize = 10;

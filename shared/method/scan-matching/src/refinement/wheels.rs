@@ -1,13 +1,13 @@
-//! The distance by the wheels beside that of the radar's matches: a Kalman filter over the place
-//! along the path against the map, and the scale of the wheels. The way by Doppler has one of its
-//! own, since it is a distance with a scale too: that of the Doppler coefficient.
+//! The distance by the wheels beside the distance by the radar's matches: a Kalman filter over the
+//! place along the path against the map, and the scale of the wheels. The displacement by Doppler
+//! has a filter of its own, since it is a distance with a scale too: the scale of the Doppler
+//! coefficient.
 //!
-//! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
-//! motions of a drive share it, and the noise of one registration is taken back by the next. A
-//! registered distance that is too far from that of the wheels says that they slip, and so does a
-//! scale that is too far from 1; they are not used then. Where the radar sees nothing, or little
-//! that does not agree, the motion is that of an arc: as long as the wheels say, turned as the
-//! gyro says.
+//! Where the radar determines the distance, it determines the scale, too: the motions of a drive
+//! share the scale, and the next registration cancels the noise of one registration. If a
+//! registered distance differs too much from the wheels' distance, or if the scale differs too much
+//! from 1, the wheels slip and are not used. If the radar sees nothing, or little that disagrees,
+//! the motion is an arc: its length by the wheels, its turn by the gyro.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
@@ -16,11 +16,10 @@ use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 
 /// Random walk of the scale, /√s: tyres that warm change it by 0.06 % in an hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
-/// Standard deviation by which a scale may differ from 1 in any case: the settings may be of other
-/// tyres.
+/// Least standard deviation of a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
 
-/// The scale of the wheels, and what they were used for.
+/// The scale of the wheels, and the uses of their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelState {
     /// True distance over the one that is measured.
@@ -29,17 +28,17 @@ pub struct WheelState {
     pub offset_m: f64,
     /// Covariance of the errors of that offset and of the scale.
     pub covariance: Matrix2<f64>,
-    /// The last registered distance was another one than that of the wheels, or the scale by which
-    /// they agree is none that they can have.
+    /// The last registered distance differed from the wheels' distance, or the implied scale is
+    /// implausible.
     pub slips: bool,
     /// The distance by the wheels since the last registered scan, m.
-    pub dead_m: f64,
+    pub since_match_m: f64,
     /// The time since then, s.
-    pub dead_s: f64,
+    pub since_match_s: f64,
     /// The turn since then, rad.
-    pub dead_rad: f64,
-    /// The time since a match has last told the place along the path, s: also along walls.
-    pub untold_s: f64,
+    pub since_match_rad: f64,
+    /// The time since a match last determined the place along the path, s: also along walls.
+    pub since_place_s: f64,
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
     pub unmatched: Matrix3<f64>,
@@ -56,7 +55,7 @@ pub struct WheelScale {
     pub slip: bool,
 }
 
-/// The witness of a distance.
+/// The aiding sensor of a distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DistanceBy {
     Wheels,
@@ -69,17 +68,17 @@ pub(super) struct PredictedDistance {
     pub by: DistanceBy,
     /// Distance since the scan before, m; negative backwards.
     pub distance_m: f64,
-    /// Way to the left of the heading half-way, m, by Doppler.
+    /// Displacement to the left of the heading in the middle, m, by Doppler.
     pub left_m: f64,
-    /// Variance of the distance, m², such that those of the motions since the last registered one
-    /// add up.
+    /// Variance of the distance, m², such that the variances of the motions since the last
+    /// registered one add up.
     pub variance_m2: f64,
     /// Variance across the path, m².
     pub side_variance_m2: f64,
-    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
     /// Time, s, and turn, rad, from the last registered scan to the scan before.
-    pub dead: [f64; 2],
+    pub since_match: [f64; 2],
 }
 
 /// A registered motion along the path.
@@ -106,7 +105,7 @@ impl Registered {
         }
     }
 
-    /// The variance of the place of one of its poses, and that of the drift.
+    /// The variance of the place of one of its poses, and the variance of the drift.
     fn noise_and_drift_m2(&self) -> [f64; 2] {
         let drift = self.drift_share * self.variance_m2;
         [0.5 * (self.variance_m2 - drift), drift]
@@ -132,16 +131,16 @@ impl WheelState {
             offset_m: 0.0,
             covariance: Matrix2::new(0.0, 0.0, 0.0, config.scale_sigma.powi(2)),
             slips: false,
-            dead_m: 0.0,
-            dead_s: 0.0,
-            dead_rad: 0.0,
-            untold_s: 0.0,
+            since_match_m: 0.0,
+            since_match_s: 0.0,
+            since_match_rad: 0.0,
+            since_place_s: 0.0,
             unmatched: Matrix3::zeros(),
         }
     }
 
-    /// Returns what is known of the scale.
-    pub(super) fn known(&self) -> WheelScale {
+    /// Returns the estimate of the scale.
+    pub(super) fn estimate(&self) -> WheelScale {
         WheelScale {
             scale: self.scale,
             sigma: self.covariance[(1, 1)].max(0.0).sqrt(),
@@ -152,7 +151,7 @@ impl WheelState {
     /// Lets time pass: the scale changes.
     pub(super) fn wait(&mut self, time_s: f64) {
         self.covariance[(1, 1)] += SCALE_WALK_PER_SQRT_S.powi(2) * time_s;
-        self.untold_s += time_s;
+        self.since_place_s += time_s;
     }
 
     /// Predicts the distance of the next scan; `None` while the wheels slip.
@@ -162,9 +161,9 @@ impl WheelState {
         config: &WheelsConfig,
     ) -> Option<PredictedDistance> {
         let step_m = measured.distance_m;
-        // The error of the scale is that of all motions since the last registered one: its square
+        // The error of the scale is common to all motions since the last registered one: its square
         // grows with the square of the whole distance.
-        let since_m2 = grown(step_m, self.dead_m);
+        let since_m2 = grown(step_m, self.since_match_m);
         (!self.slips).then_some(PredictedDistance {
             by: DistanceBy::Wheels,
             distance_m: self.scale * step_m,
@@ -172,7 +171,7 @@ impl WheelState {
             variance_m2: measured.variance_m2 + self.covariance[(1, 1)] * since_m2,
             side_variance_m2: measured.side_variance_m2,
             radar_ahead_m: config.radar_ahead_m,
-            dead: [self.dead_s, self.dead_rad],
+            since_match: [self.since_match_s, self.since_match_rad],
         })
     }
 
@@ -206,10 +205,10 @@ impl WheelState {
         }
     }
 
-    /// Compares a registered pose with the measured distance, if there is one: it is another one
-    /// where both disagree, if the match is certain. If the motions together say a scale that the
-    /// wheels cannot have, they have slipped: it is learnt anew.
-    pub(super) fn weigh(
+    /// Compares a registered pose with the measured distance, if there is one: the distance is
+    /// rejected if both disagree and the match is certain. If the motions together imply an
+    /// implausible scale, the wheels have slipped: the scale is learnt again.
+    pub(super) fn update(
         &mut self,
         measured: Option<&WheelDistance>,
         registered: &Registered,
@@ -221,12 +220,12 @@ impl WheelState {
                 self.correct(measured, registered);
                 if is_certain && !self.has_scale_of(config) {
                     *self = Self::new(config);
-                    self.adopt(registered, true);
+                    self.reset_to(registered, true);
                 }
             }
             measured => {
                 let slips = self.slips || (measured.is_some() && is_certain);
-                self.adopt(registered, slips);
+                self.reset_to(registered, slips);
             }
         }
     }
@@ -251,68 +250,72 @@ impl WheelState {
         let after = kept * before * kept.transpose() + gain * gain.transpose() * noise_m2;
         self.scale += gain[1] * apart_m;
         self.offset_m = gain[2] * apart_m;
-        // The offset of the last scan takes the place of that of the scan before.
+        // The offset of the last scan replaces the offset of the scan before.
         self.covariance = Matrix2::new(after[(2, 2)], after[(2, 1)], after[(1, 2)], after[(1, 1)]);
         self.slips = false;
-        self.see();
+        self.reset_since_match();
     }
 
     /// Takes a registered pose whose distance the wheels have not measured, or where they slip.
-    pub(super) fn adopt(&mut self, registered: &Registered, slips: bool) {
+    pub(super) fn reset_to(&mut self, registered: &Registered, slips: bool) {
         let [noise_m2, _] = registered.noise_and_drift_m2();
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(noise_m2, 0.0, 0.0, self.covariance[(1, 1)]);
         self.slips = slips;
-        self.see();
+        self.reset_since_match();
     }
 
-    fn see(&mut self) {
-        (self.dead_m, self.dead_s, self.dead_rad) = (0.0, 0.0, 0.0);
-        self.untold_s = 0.0;
+    fn reset_since_match(&mut self) {
+        (self.since_match_m, self.since_match_s, self.since_match_rad) = (0.0, 0.0, 0.0);
+        self.since_place_s = 0.0;
         self.unmatched = Matrix3::zeros();
     }
 
     /// Takes a pose that is predicted by the wheels.
-    pub(super) fn carry(&mut self, measured: &WheelDistance) {
+    pub(super) fn dead_reckon(&mut self, measured: &WheelDistance) {
         let step = Matrix2::new(1.0, -measured.distance_m, 0.0, 1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(0, 0)] += measured.variance_m2;
-        self.dead_m += measured.distance_m;
+        self.since_match_m += measured.distance_m;
     }
 
     /// Takes a registered pose whose place along the path is the predicted one, since the map does
     /// not determine it.
-    pub(super) fn slide_along(&mut self, measured: Option<&WheelDistance>, driven: &Registered) {
+    pub(super) fn propagate_along_walls(
+        &mut self,
+        measured: Option<&WheelDistance>,
+        driven: &Registered,
+    ) {
         match measured {
-            Some(measured) if !self.slips => self.slide(measured),
-            Some(measured) => self.slide_without(measured, driven),
+            Some(measured) if !self.slips => self.follow_map(measured),
+            Some(measured) => self.gate_slip(measured, driven),
             None => {}
         }
     }
 
-    /// Takes a registered pose whose place along the path is that of the wheels, since the map does
+    /// Takes a registered pose whose place along the path comes from the wheels, since the map does
     /// not determine it: the map moves along.
-    pub(super) fn slide(&mut self, measured: &WheelDistance) {
+    pub(super) fn follow_map(&mut self, measured: &WheelDistance) {
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(measured.variance_m2, 0.0, 0.0, self.covariance[(1, 1)]);
-        self.dead_m += measured.distance_m;
+        self.since_match_m += measured.distance_m;
     }
 
-    /// Takes a pose whose place along the path is that of the motions before, since the map does
-    /// not determine it: wheels that had slipped are believed again if they do not contradict that.
-    pub(super) fn slide_without(&mut self, measured: &WheelDistance, driven: &Registered) {
+    /// Takes a pose whose place along the path comes from the motions before, since the map does
+    /// not determine it: wheels that had slipped are used again if they agree with it.
+    pub(super) fn gate_slip(&mut self, measured: &WheelDistance, driven: &Registered) {
         let apart_m = driven.distance_m - self.scale * measured.distance_m;
         let [_, variance_m2] = driven.noise_and_drift_m2();
         self.slips &= apart_m.powi(2) > GATE * (variance_m2 + measured.variance_m2);
     }
 
     /// Takes a pose that is predicted from the motions before, with this variance.
-    pub(super) fn guess(&mut self, variance_m2: f64) {
+    pub(super) fn inflate(&mut self, variance_m2: f64) {
         self.covariance[(0, 0)] += variance_m2;
     }
 
     /// Adds a predicted motion to those whose error the next match takes back.
-    pub(super) fn miss(&mut self, predicted: &UncertainMotion, time_s: f64) {
+    pub(super) fn add_unmatched(&mut self, predicted: &UncertainMotion, time_s: f64) {
         let before = UncertainMotion {
             motion: Pose::identity(),
             covariance: self.unmatched,
@@ -320,11 +323,11 @@ impl WheelState {
         let turn = predicted.motion.rotation.inverse().to_rotation_matrix();
         let turn = turn.to_homogeneous();
         self.unmatched = turn * before.then(predicted).covariance * turn.transpose();
-        self.dead_s += time_s;
-        self.dead_rad += predicted.motion.rotation.angle();
+        self.since_match_s += time_s;
+        self.since_match_rad += predicted.motion.rotation.angle();
     }
 
-    /// A new map starts with the scan before: its place is that of the map.
+    /// A new map starts with the scan before: its place is the map's.
     pub(super) fn start_map(&mut self) {
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(0.0, 0.0, 0.0, self.covariance[(1, 1)]);

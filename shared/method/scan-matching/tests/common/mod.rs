@@ -9,17 +9,6 @@ use gyre_scan_matching::{
 };
 use ndarray::Array2;
 
-/// Values of a cell that no sensor gives.
-pub const BAD_VALUES: [f32; 7] = [
-    f32::NAN,
-    f32::INFINITY,
-    f32::NEG_INFINITY,
-    f32::MAX,
-    f32::MIN,
-    1e-45,
-    -3.0,
-];
-
 /// Pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {

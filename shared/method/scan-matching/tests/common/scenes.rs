@@ -180,7 +180,7 @@ impl Sensor {
                 let weight = 0.3 + 0.7 * numbers.next();
                 // The sum of twelve uniform numbers is close to normal.
                 let normal = (0..12).map(|_| numbers.next()).sum::<f64>() - 6.0;
-                // The beam need not be followed to what is far beyond the range.
+                // The beam need not be followed to points far beyond the range.
                 if (pose.translation.vector - place).norm() > 2.0 * VISIBLE_M.end() {
                     continue;
                 }
@@ -223,7 +223,23 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
-/// The time at which the beam, clockwise from straight ahead, meets a reflector that is `seen` at a
+/// Points unrelated to any scene, as strong as points of a scene.
+pub fn noise(seed: u64) -> Vec<SparsePoint> {
+    let mut numbers = Numbers(seed);
+    let mut place = || {
+        [
+            numbers.within(65.0),
+            numbers.within(65.0),
+            numbers.within(0.125),
+        ]
+    };
+    let points = (0..900).map(|_| place());
+    points
+        .map(|[x, y, time]| point([x, y, time, 0.65, 0.0]))
+        .collect()
+}
+
+/// The time when the beam, clockwise from straight ahead, meets a reflector that is `seen` at a
 /// position at each time: s from the middle of the sweep. `None` if the reflector crosses the seam.
 fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     let meets = |t: f64| {
@@ -249,7 +265,7 @@ pub struct Run {
     pub refined: Vec<Refined>,
 }
 
-/// The error at the end of a run, and that of its worst motion.
+/// The error at the end of a run, and the error of its worst motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
     /// Yaw drift, degrees counter-clockwise per 100 m.

@@ -1,4 +1,4 @@
-//! The keyframes that were read last: those of a submap are mostly those of the one before.
+//! The keyframes that were read last: consecutive submaps share most keyframes.
 
 use super::KeyframeSource;
 use crate::Keyframe;
@@ -18,10 +18,7 @@ impl Cache {
         }
     }
 
-    /// Returns a keyframe, which is read if its slot has another one.
-    ///
-    /// # Errors
-    /// The keyframe cannot be read.
+    /// Returns a keyframe, and reads it if its slot has a different one.
     pub fn get<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -14,10 +14,10 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = DOPPLER + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word that says whether there is one; bias, lean, scale, covariance; the last verdict.
+/// A word for its presence; bias, yaw bias, scale, covariance; the last verdict.
 const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
-/// A word that says whether there are any; scale, offset, three dead reckonings and the time of the
-/// last; both covariances; whether they slip.
+/// A word for their presence; scale, offset, three dead reckonings and the time of the last; both
+/// covariances; whether they slip.
 const WHEEL_WORDS: usize = 1 + 6 + 4 + 9 + 1;
 const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
@@ -27,8 +27,8 @@ const STANDSTILL: usize = REST + 8;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 const WHEELS: usize = HEADING + HEADING_WORDS;
 const DOPPLER: usize = WHEELS + WHEEL_WORDS;
-/// Words of a keyframe's slot before its cells: checksum, id, pose, way by the search, corners of
-/// both levels.
+/// Words of a keyframe's slot before its cells: checksum, id, pose, displacement by the search,
+/// corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = CORNERS + 4;
 const CORNERS: usize = 2 + 4 + 2;
 /// The checksum of an empty slot. No content has it.
@@ -51,7 +51,6 @@ pub(super) struct StateHeader {
 /// The name of a keyframe's content: two keyframes of one scan can differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
-    /// The scan.
     pub id: u64,
     /// The checksum of the slot.
     pub check: u64,
@@ -133,7 +132,7 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
 fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
     let mut words = [1; HEADING_WORDS];
     words[1] = heading.bias_radps.to_bits();
-    words[2] = heading.lean_rad.to_bits();
+    words[2] = heading.yaw_bias_rad.to_bits();
     words[3] = heading.scale.to_bits();
     let covariance = words[4..].iter_mut().zip(&heading.covariance);
     covariance.for_each(|(word, value)| *word = value.to_bits());
@@ -145,7 +144,7 @@ fn heading_from(words: &[u64]) -> Option<Heading> {
     let value = |k: usize| f64::from_bits(words[k]);
     (words[0] == 1).then(|| Heading {
         bias_radps: value(1),
-        lean_rad: value(2),
+        yaw_bias_rad: value(2),
         scale: value(3),
         covariance: Matrix4::from_fn(|row, column| value(4 + row + 4 * column)),
         verdict: match words[20] {
@@ -161,10 +160,10 @@ fn wheel_words(wheels: &WheelState) -> [u64; WHEEL_WORDS] {
     let state = [
         wheels.scale,
         wheels.offset_m,
-        wheels.dead_m,
-        wheels.dead_s,
-        wheels.dead_rad,
-        wheels.untold_s,
+        wheels.since_match_m,
+        wheels.since_match_s,
+        wheels.since_match_rad,
+        wheels.since_place_s,
     ];
     let covariances = wheels.covariance.iter().chain(&wheels.unmatched);
     let values = state.iter().chain(covariances).map(|it| it.to_bits());
@@ -181,10 +180,10 @@ fn wheels_from(words: &[u64]) -> Option<WheelState> {
     (words[0] == 1).then(|| WheelState {
         scale: value(1),
         offset_m: value(2),
-        dead_m: value(3),
-        dead_s: value(4),
-        dead_rad: value(5),
-        untold_s: value(6),
+        since_match_m: value(3),
+        since_match_s: value(4),
+        since_match_rad: value(5),
+        since_place_s: value(6),
         covariance: Matrix2::from_fn(|row, column| value(7 + row + 2 * column)),
         unmatched: Matrix3::from_fn(|row, column| value(11 + row + 3 * column)),
         slips: words[20] == 1,
@@ -324,7 +323,7 @@ pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
     })
 }
 
-/// Decodes the keyframe of this name; false if the slot has another one.
+/// Decodes the keyframe of this name; false if the slot has a different one.
 pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) -> bool {
     keyframe.id = word(slot, 1);
     keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));

@@ -28,7 +28,7 @@ impl Sent {
         })
     }
 
-    /// Waits for the answer; `None` if there is none within `limit`.
+    /// Waits for the answer; `None` without an answer within `limit`.
     pub fn answer(&mut self, limit: Duration) -> io::Result<Option<String>> {
         self.reader.get_ref().set_read_timeout(Some(limit))?;
         match self.reader.read_until(b'\n', &mut self.answer) {

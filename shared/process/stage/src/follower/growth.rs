@@ -10,18 +10,12 @@ pub struct Growth {
 
 impl Growth {
     /// Opens the event of a log, as the one process that appends to it.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn of(launch: &Launch, log: LogId) -> Result<Self, StageError> {
         let notifier = Notifier::open(&launch.node, log.event())?;
         Ok(Self { log, notifier })
     }
 
     /// Wakes the followers: a record was appended.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn notify(&self) -> Result<(), StageError> {
         self.notifier
             .notify(format_args!("notify {}", self.log.event()))

@@ -1,5 +1,5 @@
-//! The progress of a follower, a file in the run's root. The supervisor reads it to know whether
-//! the follower has come to its end, which no exit code tells: a follower that somebody asks to end
+//! The progress of a follower, a file in the run's root. The supervisor reads it to learn whether
+//! the follower has come to its end, which no exit code shows: a follower that was asked to end
 //! exits as well.
 
 use std::{
@@ -15,7 +15,6 @@ use crate::{Manifest, StageError};
 pub struct Progress {
     /// Records that it has worked on.
     pub done: u64,
-    /// Records that are there.
     pub total: u64,
 }
 
@@ -23,7 +22,6 @@ pub struct Progress {
 /// each as eight bytes, little-endian.
 const LENGTH: usize = 24;
 
-/// Writes the progress.
 pub(super) struct ProgressWriter {
     path: PathBuf,
     file: File,

@@ -2,17 +2,16 @@
 
 use gyre_messages::{GivenAnew, Item, flag};
 
-/// The position in a sequence of items that are consecutive at the publisher, until it gives
-/// numbers anew.
+/// The position in a sequence of items that are consecutive at the publisher, until it reuses
+/// numbers.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Sequence {
     /// The number behind the newest item.
     pub next: Option<u64>,
     /// The generation of the newest item.
     pub generation: u32,
-    /// The item from which on a missing one counts; `None`: from the first one received.
+    /// The first item that counts if it is missing; `None`: from the first one received.
     pub expected: Option<u64>,
-    /// Items missed so far.
     pub missed: u64,
     /// True if the newest item was the end of the stream.
     pub ended: bool,
@@ -25,14 +24,14 @@ impl Sequence {
         self.advance_past(item, None)
     }
 
-    /// The same, where `skipped` is what was given anew by generations between that of the newest
-    /// item and this one's.
+    /// As above, where `skipped` are the numbers reused by the generations between the newest
+    /// item's and this one's.
     pub(super) fn advance_past(&mut self, item: &Item, skipped: Option<GivenAnew>) -> Option<u64> {
         if item.is(flag::BASE) {
             return None;
         }
         if item.generation > self.generation {
-            // What was received of the numbers that are given anew is void.
+            // Received items with reused numbers are void.
             let first = skipped.map_or(u64::MAX, |it| it.first);
             let go_back = |seq: u64| seq.min(item.numbered_from).min(first);
             (self.next, self.expected) = (self.next.map(go_back), self.expected.map(go_back));
@@ -152,7 +151,7 @@ mod tests {
 
     #[test]
     fn what_a_skipped_generation_gave_anew_is_missed() {
-        // Items up to 14 of generation 1 are there. Generation 2 gave 7 and 8 anew, and 3 begins
+        // Items up to 14 of generation 1 are there. Generation 2 reused 7 and 8, and 3 begins
         // behind its poses.
         let skipped = |first| GivenAnew {
             generation: 2,

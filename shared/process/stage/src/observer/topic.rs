@@ -12,13 +12,10 @@ use crate::{Listener, StageError, outlet::RecordedMessage};
 
 /// The observer of a topic, whatever its type.
 pub trait TopicObserver {
-    /// Returns the topic.
     fn topic(&self) -> &'static str;
 
-    /// Takes the next message that is there; `None` if there is none.
-    ///
-    /// # Errors
-    /// A message that breaks its contract, which counts as missed; a failure of the transport.
+    /// Takes the next message that is there; `None` without a message. A message that breaks its
+    /// contract is an error and counts as missed.
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
 
     /// Returns whether the end of the stream or of the run has been taken.
@@ -34,9 +31,6 @@ pub trait TopicObserver {
     fn missed(&self) -> u64;
 
     /// See [`Observer::skipped`].
-    ///
-    /// # Errors
-    /// The same.
     fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
 }
 
@@ -46,10 +40,7 @@ struct Typed<'run, M: Message> {
 }
 
 impl ObservedRun {
-    /// Subscribes to the topic of this name; `None` if there is none.
-    ///
-    /// # Errors
-    /// As [`observe`](Self::observe).
+    /// Subscribes to the topic of this name; `None` for an unknown topic.
     pub fn observe_topic(
         &self,
         topic: &str,
@@ -84,7 +75,7 @@ impl<M: Message> TopicObserver for Typed<'_, M> {
 
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let next = self.observer.next(Duration::ZERO)?;
-        // After the end of the stream masking may still be killed, and number anew.
+        // After the end of the stream masking may still be killed, and reuse numbers.
         self.has_ended = matches!(next, Next::Ended);
         Ok(match next {
             Next::Message(message, _) => Some(message.to_bytes()),

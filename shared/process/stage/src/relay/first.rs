@@ -30,9 +30,6 @@ pub struct FirstStages<'a> {
 
 impl<'a> FirstStages<'a> {
     /// Opens the topics. `reads_motions`: the motions of this run are needed on the other machine.
-    ///
-    /// # Errors
-    /// A topic that is none of the stream; a failure of the transport.
     pub fn open(
         launch: &'a Launch,
         topics: &[&str],
@@ -57,15 +54,12 @@ impl<'a> FirstStages<'a> {
     }
 
     /// Reads the new poses. Call it after each sleep.
-    ///
-    /// # Errors
-    /// A pose that breaks its contract; a failure of the transport.
     pub fn update(&mut self) -> Result<(), StageError> {
         self.credit.update()
     }
 
     /// Returns the newest pose of the trajectory at the last start of the last stage; `None` before
-    /// it has told.
+    /// its report.
     pub fn resume_at(&self) -> Option<&Item> {
         self.credit.resume_at.as_ref()
     }
@@ -80,10 +74,7 @@ impl<'a> FirstStages<'a> {
         self.credit.newest
     }
 
-    /// Returns the next motion; `None` if there is none yet.
-    ///
-    /// # Errors
-    /// A message that breaks its contract, a sequence gap, a failure of the transport.
+    /// Returns the next motion; `None` if nothing has arrived yet.
     pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }
@@ -96,9 +87,6 @@ impl<'a> FirstStages<'a> {
     /// Publishes the messages about item `seq`, one for each topic in the order of
     /// [`open`](Self::open), but for those that have none. Its times on the other machine are on
     /// another clock: here the item begins with its arrival.
-    ///
-    /// # Errors
-    /// A message of another item, or of another size than this run's; a failure of the transport.
     pub fn publish(
         &mut self,
         messages: &[Option<RecordedMessage>],
@@ -124,9 +112,6 @@ impl<'a> FirstStages<'a> {
     }
 
     /// Publishes the end of the stream.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn end(&mut self, item: Item) -> Result<(), StageError> {
         self.outlets
             .iter()
@@ -137,9 +122,6 @@ impl<'a> FirstStages<'a> {
     /// Sleeps until there is a pose or a motion, or the connection has something to read, and
     /// answers the handshakes of new readers; true on a request to stop. It is never late: the
     /// other machine may be out of reach.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
         self.schedule.due_at(clock::now_ns() + ALIVE_NS)?;
         let handshakes: Vec<_> = self
@@ -160,7 +142,6 @@ impl<'a> FirstStages<'a> {
         Ok(woken.stop)
     }
 
-    /// Returns what was counted.
     pub fn counters(&self) -> StageCounters {
         self.counters.clone()
     }

@@ -12,8 +12,8 @@ use crate::{
     remote_progress::ProgressWriter, sink, transport::Listener, wake, writer::Writer,
 };
 
-/// Reads what the last stages read, which are on another machine, and publishes the poses that come
-/// back from them.
+/// Reads the topics of the last stages, which are on another machine, and publishes the poses that
+/// come back from them.
 pub struct LastStages<'a> {
     launch: &'a Launch,
     poses: Writer<Pose>,
@@ -26,9 +26,6 @@ pub struct LastStages<'a> {
 
 impl<'a> LastStages<'a> {
     /// Opens the topics that it publishes. `publishes_motions`: motions come back too.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(launch: &'a Launch, publishes_motions: bool) -> Result<Self, StageError> {
         let (node, manifest) = (&launch.node, &launch.manifest);
         let motions = publishes_motions.then(|| Writer::open(node, manifest));
@@ -42,11 +39,8 @@ impl<'a> LastStages<'a> {
         })
     }
 
-    /// Publishes the last poses again, of which the newest says where the source goes on; without
-    /// any, that it begins.
-    ///
-    /// # Errors
-    /// A failure of the transport.
+    /// Publishes the last poses again. The newest pose determines where the source continues;
+    /// without any pose, the source begins.
     pub fn republish(&self, restored: &[PoseHeader]) -> Result<(), StageError> {
         sink::republish(&self.poses, restored, StageId::PoseIntegration)
     }
@@ -57,37 +51,25 @@ impl<'a> LastStages<'a> {
     }
 
     /// Subscribes to topics of the stream.
-    ///
-    /// # Errors
-    /// A topic that is none of the stream; a failure of the transport.
     pub fn read(&mut self, topics: &[&str]) -> Result<(), StageError> {
         let inlets = topics.iter().map(|topic| inlet(self.launch, topic));
         self.inlets = inlets.collect::<Result<_, _>>()?;
         Ok(())
     }
 
-    /// Returns the next message of one of these topics, by its place among them; `None` if there is
-    /// none yet.
-    ///
-    /// # Errors
-    /// A message that breaks its contract, a sequence gap, a failure of the transport.
+    /// Returns the next message of one of these topics, by its place among them; `None` if nothing
+    /// has arrived yet.
     pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, StageError> {
         let inlet = self.inlets.get_mut(topic);
         inlet.map_or(Ok(None), |inlet| inlet.receive())
     }
 
-    /// Says that the other machine owes the poses of so many items, counted at the source.
-    ///
-    /// # Errors
-    /// A file of the run that cannot be written.
+    /// Reports the number of items whose poses the other machine owes, counted at the source.
     pub fn has_handed_over(&self, items: u64) -> Result<(), StageError> {
         self.progress.has_published(items)
     }
 
     /// Publishes a new pose, the credit for one more scan.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
@@ -96,9 +78,6 @@ impl<'a> LastStages<'a> {
     }
 
     /// Publishes the end of the stream.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn end(&self, item: Item) -> Result<(), StageError> {
         let end = PoseHeader {
             item: Item {
@@ -110,10 +89,6 @@ impl<'a> LastStages<'a> {
         sink::publish(&self.poses, end, StageId::PoseIntegration)
     }
 
-    /// Publishes a motion.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
         let Some(motions) = &self.motions else {
             return Ok(());
@@ -125,9 +100,6 @@ impl<'a> LastStages<'a> {
 
     /// Sleeps until a topic has a message or the connection has something to read, and answers the
     /// handshakes of new readers; true on a request to stop.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
         let data: Vec<_> = self.inlets.iter().map(|inlet| inlet.listener()).collect();
         let motions = self.motions.as_ref().map(Writer::listener);
@@ -145,7 +117,6 @@ impl<'a> LastStages<'a> {
         Ok(woken.stop)
     }
 
-    /// Returns what was counted.
     pub fn counters(&self) -> StageCounters {
         self.counters.clone()
     }

@@ -3,7 +3,7 @@
 //! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of
 //! each run lies its lock, and as long as the run lives its supervisor holds it. So a lock that is
 //! free belongs to a dead run, and whoever holds it may remove that run. No lock is shared between
-//! runs, and none is waited for.
+//! runs, and no run waits for one.
 
 use std::{
     collections::BTreeSet,
@@ -28,7 +28,7 @@ use thiserror::Error;
 use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 
 const OWNER_ONLY: u32 = 0o700;
-/// Modes of a directory in which others could have put something, or that is a special one.
+/// Modes of a directory where others could have put something, or of a special directory.
 const NOT_OWN: u32 = 0o7022;
 /// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
@@ -49,38 +49,24 @@ pub struct RunRoot {
 /// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    /// Another run writes to the same results.
     #[error("another run is writing to {out}{holder}: wait for it, or choose another --out")]
     Busy {
-        /// The results.
         out: PathBuf,
         /// The process of the other run, after a comma.
         holder: String,
     },
-    /// Shared memory cannot be used.
     #[error(
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
-    Unusable {
-        /// The path.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
-    /// The user's directory is not the user's alone.
+    Unusable { path: PathBuf, source: io::Error },
     #[error("{path} {state}, so the shared memory of a run would not be safe in it: {remedy}")]
     Unsafe {
-        /// The directory.
         path: PathBuf,
-        /// The problem.
         state: String,
-        /// The remedy.
         remedy: String,
     },
-    /// A signal requested a stop.
     #[error("interrupted before the start")]
     Interrupted,
-    /// Signals cannot be waited for.
     #[error(transparent)]
     Signals(#[from] StageError),
 }
@@ -100,9 +86,6 @@ impl RootError {
 impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
-    ///
-    /// # Errors
-    /// Another run writes to `out`, shared memory cannot be used, or a signal requested a stop.
     pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
         let name = name(out, geteuid());
         let deadline = Instant::now() + LIMIT;
@@ -152,7 +135,6 @@ impl RunRoot {
         self.prefix.clone()
     }
 
-    /// Returns the path of the root.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -193,9 +175,9 @@ fn lock_of(root: &Path) -> PathBuf {
     root.with_extension("lock")
 }
 
-/// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open
-/// to all users, so what is there is used only if it is a directory of this user in which no other
-/// can write.
+/// Returns the directory of the user's runs, and creates it if it is missing. `/dev/shm` is open to
+/// all users, so an entry there is used only if it is a directory of this user that no other can
+/// write to.
 fn user_directory() -> Result<PathBuf, RootError> {
     let path = path_of(geteuid());
     make_directory(&path).map_err(|source| RootError::Unusable {
@@ -219,7 +201,7 @@ fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
     fs::set_permissions(path, Permissions::from_mode(OWNER_ONLY))
 }
 
-/// Checks that a path is a directory of this user in which no other could write, and closes it to
+/// Checks that a path is a directory of this user that no other could write to, and closes it to
 /// all others. A process with another umask may have created it, as the transport does in a process
 /// whose run has been removed.
 fn make_owner_only(path: &Path) -> Result<(), RootError> {
@@ -277,7 +259,7 @@ pub fn sweep() {
     }
 }
 
-/// Removes what the run with this root has left in shared memory, if its supervisor is dead and no
+/// Removes the remains of the run with this root in shared memory, if its supervisor is dead and no
 /// other run has its place.
 pub fn sweep_run(root: &Path) {
     let is_run = root.file_name().and_then(|name| name.to_str());
@@ -347,7 +329,7 @@ fn remove_files(root: &Path) {
     for (path, _) in own_files(Path::new(SHARED_MEMORY), &format!("{name}_")) {
         let _ = fs::remove_file(path);
     }
-    // An empty directory goes without a descriptor, of which there may be none left.
+    // An empty directory is removed without a descriptor, since there may be no descriptor left.
     let _ = fs::remove_dir(root).or_else(|_| fs::remove_dir_all(root));
 }
 
@@ -363,9 +345,6 @@ pub fn own_files(directory: &Path, prefix: &str) -> impl Iterator<Item = (PathBu
 
 /// Closes the files of a run to other users. The transport opens one of them, the counter of its
 /// nodes, to all.
-///
-/// # Errors
-/// A file whose mode cannot be changed.
 pub fn close_to_others(prefix: &str) -> io::Result<()> {
     own_files(Path::new(SHARED_MEMORY), prefix)
         .filter(|(_, file)| file.mode() & 0o077 != 0)

@@ -4,7 +4,6 @@ use std::time::{Duration, Instant};
 
 use crate::{Launch, StageError};
 
-/// Pause between two attempts.
 pub(super) const PAUSE: Duration = Duration::from_millis(100);
 
 /// Why a scan cannot be read: one sentence each.
@@ -27,9 +26,7 @@ pub struct Tolerance {
 
 /// Opens the input of a source, and tries again while that fails with a sentence. `None` on a
 /// request to stop.
-///
-/// # Errors
-/// Input that fails for longer than `tolerance` allows; a failure of the transport.
+/// Fails when input is unreadable for longer than `tolerance`.
 pub fn open<T>(
     launch: &Launch,
     tolerance: &Tolerance,
@@ -62,9 +59,6 @@ impl Attempts {
     }
 
     /// Allows another attempt after one that failed.
-    ///
-    /// # Errors
-    /// The attempts have taken too long.
     pub fn failed(&mut self, reason: String) -> Result<(), StageError> {
         let since = match self.first_failure {
             Some(since) => since,

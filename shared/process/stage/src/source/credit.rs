@@ -1,4 +1,4 @@
-//! The progress of the run, by which a source is admitted.
+//! The progress of the run, which admits the scans of a source.
 
 use gyre_messages::{Item, Pose, flag};
 

@@ -28,12 +28,11 @@ pub(super) struct LiveSensors {
     /// The samples of the last scan.
     of_scan: Vec<Sample>,
     max_wait: Duration,
-    /// Samples that were left out so far, and the number at which that is said next.
+    /// Samples that were left out so far, and the number for the next report.
     left_out: usize,
     said_at: usize,
 }
 
-/// A live sensor.
 struct Live {
     samples: LiveSamples,
     socket: Option<UdpSocket>,
@@ -46,10 +45,7 @@ struct Live {
 }
 
 impl LiveSensors {
-    /// Opens those of the sections `[gyro]` and `[wheels]`; `None` without one.
-    ///
-    /// # Errors
-    /// An address at which nothing can be received.
+    /// Opens the samples of the sections `[gyro]` and `[wheels]`; `None` without one.
     pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);
@@ -90,9 +86,6 @@ impl LiveSensors {
     }
 
     /// Takes the samples that have arrived, at most one turn of them.
-    ///
-    /// # Errors
-    /// A socket fails.
     pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
         let sensors = [
             (SampleKind::Gyro, &mut self.gyro),

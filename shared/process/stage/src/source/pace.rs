@@ -11,7 +11,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// The pace at which a scan that is complete at `first_ns` on the sensor's clock is due now.
+    /// The pace that makes a scan that is complete at `first_ns` on the sensor's clock due now.
     pub fn new(rate: f64, first_ns: i64) -> Self {
         Self {
             rate,

@@ -57,8 +57,8 @@ impl<S: Source> Playback<'_, S> {
             }
             self.credit.update()?;
             if let Some(newest_pose) = self.credit.resume_at {
-                // In live mode the numbers do not tell how far back the previous scan is; masking
-                // does without it.
+                // In live mode the numbers do not determine the distance to the previous scan;
+                // masking does without it.
                 let manifest = &self.launch.manifest;
                 let masks_pairs = manifest.window.masks_pairs() && !manifest.live;
                 let first = self.source.scans().start;
@@ -136,12 +136,12 @@ impl<S: Source> Playback<'_, S> {
         ))
     }
 
-    /// Returns whether scans become due whatever this process does, as those of a sensor.
+    /// Returns whether scans become due independently of this process, as a sensor's do.
     fn is_sensor(&self) -> bool {
         self.launch.manifest.live && self.source.drops_missed_scans()
     }
 
-    /// Returns the time on the sensor's clock at which the last scan of a scan's burst is complete.
+    /// Returns the time on the sensor's clock when the last scan of a scan's burst is complete.
     fn burst_ns(&self, complete_ns: i64, published: u64) -> i64 {
         let after = self.left_in_burst(published) as i64;
         complete_ns.saturating_add(self.source.period_ns().saturating_mul(after))
@@ -261,7 +261,7 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// Returns when a scan is expected to be due before it is read; `None` if its time is unknown
-    /// or breaks with that of the scan before.
+    /// or inconsistent with the scan before.
     fn expected_ns(&self, index: usize, published: u64, pace: Pace) -> Option<i64> {
         let before_ns = self.source.complete_ns(index.checked_sub(1)?)?;
         let complete_ns = self.source.complete_ns(index)?;

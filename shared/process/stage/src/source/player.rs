@@ -23,17 +23,10 @@ pub trait Recorded {
     /// The messages to play, by their sequence number: each topic has all of them.
     fn items(&self) -> Range<u64>;
 
-    /// Reads a message.
-    ///
-    /// # Errors
-    /// The reason why it cannot be used.
     fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError>;
 }
 
 /// Plays recorded messages until SIGTERM.
-///
-/// # Errors
-/// A message that cannot be read, or a failure of the transport.
 pub fn run_player(
     launch: &Launch,
     recorded: &mut impl Recorded,
@@ -118,7 +111,8 @@ impl<R: Recorded> Player<'_, R> {
     }
 
     /// Waits until the sink has reported the newest pose, and returns the first message to send:
-    /// that of this pose, which the others need as the previous one. `None` on a request to stop.
+    /// the message of this pose, which the others need as the previous one. `None` on a request to
+    /// stop.
     fn wait_for_start(&mut self) -> Result<Option<u64>, StageError> {
         loop {
             // Sleep first, as the source of scans does.

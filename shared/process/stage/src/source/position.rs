@@ -51,8 +51,8 @@ impl Position {
         }
     }
 
-    /// Goes on after the newest pose, and after all that has been published: a sensor measures
-    /// nothing twice.
+    /// Continues after the newest pose, and after all published scans: a sensor measures nothing
+    /// twice.
     pub fn after(newest_pose: &Item, published: u64) -> Self {
         let next = match newest_pose.is(flag::BASE) {
             true => 0,

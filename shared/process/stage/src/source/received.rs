@@ -1,5 +1,5 @@
-//! Counts of what a sensor has delivered and what is missing, in a file of the run's root: a source
-//! that follows one that has died goes on counting, and who looks on sees it while the run works.
+//! Counts of the deliveries and losses of a sensor, in a file of the run's root: a source that
+//! replaces a dead one continues to count, and observers see the counts while the run works.
 
 use std::{
     fs::{File, OpenOptions},
@@ -17,21 +17,19 @@ const FILE: &str = "source.received";
 const NUMBERS: usize = 9;
 const BYTES: usize = 8 * NUMBERS;
 
-/// Counts of what a live sensor has delivered since the start of the run, and of what is missing.
+/// Counts of the deliveries and losses of a live sensor since the start of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Received {
     /// Azimuths that are missing from the scans that were published.
     pub missing_azimuths: u64,
-    /// Turns of the sensor of which there is no scan.
+    /// Turns of the sensor without a scan.
     pub scans_left_out: u64,
     /// Messages that could not be read.
     pub damaged_messages: u64,
     /// Datagrams of others, and descriptions of scans that do not fit into the run. They were
     /// passed over.
     pub foreign_messages: u64,
-    /// Connections so far.
     pub connections: u64,
-    /// Azimuths arrive.
     pub is_receiving: bool,
     /// The scan that was published last.
     pub last_scan: Option<LastScan>,
@@ -107,7 +105,7 @@ impl Received {
     }
 }
 
-/// Returns what the sensor of a run has delivered; `None` if its source is no sensor.
+/// Returns the deliveries of a run's sensor; `None` if its source is no sensor.
 pub fn read(manifest: &Manifest) -> Option<Received> {
     let mut bytes = [0; BYTES];
     let file = File::open(manifest.root.join(FILE)).ok()?;
@@ -115,7 +113,6 @@ pub fn read(manifest: &Manifest) -> Option<Received> {
     Some(Received::from_bytes(&bytes))
 }
 
-/// Writes what is received.
 pub(super) struct ReceivedWriter {
     path: PathBuf,
     file: File,

@@ -19,14 +19,14 @@ use crate::{
     writer::{Draft, Writer},
 };
 
-/// Time for which the supervisor need not intervene: this loop says again and again that it is not
+/// Time without need for the supervisor to intervene: this loop repeatedly reports that it is not
 /// late, since a radar that is switched off is no reason to restart it.
 pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
 /// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
 /// file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
 
-/// A sensor that delivers scans by itself.
+/// A sensor that delivers scans at its own pace.
 pub trait Sensor {
     /// The stage that it is, or replaces.
     const HOP: StageId;
@@ -34,11 +34,8 @@ pub trait Sensor {
     /// The connection to wait for, while there is one.
     fn connection(&self) -> Option<BorrowedFd<'_>>;
 
-    /// Takes what has arrived and writes it into shared memory, without waiting. After
+    /// Takes the received data and writes them into shared memory, without waiting. After
     /// [`Arrival::Scan`] it is called again at once, with memory for the next scan.
-    ///
-    /// # Errors
-    /// Input that this run can do nothing with.
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
 
     /// Returns when the scan that was returned last was complete by the sensor's clock,
@@ -58,17 +55,16 @@ pub trait Sensor {
         None
     }
 
-    /// Goes on counting after a source that has died.
+    /// Continues to count after a dead source.
     fn resume(&mut self, before: Received);
 
-    /// Returns what it has delivered since the start of the run, and what is missing.
+    /// Returns the deliveries and losses since the start of the run.
     fn received(&self) -> Received;
 }
 
 /// The event of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// A scan is complete.
     Scan,
     /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after
     /// this time.
@@ -78,10 +74,7 @@ pub enum Arrival {
     Later(Duration),
 }
 
-/// Publishes what a sensor delivers until SIGTERM, or until `scans` scans are published.
-///
-/// # Errors
-/// Input that cannot be used, or a failure of the transport.
+/// Publishes the scans of a sensor until SIGTERM, or until `scans` scans are published.
 pub fn run_sensor(
     launch: &Launch,
     sensor: &mut impl Sensor,
@@ -118,7 +111,7 @@ struct Stream<'a> {
     counters: StageCounters,
     received: ReceivedWriter,
     live: Option<LiveSensors>,
-    /// When the supervisor was last told that this process is alive, `CLOCK_MONOTONIC`, ns.
+    /// Time of the last sign of life to the supervisor, `CLOCK_MONOTONIC`, ns.
     said_ns: i64,
 }
 
@@ -145,7 +138,7 @@ impl Stream<'_> {
         scans: Option<u64>,
     ) -> Result<(), StageError> {
         let newest = self.credit.resume_at.unwrap_or_default();
-        // A run that is started again knows what was published up to its newest pose.
+        // A restarted run knows the number of scans published up to its newest pose.
         let (manifest, first) = (&self.launch.manifest, position.published);
         let generation = Generation::begin(manifest, NumberedBy::Source, &newest, first)?;
         while scans.is_none_or(|scans| position.published < scans) {

@@ -1,4 +1,4 @@
-//! Generations of numbers: each is another one, whatever was before it.
+//! Generations of numbers: each differs from all generations before it.
 
 use std::fs;
 

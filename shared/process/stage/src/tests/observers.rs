@@ -1,4 +1,4 @@
-//! Observers change nothing for the others, and know what they miss.
+//! Observers change nothing for the others, and count the messages that they miss.
 
 use std::{fs, rc::Rc, time::Duration};
 
@@ -17,7 +17,7 @@ use crate::{
 
 const POSE: Topic = Topic::of::<Pose>();
 
-/// The sequence number of the next message and what was missed before it.
+/// The sequence number of the next message, and the number of missed messages before it.
 fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
     match observer.next(Duration::ZERO).unwrap() {
         Next::Message(message, missed) => Some((message.item().seq, missed)),
@@ -137,7 +137,7 @@ fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_resu
     let later = Run::writing_to(&out);
     drop(observer);
     drop(observed);
-    // A restarted stage opens its topics anew.
+    // A restarted stage opens its topics again.
     Service::open(&super::node(&later.manifest), &POSE).unwrap();
     reader::<Pose>(&later.manifest, None);
 }

@@ -1,5 +1,4 @@
-//! Programs whose ports are typed, as those of other languages are: they find the types that Gyre
-//! has for its bytes.
+//! Programs with typed ports, as in other languages, find the types for Gyre's bytes.
 
 use std::fmt;
 

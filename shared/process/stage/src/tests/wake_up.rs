@@ -1,4 +1,4 @@
-//! Wake-ups: their latency, and that none is superfluous.
+//! Wake-ups: their latency, and the absence of superfluous ones.
 
 use std::{
     sync::mpsc,

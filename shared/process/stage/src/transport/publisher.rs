@@ -110,7 +110,7 @@ impl Loan {
         self.parts().0
     }
 
-    /// Returns the scan that the message is about, with which every header starts.
+    /// Returns the item of the message's scan, which is at the start of every header.
     pub(crate) fn item(&mut self) -> &mut Item {
         bytemuck::from_bytes_mut(&mut self.header()[..size_of::<Item>()])
     }

@@ -37,9 +37,6 @@ impl Service {
     }
 
     /// Opens a topic, which the supervisor has created.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(node: &Node, topic: &Topic) -> Result<Self, StageError> {
         let factory = builder(node, topic)?
             .open()
@@ -62,7 +59,6 @@ impl Service {
         self.factory.dynamic_config().number_of_publishers() > 0
     }
 
-    /// Returns the number of subscribers.
     pub fn subscribers(&self) -> usize {
         self.factory.dynamic_config().number_of_subscribers()
     }

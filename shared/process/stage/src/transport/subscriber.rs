@@ -33,7 +33,7 @@ impl Subscriber {
         Ok(Self::new(service, port, false))
     }
 
-    /// Subscribes as an observer, under a name by which observers are counted.
+    /// Subscribes as an observer, under a name for counting observers.
     pub(crate) fn observe(service: &Service, name: &str) -> Result<Self, StageError> {
         let name =
             PortName::new(name).map_err(|e| StageError::transport("name the observer", e))?;

@@ -11,7 +11,7 @@ pub struct Recorded {
     header: Vec<u8>,
     /// The bytes of the payload.
     pub payload: Vec<u8>,
-    /// Time at which it was received, `CLOCK_MONOTONIC`, ns; 0 for one that was made.
+    /// Time of receipt, `CLOCK_MONOTONIC`, ns; 0 for a synthetic message.
     pub received_ns: i64,
 }
 
@@ -43,13 +43,10 @@ impl Recorded {
     }
 
     /// Returns the header of a message of topic `M`.
-    ///
-    /// # Errors
-    /// It is of another topic, whose headers have another size.
     pub fn header<M: Message<Header: Copy>>(&self) -> Result<M::Header, StageError> {
         match self.header.len() == size_of::<M::Header>() {
-            // SAFETY: the bytes are those of a header of this size, which is plain numbers: any
-            // bytes are a value of it.
+            // SAFETY: the bytes are a header of this size, which is plain numbers: any bytes are a
+            // value of it.
             true => Ok(unsafe { self.header.as_ptr().cast::<M::Header>().read_unaligned() }),
             false => Err(StageError::Input(format!(
                 "a header of {} bytes is none of topic `{}`",

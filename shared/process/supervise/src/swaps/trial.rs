@@ -1,5 +1,5 @@
-//! The trial of a program that has taken the place of another one: it lasts until the first pose
-//! that the program has worked on, and who has asked for the swap waits for its result.
+//! The trial of a replacing program: it lasts until the first pose that the program has worked on,
+//! and the client of the swap waits for its result.
 
 use std::time::{Duration, Instant};
 
@@ -22,8 +22,8 @@ pub(super) struct Trial {
 }
 
 impl Swaps {
-    /// Lets the client of a swap wait. Of a follower no pose says what it does: so its swap is done
-    /// when it is started.
+    /// Lets the client of a swap wait. Poses do not show the work of a follower: so its swap is
+    /// done when it is started.
     pub fn await_trial(&mut self, process: usize, child: &Child, client: Client) {
         if child.follows() {
             client.answer(&Answer::Done);
@@ -71,7 +71,8 @@ impl Swaps {
         })
     }
 
-    /// Tells the client that the program has failed, and the one before is started again.
+    /// Informs the client that the program has failed, and that the previous program is started
+    /// again.
     pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
         let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
@@ -81,7 +82,7 @@ impl Swaps {
         }
     }
 
-    /// Tells the client that the stream has ended before the first pose.
+    /// Informs the client that the stream has ended before the first pose.
     pub fn end_trial(&mut self, processes: &Processes) {
         if let Some(trial) = self.trial.take() {
             let name = processes[trial.process].name();

@@ -11,7 +11,7 @@ use gyre_samples::Sample;
 const STEP_NS: i64 = 1_000_000_000;
 /// A step ahead by more than this is no gap but a step of the clock, ns.
 const AHEAD_NS: i64 = 3_600_000_000_000;
-/// Stretches from which on the stamps are no clock's.
+/// With this many stretches the stamps are not measured by a clock.
 const MAX_STRETCHES: usize = 5000;
 
 /// Keeps those stretches between steps of the stamps that follow one another and have the most

@@ -1,4 +1,4 @@
-//! Samples that come in bursts, all of a burst with the stamp at which it was received.
+//! Samples that come in bursts, all of a burst with its receive time as stamp.
 
 use gyre_radar::median;
 

@@ -9,7 +9,7 @@ use gyre_samples::Sample;
 /// a period, since one between two others is at most that far from the nearer.
 const HOLE_PERIODS: f64 = 0.6;
 
-/// Sorts samples by their stamps, each of which is used once.
+/// Sorts samples by their stamps, and removes repeated stamps.
 ///
 /// A sample that came late fills a hole. Where it does not the clock was set back, and the time
 /// since is measured twice: which stamps are right is not known, and none of them is used.

@@ -1,6 +1,6 @@
 //! The steps of a network in ONNX whose layers are quantised: each operator stands between
-//! `DequantizeLinear` and `QuantizeLinear`. `None` says everywhere that the network has something
-//! else, which another library computes.
+//! `DequantizeLinear` and `QuantizeLinear`. `None` always means that the network has an unsupported
+//! part, which another library computes.
 
 mod layout;
 
@@ -117,7 +117,7 @@ impl<'a> Reader<'a> {
         Some(())
     }
 
-    /// Returns what an operator gives that is not `QuantizeLinear`.
+    /// Returns the output of an operator that is not `QuantizeLinear`.
     fn float(&mut self, node: &NodeProto) -> Option<Float> {
         let attributes = Attributes(&node.attribute);
         Some(match node.op_type.as_deref()? {
@@ -242,7 +242,7 @@ impl<'a> Reader<'a> {
         Some(Integer::Of(layout))
     }
 
-    /// Adds an image that is made from another one. Returns the numbers of both and the values.
+    /// Adds an image that is made from an existing one. Returns the numbers of both and the values.
     fn made_from(
         &mut self,
         from: &Layout,
@@ -299,8 +299,8 @@ impl<'a> Reader<'a> {
         Some((image, Layout::whole(image, shape, quantisation)))
     }
 
-    /// Returns an image that holds the values in their order, and adds a step that gathers them if
-    /// there is none.
+    /// Returns an image that holds the values in their order, and adds a gathering step if no image
+    /// does.
     fn whole(&mut self, layout: &Layout) -> Option<usize> {
         if layout.is_whole() {
             return Some(layout.image);

@@ -40,7 +40,6 @@ impl Image {
         channel * self.plane() + (row + 1) * self.stride() + column + 1
     }
 
-    /// Returns all values.
     pub fn values(&self) -> &[f32] {
         &self.values
     }

@@ -162,7 +162,7 @@ pub fn enlarge(from: &Image, to: &mut Image) {
     }
 }
 
-/// Writes the channels of an image, multiplied, as those of another one from `first` on.
+/// Writes the channels of an image, multiplied, into another image, beginning at channel `first`.
 #[simd]
 pub fn copy(from: &Image, factor: f32, first: usize, to: &mut Image) {
     for channel in 0..from.channels {

@@ -41,7 +41,7 @@ pub(super) fn pass_forward<const MOST_STEPS: usize, const NUMBERS: usize>(
                 *product *= f64::from(sum);
             }
         }
-        // Logarithms are slow, and a row's likelihood is at least that of an outlier.
+        // Logarithms are slow, and a row's likelihood is at least an outlier's.
         if row % 64 == 63 {
             add_logarithms(&mut likelihood, &mut product);
         }
@@ -64,7 +64,7 @@ pub(super) fn pass_backward<const MOST_STEPS: usize, const NUMBERS: usize>(
 ) {
     let count = known::<NUMBERS>(moments.len());
     moments[..count].fill(Default::default());
-    // What is lost behind the last row shows in none.
+    // A loss behind the last row shows in no row.
     let mut behind = [[gap::<NUMBERS>(); _]; NUMBERS];
     behind[count] = [1.0; _];
     let forward = forward.chunks_exact(count + 1);
@@ -117,7 +117,7 @@ fn of_number<const MOST_STEPS: usize>(steps: &[f32; MOST_STEPS], number: usize) 
     chunk.expect("there are steps for the turns of the largest number")
 }
 
-/// Adds the logarithms of products, and begins them anew.
+/// Adds the logarithms of products, and resets the products.
 fn add_logarithms(sums: &mut Turns<f64>, products: &mut Turns<f64>) {
     for (sum, product) in sums.iter_mut().zip(products) {
         *sum += product.ln();

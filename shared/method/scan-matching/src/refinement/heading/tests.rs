@@ -14,7 +14,7 @@ const NOISE_RAD: f64 = 2e-3;
 /// Weighs a drive of `scans` scans that turns at a rate, with a gyro that has a bias. Each scan
 /// becomes a keyframe, unless the vehicle stands.
 fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64) {
-    // A turn that stays does not tell the scale from the bias.
+    // A constant turn does not separate the scale from the bias.
     let config = GyroConfig {
         scale_sigma: 0.0,
         ..GyroConfig::default()
@@ -36,9 +36,9 @@ fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64
             covariance: Matrix3::from_diagonal_element(NOISE_RAD * NOISE_RAD),
         };
         let predicted = heading.predict(&turn, &config);
-        at = heading.weigh(&registered, &at, &predicted, 0.1).motion;
+        at = heading.update(&registered, &at, &predicted, 0.1).motion;
         if let Some(keyframes) = keyframes {
-            heading.follow(keyframes);
+            heading.add_keyframe(keyframes);
         }
     }
     (heading, wrap_angle(at.rotation.angle() - truth))
@@ -61,8 +61,8 @@ fn on_the_road_the_bias_is_never_better_known_than_the_radar_leans() {
         assert!(off_rad.abs() < 2.0 * NOISE_RAD, "{off_rad} rad");
         heading.covariance[(1, 1)].sqrt()
     });
-    // A map of ten keyframes follows the lean by 2/11 a scan.
-    let floor_radps = LEAN_SIGMA_RAD * 2.0 / 11.0 / INTERVAL_S;
+    // A map of ten keyframes follows the yaw_bias by 2/11 a scan.
+    let floor_radps = YAW_BIAS_SIGMA_RAD * 2.0 / 11.0 / INTERVAL_S;
     assert!(
         driven > floor_radps && driven > 2.0 * stood,
         "{driven}, {stood} rad/s"
@@ -89,7 +89,7 @@ fn the_place_moves_along_with_the_heading() {
         covariance,
     };
     let predicted = heading.predict(&turn, &config);
-    let fused = heading.weigh(&registered, &previous, &predicted, 1.0);
+    let fused = heading.update(&registered, &previous, &predicted, 1.0);
     let [x_m, y_m, yaw_rad] = xy_yaw(&fused.motion);
     let off = [x_m, y_m - 1.995, yaw_rad - previous.rotation.angle()];
     assert!(off.iter().all(|off| off.abs() < 1e-4), "{off:?}");
@@ -107,7 +107,7 @@ enum Event {
     Blind,
     /// The scan is registered, and the log has a gap.
     Gap,
-    /// Neither: the heading is that of the motions before.
+    /// Neither: the motions before determine the heading.
     Lost,
 }
 
@@ -131,7 +131,7 @@ struct Drive {
     bias_radps: f64,
     /// Measured turn over the true one.
     measured: f64,
-    lean_rad: f64,
+    yaw_bias_rad: f64,
 }
 
 impl Drive {
@@ -143,7 +143,7 @@ impl Drive {
     fn new(seed: u64) -> Self {
         let config = GyroConfig::default();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let [bias, lean, scale] = [0, 1, 2].map(|_| rng.sample::<f64, _>(StandardNormal));
+        let [bias, yaw_bias, scale] = [0, 1, 2].map(|_| rng.sample::<f64, _>(StandardNormal));
         Self {
             rng,
             heading: Heading::new(&config),
@@ -152,7 +152,7 @@ impl Drive {
             config,
             at: Pose::identity(),
             true_rad: 0.0,
-            lean_rad: lean * LEAN_SIGMA_RAD,
+            yaw_bias_rad: yaw_bias * YAW_BIAS_SIGMA_RAD,
         }
     }
 
@@ -166,22 +166,26 @@ impl Drive {
         let predicted_rad = match event.has_turn() {
             true => self.predicted(turn_rad),
             false => {
-                self.heading.wait(INTERVAL_S, &self.config);
+                self.heading.propagate(INTERVAL_S, &self.config);
                 None
             }
         };
         let walk = self.config.bias_walk_radps_per_sqrt_s * INTERVAL_S.sqrt();
         self.bias_radps += self.normal(walk);
-        let kept = (-INTERVAL_S / LEAN_TIME_S).exp();
-        let fresh = self.normal(LEAN_SIGMA_RAD * (1.0 - kept * kept).sqrt());
-        self.lean_rad = kept * self.lean_rad + fresh;
+        let kept = (-INTERVAL_S / YAW_BIAS_TIME_S).exp();
+        let fresh = self.normal(YAW_BIAS_SIGMA_RAD * (1.0 - kept * kept).sqrt());
+        self.yaw_bias_rad = kept * self.yaw_bias_rad + fresh;
         let registered = self.registered();
         self.at = match (event.is_registered(), predicted_rad) {
-            (true, Some(turn)) => self.heading.weigh(&registered, &self.at, &turn, 0.1).motion,
-            (true, None) => self.heading.adopt(&registered, &self.at).motion,
+            (true, Some(turn)) => {
+                self.heading
+                    .update(&registered, &self.at, &turn, 0.1)
+                    .motion
+            }
+            (true, None) => self.heading.reset_to(&registered, &self.at).motion,
             (false, Some(turn)) => self.at * pose(0.0, 0.0, turn.yaw_rad),
             (false, None) => {
-                self.heading.guess(Self::GUESS_RAD.powi(2));
+                self.heading.inflate(Self::GUESS_RAD.powi(2));
                 let guessed_rad = turn_rad + self.normal(Self::GUESS_RAD);
                 self.at * pose(0.0, 0.0, guessed_rad)
             }
@@ -203,7 +207,7 @@ impl Drive {
     fn registered(&mut self) -> UncertainMotion {
         let noise_rad = self.normal(NOISE_RAD);
         UncertainMotion {
-            motion: pose(0.0, 0.0, self.true_rad + self.lean_rad + noise_rad),
+            motion: pose(0.0, 0.0, self.true_rad + self.yaw_bias_rad + noise_rad),
             covariance: Matrix3::from_diagonal_element(NOISE_RAD * NOISE_RAD),
         }
     }
@@ -270,7 +274,7 @@ proptest! {
                 1 => drive.step(Event::Blind),
                 2 => drive.step(Event::Gap),
                 3 => drive.step(Event::Lost),
-                4 => drive.heading.follow(10),
+                4 => drive.heading.add_keyframe(10),
                 _ => drive.heading.start_map(),
             }
             let covariance = drive.heading.covariance;

@@ -9,11 +9,11 @@ const INTERVAL_S: f64 = 0.25;
 /// Standard deviations of an estimate: x, y (m), yaw (rad).
 const SIGMA: [f64; 3] = [0.055, 0.055, 0.0035];
 
-/// A drive along x, with what is estimated and reported of it.
+/// A drive along x, with its estimated and reported positions.
 struct Drive {
     standstill: Standstill,
     random: u64,
-    /// Standard deviation of the jitter over that of the covariances.
+    /// Standard deviation of the jitter relative to the covariances.
     jitter: f64,
     true_m: f64,
     estimate: Pose,
@@ -21,7 +21,6 @@ struct Drive {
     path_m: f64,
 }
 
-/// One scan of it.
 struct Step {
     stationary: bool,
     /// Distance of the reported pose from the estimated one.

@@ -17,7 +17,7 @@ struct Drive {
     config: WheelsConfig,
     wheels: WheelState,
     true_scale: f64,
-    /// Places along the path against the map: the true one, and that of the last scan.
+    /// Places along the path against the map: the true one, and the last scan's.
     true_m: f64,
     at_m: f64,
 }
@@ -82,7 +82,7 @@ impl Drive {
         let measured = self.drive(step_m, slip_m);
         let registered = self.register();
         self.wheels
-            .weigh(Some(&measured), &registered, true, &self.config);
+            .update(Some(&measured), &registered, true, &self.config);
         !self.wheels.slips
     }
 
@@ -101,9 +101,9 @@ impl Drive {
         let predicted = self.wheels.predict(&measured, &self.config);
         let predicted = predicted.expect("no slip");
         self.at_m += predicted.distance_m;
-        self.wheels.carry(&measured);
+        self.wheels.dead_reckon(&measured);
         let motion = predicted.motion([0.0, 0.0]);
-        self.wheels.miss(&motion, INTERVAL_S);
+        self.wheels.add_unmatched(&motion, INTERVAL_S);
         predicted
     }
 
@@ -155,14 +155,14 @@ fn the_variance_of_a_time_without_a_match_grows_with_noise_and_scale() {
         let mut drive = Drive::new(seed);
         drive.steps(40);
         let from_m = drive.true_m;
-        // That of the pose before is the noise of its registration.
+        // The error of the pose before is the noise of its registration.
         let start_m = drive.at_m;
         let predicted = (0..40).map(|_| drive.blind_step(2.5).variance_m2);
         variance_m2 += predicted.sum::<f64>() / DRIVES as f64;
         let off_m = (drive.at_m - start_m) - (drive.true_m - from_m);
         squares += off_m * off_m / DRIVES as f64;
         let along = drive.wheels.unmatched[(0, 0)];
-        assert!(along > 0.0 && drive.wheels.dead_s == 10.0);
+        assert!(along > 0.0 && drive.wheels.since_match_s == 10.0);
     }
     let ratio = squares / variance_m2;
     assert!((0.7..1.4).contains(&ratio), "{ratio}: {squares} m2");
@@ -201,7 +201,7 @@ fn wheels_that_slip_from_the_first_metre_are_noticed_and_their_scale_is_learnt_a
     }
 }
 
-/// A tachometer that shows 11 % too much, which the settings do not say, is not learnt in silence.
+/// A tachometer that shows 11 % too much, contrary to the settings, is not learnt in silence.
 #[test]
 fn wheels_of_another_scale_than_the_settings_allow_slip_again_and_again() {
     for seed in 0..100 {
@@ -220,7 +220,7 @@ fn a_new_map_starts_where_the_last_scan_is() {
     drive.wheels.start_map();
     assert_eq!(drive.wheels.offset_m, 0.0);
     assert_eq!(drive.wheels.covariance[(0, 0)], 0.0);
-    assert!(drive.wheels.covariance[(1, 1)] > 0.0 && drive.wheels.dead_m > 2.0);
+    assert!(drive.wheels.covariance[(1, 1)] > 0.0 && drive.wheels.since_match_m > 2.0);
 }
 
 fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
@@ -231,7 +231,7 @@ fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
         variance_m2: 1e-4,
         side_variance_m2: 4e-4,
         radar_ahead_m,
-        dead: [0.0; 2],
+        since_match: [0.0; 2],
     }
 }
 
@@ -253,7 +253,7 @@ proptest! {
         }
     }
 
-    /// The covariance is that of motions whose distance and turn are off by one standard deviation.
+    /// The covariance matches motions whose distance and turn are off by one standard deviation.
     #[test]
     fn the_covariance_is_that_of_small_errors(
         distance_m in -5.0..20.0f64, yaw_rad in -0.5..0.5f64, ahead_m in -3.0..5.0f64,

@@ -47,7 +47,7 @@ fn a_dead_run_is_removed_by_the_next_one() {
     fs::write(&segment, b"").unwrap();
     drop(lock);
     drop(acquire(out.path()).unwrap());
-    // The next one may be that of another test, which is still at it.
+    // The next one may belong to another test that is still running.
     let since = Instant::now();
     while segment.exists() || dead.exists() || lock_of(&dead).exists() {
         assert!(since.elapsed() < 10 * LIMIT, "the dead run stays");

@@ -1,0 +1,55 @@
+//! The samples of a drive as a log has them: `imu.csv`.
+
+use std::fmt::Write as _;
+
+use gyre_samples::{Sample, SampleKind};
+
+use super::attitude::Vehicle;
+use super::clock::Clock;
+use super::config::SimulatedGyroConfig;
+use super::errors::Errors;
+
+/// The file beside the scans.
+pub(crate) const FILE: &str = "imu.csv";
+/// The first row of the file: that of the log of RADIATE.
+const HEADER: &str =
+    "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
+
+/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
+/// stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
+pub(crate) fn samples(
+    config: &SimulatedGyroConfig,
+    seed: u64,
+    vehicle: &Vehicle<'_>,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<Sample>> {
+    let figures = config.figures()?;
+    let mut errors = Errors::new(&figures, config.up, seed);
+    let mut clock = Clock::new(config, seed);
+    let sample = |index: usize| {
+        let span_s = [index, index + 1].map(|index| index as f64 / figures.rate_hz);
+        let values = errors.measure(&vehicle.mean_motion(span_s));
+        let stamp_ns = clock.stamp_ns(0.5 * (span_s[0] + span_s[1]))?;
+        Some(Sample {
+            stamp_ns: start_ns + stamp_ns,
+            kind: SampleKind::Gyro as u32,
+            reserved: 0,
+            values,
+        })
+    };
+    let count = (end_s * figures.rate_hz).ceil() as usize;
+    Some((0..count).filter_map(sample).collect())
+}
+
+/// The samples as CSV: the numbers read from it are those of the samples.
+pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
+    let mut text = format!("{HEADER}\n");
+    for sample in samples {
+        let _ = write!(text, "{}", sample.stamp_ns);
+        for value in sample.values {
+            let _ = write!(text, ",{value}");
+        }
+        text.push('\n');
+    }
+    text.into_bytes()
+}

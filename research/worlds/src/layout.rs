@@ -1,0 +1,7 @@
+//! The dataset formats, one file each: names and folders of the images, the files beside them, and
+//! the instant of a sweep that is the scan's time.
+
+pub(crate) mod boreas;
+pub(crate) mod oxford;
+pub(crate) mod radiate;
+pub(crate) mod side_file;

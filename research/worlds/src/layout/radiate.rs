@@ -1,0 +1,172 @@
+//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, without metadata;
+//! and `Navtech_Polar.txt` with the times at which the host received the scans. RADIATE has no
+//! exact ground truth, so it is written as `ground_truth.tum`.
+
+use std::fmt::Write as _;
+
+use rand::Rng;
+
+use crate::error::SimulatorError;
+use crate::output::HostStamps;
+use crate::sensor::effects::is_on;
+use crate::simulator::Simulator;
+use crate::stream::Stream;
+
+pub(crate) const FOLDER: &str = "Navtech_Polar";
+
+/// Sensor periods that a reader can recognise, microseconds.
+const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
+/// One host stall in this many scans: a recording has seven in 466.
+const STALL_EVERY: usize = 64;
+/// Duration of a stall, seconds.
+const STALL_S: std::ops::Range<f64> = 0.3..1.4;
+/// Time between scans while the host catches up, microseconds.
+const CATCH_UP_US: i64 = 5_000;
+
+/// Checks that readers of this format can handle the radar.
+///
+/// # Errors
+/// [`SimulatorError::Config`] if they cannot.
+pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
+    let sampling = simulator.sampling();
+    match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
+        true => Ok(()),
+        false => Err(SimulatorError::Config {
+            key: "output.format",
+            value: "radiate".to_owned(),
+            expected: format!(
+                "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
+                sampling.azimuths, sampling.bins, sampling.period_us
+            ),
+        }),
+    }
+}
+
+/// Probability that the host loses an azimuth: as in a recording, where 46 % of the scans have lost
+/// one or more.
+const LOST: f64 = 0.0015;
+
+/// Returns the azimuths of a scan that the host loses, in order.
+pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
+    if index == 0 || !is_on(simulator.config().effects.lost_azimuths) {
+        return Vec::new();
+    }
+    let mut rng = Stream::Lost(index as u64).generator(seed);
+    let azimuths = 0..simulator.sampling().azimuths;
+    azimuths.filter(|_| rng.random_bool(LOST)).collect()
+}
+
+/// Loses azimuths of an image, range downwards: the columns behind each move up by one, and the
+/// last ones are those of the image before.
+pub(crate) fn lose(pixels: &mut [u8], before: &[u8], columns: usize, azimuths: &[usize]) {
+    let measured = columns - azimuths.len();
+    let rows = pixels.chunks_exact_mut(columns);
+    for (row, before) in rows.zip(before.chunks_exact(columns)) {
+        let kept = (0..columns).filter(|column| !azimuths.contains(column));
+        for (to, from) in kept.enumerate() {
+            row[to] = row[from];
+        }
+        row[measured..].copy_from_slice(&before[measured..]);
+    }
+}
+
+pub(crate) fn file_name(index: usize) -> String {
+    format!("{:06}.png", index + 1)
+}
+
+/// The scan's time, nanoseconds since 1970: the mean over its columns, whose times are evenly
+/// spaced over a turn.
+pub(crate) fn stamp_ns(simulator: &Simulator, index: usize) -> i64 {
+    let (time, azimuths) = (simulator.time(index), simulator.sampling().azimuths as i64);
+    time.start_us * 1000 + time.period_us * 1000 * (azimuths - 1) / (2 * azimuths)
+}
+
+/// `Navtech_Polar.txt`: the nanoseconds follow the dot *without leading zeros*.
+pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> String {
+    let mut text = String::new();
+    for index in 0..simulator.scans() {
+        let received_us = simulator.time(index).start_us + delay_us(simulator, host, seed, index);
+        let (seconds, rest_us) = (received_us / 1_000_000, received_us % 1_000_000);
+        let _ = writeln!(
+            text,
+            "Frame: {:06} Time: {seconds}.{}",
+            index + 1,
+            rest_us * 1000
+        );
+    }
+    text
+}
+
+/// Delay of the host for a scan, microseconds, less the shortest delay.
+fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) -> i64 {
+    if host == HostStamps::Even {
+        return 0;
+    }
+    let block = index / STALL_EVERY;
+    let mut rng = Stream::Stall(block as u64).generator(seed);
+    let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
+    let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
+    let Some(waiting) = index.checked_sub(begins) else {
+        return 0;
+    };
+    let received_us = ends_us + waiting as i64 * CATCH_UP_US;
+    (received_us - simulator.time(index).start_us).max(0)
+}
+
+/// Transposes rows of `stride` bytes: `into[bin][azimuth] = rows[azimuth][first_byte + bin]`.
+pub(crate) fn transpose(rows: &[u8], stride: usize, first_byte: usize, into: &mut [u8]) {
+    let azimuths = rows.len() / stride;
+    // Eight rows at a time, so that each line of the image is written in runs.
+    for (group, rows) in rows.chunks(8 * stride).enumerate() {
+        for (bin, line) in into.chunks_exact_mut(azimuths).enumerate() {
+            for (row, to) in rows.chunks_exact(stride).zip(&mut line[8 * group..]) {
+                *to = row[first_byte + bin];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::config::SimulationConfig;
+
+    #[test]
+    fn a_stalling_host_is_late_by_at_most_its_stall_and_keeps_the_order() {
+        let simulator = Simulator::new(&SimulationConfig {
+            scans: Some(400),
+            ..SimulationConfig::default()
+        })
+        .unwrap();
+        let late: Vec<i64> = (0..400)
+            .map(|i| delay_us(&simulator, HostStamps::Stalling, 3, i))
+            .collect();
+        let received: Vec<i64> = (0..400)
+            .map(|i| simulator.time(i).start_us + late[i])
+            .collect();
+        assert!(received.windows(2).all(|w| w[0] < w[1]));
+        let worst = late.iter().copied().max().unwrap();
+        assert!((600_000..1_400_000).contains(&worst), "{worst}");
+        let on_time = late.iter().filter(|late| **late == 0).count();
+        assert!((330..396).contains(&on_time), "{on_time}");
+    }
+
+    #[test]
+    fn transposing_leaves_the_metadata_out() {
+        let (azimuths, bins, first) = (21, 13, 2);
+        let rows: Vec<u8> = (0..azimuths * (bins + first))
+            .map(|i| (i * 7 % 251) as u8)
+            .collect();
+        let mut into = vec![0; azimuths * bins];
+        transpose(&rows, bins + first, first, &mut into);
+        for azimuth in 0..azimuths {
+            for bin in 0..bins {
+                assert_eq!(
+                    into[bin * azimuths + azimuth],
+                    rows[azimuth * (bins + first) + first + bin]
+                );
+            }
+        }
+    }
+}

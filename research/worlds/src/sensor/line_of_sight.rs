@@ -1,0 +1,131 @@
+//! Occlusion from the sensor: some rays for each azimuth, with the walls along each.
+
+use nalgebra::{Rotation2, Vector2};
+
+use super::sweep_poses::{AzimuthPose, MARGIN, SweepPoses};
+use crate::body::{Moving, NO_BODY, Wall};
+use crate::occlusion::crossing;
+use crate::world::World;
+
+/// Rays for each azimuth of 0.9 degrees.
+const RAYS: usize = 4;
+/// Minimum distance of a wall from the objects behind it that it hides, metres: objects lean
+/// against walls.
+const CLEARANCE_M: f32 = 0.1;
+
+/// Maximum distance of a moving body's parts from its origin, metres: half a long bus.
+const MOVER_M: f64 = 10.0;
+
+/// A wall along a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WallHit {
+    pub range_m: f32,
+    pub transmission: f32,
+    pub body: u32,
+    /// Index of the wall in the world; `u32::MAX` for walls of moving bodies.
+    pub wall: u32,
+}
+
+/// The rays of a sweep, each from the pose of the sensor at its azimuth.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LineOfSight {
+    passed: Vec<WallHit>,
+    /// `starts[r]..starts[r + 1]` are the walls of ray `r`, nearest first.
+    starts: Vec<usize>,
+}
+
+impl LineOfSight {
+    /// Casts the rays of a sweep.
+    pub fn cast(
+        &mut self,
+        world: &World,
+        moving: &[Moving<'_>],
+        sweep_poses: &SweepPoses,
+        reach_m: f64,
+    ) {
+        self.passed.clear();
+        self.starts.clear();
+        for ray in 0..(sweep_poses.azimuths() + 2 * MARGIN) * RAYS {
+            let first = self.passed.len();
+            self.starts.push(first);
+            let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
+            let azimuth_pose = sweep_poses.at(azimuth.floor());
+            let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad();
+            let line = Rotation2::new(-turned) * azimuth_pose.beam * reach_m;
+            self.cast_ray(world, moving, azimuth_pose, line, reach_m);
+            self.passed[first..].sort_unstable_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        }
+        self.starts.push(self.passed.len());
+    }
+
+    fn cast_ray(
+        &mut self,
+        world: &World,
+        moving: &[Moving<'_>],
+        azimuth_pose: &AzimuthPose,
+        line: Vector2<f64>,
+        reach_m: f64,
+    ) {
+        let passed = &mut self.passed;
+        let mut add = |number: u32, wall: &Wall, share: f64| {
+            let range_m = (share * reach_m) as f32;
+            passed.push(WallHit {
+                range_m,
+                transmission: wall.transmission as f32,
+                body: wall.body,
+                wall: number,
+            });
+        };
+        world.walls_between(
+            azimuth_pose.position,
+            azimuth_pose.position + line,
+            &mut add,
+        );
+        for mover in moving {
+            let pose = mover.pose_after(azimuth_pose.time_s);
+            let from = pose.inverse_transform_point(&azimuth_pose.position);
+            let line = pose.inverse_transform_vector(&line);
+            // A ray that misses the circle around a body crosses none of its walls.
+            let (aside, ahead) = (line.perp(&from.coords).abs(), -line.dot(&from.coords));
+            if aside > MOVER_M * reach_m || ahead < -MOVER_M * reach_m {
+                continue;
+            }
+            for wall in &mover.body.walls {
+                if let Some(share) = crossing(from, line, wall) {
+                    add(u32::MAX, wall, share);
+                }
+            }
+        }
+    }
+
+    /// Two-way share of the power that passes to a scatterer of `body` at `range_m` and an azimuth
+    /// with fractions.
+    pub fn transmission(&self, azimuth: f64, range_m: f64, body: u32) -> f32 {
+        let nearer = range_m as f32 - CLEARANCE_M;
+        self.ray(azimuth)
+            .iter()
+            .take_while(|wall| wall.range_m < nearer)
+            .filter(|wall| body == NO_BODY || wall.body != body)
+            .map(|wall| wall.transmission)
+            .product()
+    }
+
+    /// Two-way share of the power that passes to a range along the axis of an azimuth's beam.
+    pub fn transmission_along(&self, azimuth: usize, range_m: f64) -> f32 {
+        self.transmission(azimuth as f64, range_m, NO_BODY)
+    }
+
+    /// The walls along the ray nearest to an azimuth, nearest first.
+    pub fn ray(&self, azimuth: f64) -> &[WallHit] {
+        // The cast turns negative numbers into zero.
+        let ray = ((azimuth + MARGIN as f64) * RAYS as f64 + 0.5) as usize;
+        let ray = ray.min(self.starts.len() - 2);
+        &self.passed[self.starts[ray]..self.starts[ray + 1]]
+    }
+
+    /// The first walls of all rays within the sweep.
+    pub fn first_walls(&self, azimuths: usize) -> impl Iterator<Item = &WallHit> {
+        let rays = MARGIN * RAYS..(azimuths + MARGIN) * RAYS;
+        rays.filter_map(|ray| self.passed[self.starts[ray]..self.starts[ray + 1]].first())
+    }
+}

@@ -1,0 +1,152 @@
+//! All that stands still around the sensor, indexed by place.
+
+use nalgebra::Point2;
+
+use crate::body::{Body, Scatterer, Wall};
+use crate::occlusion::WallGrid;
+use crate::relief::Relief;
+
+/// Metres a side of the tiles that scatterers are sorted into.
+const TILE_M: f64 = 16.0;
+
+/// All that stands still around the sensor.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Tile by tile; within a tile in the given order.
+    scatterers: Vec<Scatterer>,
+    corner: Point2<f64>,
+    columns: usize,
+    rows: usize,
+    /// `tile_start[t]..tile_start[t + 1]` are the scatterers of tile `t`.
+    tile_start: Vec<usize>,
+    walls: WallGrid,
+    relief: Relief,
+}
+
+impl World {
+    /// Indexes scatterers and walls.
+    pub fn new(content: Body) -> Self {
+        let Body {
+            mut scatterers,
+            walls,
+        } = content;
+        let places = || scatterers.iter().map(|scatterer| scatterer.position);
+        let origin = Point2::origin();
+        let corner = places().fold(origin, |a, b| a.inf(&b));
+        let size = (places().fold(origin, |a, b| a.sup(&b)) - corner) / TILE_M;
+        let (columns, rows) = (size.x as usize + 1, size.y as usize + 1);
+        let tile = |scatterer: &Scatterer| {
+            let place = (scatterer.position - corner) / TILE_M;
+            place.y as usize * columns + place.x as usize
+        };
+        scatterers.sort_by_cached_key(tile);
+        let mut tile_start = vec![0; columns * rows + 1];
+        for scatterer in &scatterers {
+            tile_start[tile(scatterer) + 1] += 1;
+        }
+        for index in 1..tile_start.len() {
+            tile_start[index] += tile_start[index - 1];
+        }
+        Self {
+            scatterers,
+            corner,
+            columns,
+            rows,
+            tile_start,
+            walls: WallGrid::new(walls),
+            relief: Relief::LEVEL,
+        }
+    }
+
+    /// The same world on another ground; without it, it is level.
+    #[must_use]
+    pub fn on(self, relief: Relief) -> Self {
+        Self { relief, ..self }
+    }
+
+    /// The ground.
+    pub fn relief(&self) -> Relief {
+        self.relief
+    }
+
+    /// All scatterers.
+    pub fn scatterers(&self) -> &[Scatterer] {
+        &self.scatterers
+    }
+
+    /// Runs of scatterers that include all within `reach_m` of a place, and some beyond.
+    pub fn around(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &[Scatterer]> {
+        let low = (place - self.corner).add_scalar(-reach_m) / TILE_M;
+        let high = (place - self.corner).add_scalar(reach_m) / TILE_M;
+        let span = |low: f64, high: f64, end: usize| {
+            let clamp = |v: f64| v.floor().clamp(-1.0, end as f64);
+            (
+                clamp(low).max(0.0) as usize,
+                (clamp(high) + 1.0).clamp(0.0, end as f64) as usize,
+            )
+        };
+        let (first, end) = span(low.x, high.x, self.columns);
+        let (top, bottom) = span(low.y, high.y, self.rows);
+        let row = move |row: usize| {
+            let tile = row * self.columns;
+            &self.scatterers[self.tile_start[tile + first]..self.tile_start[tile + end.max(first)]]
+        };
+        (top..bottom).map(row)
+    }
+
+    /// All walls.
+    pub fn walls(&self) -> &[Wall] {
+        self.walls.walls()
+    }
+
+    /// Two-way share of the power that passes between two points; walls of `body` are ignored.
+    /// Stops as soon as the share is below `negligible`.
+    pub fn transmission(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        body: u32,
+        negligible: f64,
+    ) -> f64 {
+        self.walls.transmission(from, to, body, negligible)
+    }
+
+    /// Visits the walls between two points, each once: its number in [`World::walls`], and the
+    /// share of the line at which it is crossed.
+    pub fn walls_between(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        see: &mut impl FnMut(u32, &Wall, f64),
+    ) {
+        self.walls.between(from, to, see);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::NO_BODY;
+
+    #[test]
+    fn around_includes_all_that_is_near() {
+        let at = |i: i32, j: i32| Point2::new(f64::from(i) * 7.3 - 90.0, f64::from(j) * 9.1 - 40.0);
+        let scatterer = |position| Scatterer::all_round(position, 1.0, NO_BODY);
+        let scatterers = (0..40)
+            .flat_map(|i| (0..20).map(move |j| scatterer(at(i, j))))
+            .collect();
+        let world = World::new(Body::of(scatterers));
+        assert_eq!(world.scatterers().len(), 800);
+        for (place, reach_m) in [
+            ((0.0, 0.0), 30.0),
+            ((-300.0, 20.0), 250.0),
+            ((190.0, 130.0), 5.0),
+            ((0.0, 900.0), 9.0),
+        ] {
+            let place = Point2::new(place.0, place.1);
+            let near = |s: &&Scatterer| (s.position - place).norm() <= reach_m;
+            let found = world.around(place, reach_m).flatten().filter(near).count();
+            assert_eq!(found, world.scatterers().iter().filter(near).count());
+        }
+    }
+}

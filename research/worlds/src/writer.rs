@@ -1,0 +1,182 @@
+//! Writes a simulated drive to a folder, on all processors. Resumes an interrupted one.
+
+mod removal;
+mod resume;
+
+use std::fs::{self, File};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use gyre_datasets::ImageSource as _;
+
+use crate::config::SimulationConfig;
+use crate::error::SimulatorError;
+use crate::image::write_image;
+use crate::simulated_drive::SimulatedDrive;
+
+pub use removal::remove_dataset;
+pub use resume::MADE_BY;
+
+/// The result of writing a dataset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// The dataset's folder.
+    pub folder: PathBuf,
+    /// Scans in the dataset.
+    pub scans: usize,
+    /// Scans that existed already.
+    pub kept: usize,
+    /// Length of the path from the first scan to the last, metres (sum of the straight lines
+    /// between scans).
+    pub path_m: f64,
+    /// Time from the first scan to the last, seconds.
+    pub duration_s: f64,
+}
+
+/// Calls [`write_dataset_on`] with one thread for each processor.
+///
+/// # Errors
+/// As [`write_dataset_on`].
+pub fn write_dataset(
+    config: &SimulationConfig,
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Summary, SimulatorError> {
+    write_dataset_on(
+        std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        config,
+        out,
+        progress,
+    )
+}
+
+/// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls
+/// `progress(done, total)` for each image.
+///
+/// The files are the same, byte for byte, for the same configuration and any number of threads.
+/// Images of an earlier call with the same configuration are kept, if it was interrupted or had
+/// fewer scans; the first and the last of them are compared with newly rendered ones.
+///
+/// # Errors
+/// [`SimulatorError`] if `config` cannot be simulated, if `out` holds another dataset or images of
+/// unknown origin, if another process writes to it, or if it cannot be written.
+pub fn write_dataset_on(
+    threads: NonZeroUsize,
+    config: &SimulationConfig,
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Summary, SimulatorError> {
+    let drive = SimulatedDrive::new(config)?;
+    let images = out.join(drive.image_folder());
+    fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
+    let _alone = lock(out)?;
+    let missing = resume::missing(&drive, config, out)?;
+    gyre_storage::write(&out.join(MADE_BY), resume::made_by(config)?)?;
+    let options = resume::dataset_options(&drive)?;
+    gyre_storage::write(&out.join(resume::DATASET_OPTIONS), options)?;
+    write_side_files(&drive, out)?;
+    let kept = drive.scans() - missing.len();
+    progress(kept, drive.scans());
+    let mut written = |done| progress(kept + done, drive.scans());
+    write_images(&drive, &missing, threads.get(), &images, &mut written)?;
+    Ok(summary(&drive, out, kept))
+}
+
+/// Locks the folder for this process until the returned file is dropped.
+fn lock(folder: &Path) -> Result<File, SimulatorError> {
+    let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
+    match handle.try_lock() {
+        Ok(()) => Ok(handle),
+        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy {
+            folder: folder.to_owned(),
+        }),
+        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write {
+            path: folder.to_owned(),
+            source,
+        }),
+    }
+}
+
+fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
+    let simulator = drive.simulator();
+    let last = simulator.scans() - 1;
+    let step_m = |i: usize| {
+        (simulator.pose(i).inverse() * simulator.pose(i + 1))
+            .translation
+            .vector
+            .norm()
+    };
+    Summary {
+        folder: out.to_owned(),
+        scans: simulator.scans(),
+        kept,
+        path_m: (0..last).map(step_m).sum(),
+        duration_s: (simulator.time(last).start_us - simulator.time(0).start_us) as f64 * 1e-6,
+    }
+}
+
+fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorError> {
+    for (name, bytes) in drive.side_files() {
+        let path = out.join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
+        }
+        gyre_storage::write(&path, &bytes)?;
+    }
+    Ok(())
+}
+
+/// Renders and writes the scans in `missing`; each thread takes the next one that is left.
+fn write_images(
+    drive: &SimulatedDrive,
+    missing: &[usize],
+    threads: usize,
+    folder: &Path,
+    progress: &mut dyn FnMut(usize),
+) -> Result<(), SimulatorError> {
+    let next = AtomicUsize::new(0);
+    let (sender, results) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(missing.len()) {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || work(drive, folder, missing, next, &sender));
+        }
+        drop(sender);
+        let mut outcome = Ok(());
+        for (done, result) in results.iter().enumerate() {
+            if result.is_err() && outcome.is_ok() {
+                // No thread takes another scan; those in work are completed.
+                next.store(missing.len(), Ordering::Relaxed);
+                outcome = result;
+            }
+            progress(done + 1);
+        }
+        outcome
+    })?;
+    Ok(gyre_storage::sync_folder(folder)?)
+}
+
+fn work(
+    drive: &SimulatedDrive,
+    folder: &Path,
+    missing: &[usize],
+    next: &AtomicUsize,
+    results: &mpsc::Sender<Result<(), SimulatorError>>,
+) {
+    let (mut renderer, size) = (drive.renderer(), drive.image_size());
+    let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
+    while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+        renderer.draw(index, &mut pixels);
+        let written = write_image(
+            &folder.join(drive.image_name(index)),
+            size,
+            &pixels,
+            &mut encoded,
+        );
+        if results.send(written).is_err() {
+            return;
+        }
+    }
+}

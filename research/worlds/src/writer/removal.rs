@@ -1,0 +1,71 @@
+//! Removes a dataset that was written here, and nothing else.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::resume::{DATASET_OPTIONS, MADE_BY, made_with};
+use crate::error::SimulatorError;
+use crate::simulated_drive::SimulatedDrive;
+
+/// Removes the dataset in `folder` with the configuration that made it.
+///
+/// # Errors
+/// [`SimulatorError::OutputInUse`] if the folder holds a file that is not of such a dataset: then
+/// nothing is removed. [`SimulatorError::Busy`] if another process writes to it.
+pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
+    let _alone = super::lock(folder)?;
+    let found = files(folder)?;
+    let in_use = |other: &Path| SimulatorError::OutputInUse {
+        folder: folder.to_owned(),
+        other: other.display().to_string(),
+    };
+    let ours = match made_with(folder)? {
+        Some(config) => files_of(&SimulatedDrive::new(&config)?),
+        None => BTreeSet::new(),
+    };
+    if let Some(other) = found
+        .iter()
+        .find(|path| !ours.contains(*path) && !gyre_storage::is_draft(path))
+    {
+        return Err(in_use(other));
+    }
+    // What says whose dataset it is goes last.
+    let (last, first): (Vec<_>, Vec<_>) = found
+        .iter()
+        .partition(|path| path.as_path() == Path::new(MADE_BY));
+    for path in first.into_iter().chain(last).map(|path| folder.join(path)) {
+        fs::remove_file(&path).map_err(SimulatorError::write(&path))?;
+    }
+    Ok(())
+}
+
+/// The files of a dataset, relative to its folder.
+fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
+    let images = (0..drive.scans())
+        .map(|index| Path::new(drive.image_folder()).join(drive.image_name(index)));
+    let beside = drive.side_files().into_iter().map(|(name, _)| name);
+    images
+        .chain(beside)
+        .chain([MADE_BY.into(), DATASET_OPTIONS.into()])
+        .collect()
+}
+
+/// Lists the files in a folder and in those below it, relative to it.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, SimulatorError> {
+    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(next) = folders.pop() {
+        let listing = |source| SimulatorError::List {
+            folder: next.clone(),
+            source,
+        };
+        for entry in fs::read_dir(&next).map_err(listing)? {
+            let entry = entry.map_err(listing)?;
+            match entry.file_type().map_err(listing)?.is_dir() {
+                true => folders.push(entry.path()),
+                false => files.extend(entry.path().strip_prefix(folder).map(Path::to_owned)),
+            }
+        }
+    }
+    Ok(files)
+}

@@ -1,0 +1,142 @@
+//! Localisation of a run in the map of an earlier drive, while it drives.
+//!
+//! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place
+//! as a `fix`. It writes no file: its fixes depend only on the keyframes and the map, whenever the
+//! keyframes arrive.
+
+use std::path::PathBuf;
+
+use gyre_geometry::{covariance, xy_yaw};
+use gyre_messages::{Fix, FixHeader, Item, fix_status};
+use gyre_radar::points::PointsConfig;
+use gyre_scan_matching::RefinementConfig;
+use gyre_slam::localisation::{
+    Localisation, Localiser, LocaliserOptions, Map, Observation, Status,
+};
+use gyre_slam::{Keyframe, RecordReader, SlamConfig};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+/// Runs the follower to the end of the keyframes, or until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let slam: SlamConfig = launch.section("slam")?;
+    let refinement: RefinementConfig = launch.section("refinement")?;
+    let points: PointsConfig = launch.section("points")?;
+    let failed = |error: &dyn std::error::Error| StageError::Configuration(error.to_string());
+    let map = Map::open(&slam.map).map_err(|error| failed(&error))?;
+    let options = LocaliserOptions::default();
+    let localiser = Localiser::new(map, options, &refinement, points.capacity);
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let out = launch.manifest.out.clone();
+    let mut places = Fixes {
+        keyframes: RecordReader::open(&out)?,
+        localiser: localiser.map_err(|error| failed(&error))?,
+        read: 0,
+        out,
+    };
+    follower::run(launch, &mut places)
+}
+
+struct Fixes {
+    /// The folder of the results.
+    out: PathBuf,
+    keyframes: RecordReader<Keyframe>,
+    localiser: Localiser,
+    read: usize,
+}
+
+impl Fixes {
+    /// Looks for new keyframes. If some of the keyframes that were read have been cut off, it
+    /// restarts from the first keyframe.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.keyframes.refresh()?;
+        if self.keyframes.unchanged() < self.read {
+            self.keyframes = RecordReader::open(&self.out)?;
+            self.localiser.reset();
+            self.read = 0;
+        }
+        Ok(())
+    }
+
+    fn locate_next(&mut self) -> Result<FixHeader, StageError> {
+        let keyframe = self.keyframes.read(self.read)?;
+        let found = self.localiser.locate(&Observation {
+            stamp_ns: keyframe.stamp_ns,
+            points: &keyframe.points,
+            twist: keyframe.twist,
+            motion: keyframe.motion,
+        });
+        let header = header(self.read, &keyframe, &found, self.localiser.map());
+        self.read += 1;
+        Ok(header)
+    }
+}
+
+impl Follower for Fixes {
+    type Output = Fix;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes];
+
+    fn step(&mut self) -> Result<Step<FixHeader>, StageError> {
+        self.look()?;
+        if self.read < self.keyframes.len() {
+            return Ok(Step::Worked(Some(self.locate_next()?)));
+        }
+        Ok(match self.keyframes.has_ended() {
+            true => Step::Ended,
+            false => Step::Idle,
+        })
+    }
+
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.read as u64,
+            total: self.keyframes.len() as u64,
+        }
+    }
+}
+
+fn header(index: usize, keyframe: &Keyframe, found: &Localisation, map: &Map) -> FixHeader {
+    let item = Item {
+        seq: index as u64,
+        scan: keyframe.scan,
+        previous_scan: keyframe.scan,
+        stamp_ns: keyframe.stamp_ns,
+        ..Item::default()
+    };
+    let status = match found.status {
+        Status::Lost => fix_status::LOST,
+        Status::Found => fix_status::FOUND,
+        Status::Tracked => fix_status::TRACKED,
+        // Away from the map a prediction is no place.
+        Status::Predicted if found.fix.is_none() => fix_status::LOST,
+        Status::Predicted => fix_status::PREDICTED,
+    };
+    let Some(fix) = &found.fix else {
+        return FixHeader {
+            item,
+            keyframe_seq: keyframe.seq,
+            status,
+            ..FixHeader::default()
+        };
+    };
+    let [x_m, y_m, yaw_rad] = xy_yaw(&fix.pose.motion);
+    FixHeader {
+        item,
+        keyframe_seq: keyframe.seq,
+        status,
+        place: map.keyframes()[fix.keyframe].scan,
+        x_m,
+        y_m,
+        yaw_rad,
+        covariance: covariance::pack(&fix.pose.covariance),
+        correlation: fix.correlation,
+    }
+}

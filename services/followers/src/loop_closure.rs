@@ -1,0 +1,277 @@
+//! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
+//! run.
+//!
+//! It follows `journal/keyframes.log`. It keeps the places of keyframes in `journal/places.log` and
+//! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
+//! logs. Both follow from the keyframes, whenever those come.
+
+use std::{collections::VecDeque, path::PathBuf};
+
+use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
+use gyre_journal::loops::loop_header;
+use gyre_messages::{Loop, LoopHeader};
+use gyre_radar::points::PointsConfig;
+use gyre_scan_matching::RefinementConfig;
+use gyre_slam::{
+    ClosingError, Keyframe, KeyframeSource, LoopCloser, LoopOptions, Place, Query, RecordLog,
+    RecordReader, SlamConfig,
+};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, Growth, LogId, Progress, Step},
+};
+
+/// Runs the follower to the end of the keyframes, or until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let settings = Settings {
+        out: launch.manifest.out.clone(),
+        slam: launch.section("slam")?,
+        refinement: launch.section("refinement")?,
+        points: launch.section("points")?,
+    };
+    let growth = Growth::of(launch, LogId::Loops)?;
+    let mut state = State::open(&settings)?;
+    state.restore(None)?;
+    follower::run(
+        launch,
+        &mut LoopClosing {
+            settings,
+            growth,
+            state,
+        },
+    )
+}
+
+struct LoopClosing {
+    settings: Settings,
+    growth: Growth,
+    state: State,
+}
+
+struct Settings {
+    /// The folder of the results.
+    out: PathBuf,
+    slam: SlamConfig,
+    refinement: RefinementConfig,
+    points: PointsConfig,
+}
+
+impl Settings {
+    fn closer(&self) -> Result<LoopCloser, StageError> {
+        LoopCloser::new(
+            LoopOptions {
+                submap_reach_m: self.slam.submap_reach_m,
+                ..LoopOptions::default()
+            },
+            &self.refinement,
+            self.points.capacity,
+        )
+        .map_err(|error| StageError::Configuration(error.to_string()))
+    }
+}
+
+impl Follower for LoopClosing {
+    type Output = Loop;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes];
+
+    fn step(&mut self) -> Result<Step<LoopHeader>, StageError> {
+        if let Some(unchanged) = self.state.look()? {
+            self.state.closer = self.settings.closer()?;
+            self.state.restore(Some(unchanged))?;
+        }
+        let step = self.state.step()?;
+        if self.state.has_appended {
+            self.state.has_appended = false;
+            self.growth.notify()?;
+        }
+        Ok(step)
+    }
+
+    fn sync(&mut self) -> Result<(), StageError> {
+        self.state.places.sync()?;
+        Ok(self.state.queries.sync()?)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.state.queries.len() as u64,
+            total: self.state.keyframes.len() as u64,
+        }
+    }
+}
+
+/// The logs and the records read so far.
+struct State {
+    keyframes: RecordReader<Keyframe>,
+    places: RecordLog<Place>,
+    queries: RecordLog<Query>,
+    closer: LoopCloser,
+    submap_reach_m: f64,
+    /// Number of loops so far.
+    loops: u64,
+    /// Loops that are to be published.
+    pending: VecDeque<LoopHeader>,
+    /// True if the closer knows that no keyframes follow.
+    has_finished: bool,
+    /// True if the queries have grown.
+    has_appended: bool,
+}
+
+impl State {
+    fn open(settings: &Settings) -> Result<Self, StageError> {
+        Ok(Self {
+            keyframes: RecordReader::open(&settings.out)?,
+            places: RecordLog::open(&settings.out)?,
+            queries: RecordLog::open(&settings.out)?,
+            closer: settings.closer()?,
+            submap_reach_m: settings.slam.submap_reach_m,
+            loops: 0,
+            pending: VecDeque::new(),
+            has_finished: false,
+            has_appended: false,
+        })
+    }
+
+    /// Gives the places and queries that are there to a new closer, and cuts off those that
+    /// keyframes which are no longer there have led to. `unchanged` is the number of keyframes that
+    /// are as they were; `None`: none was cut off.
+    fn restore(&mut self, unchanged: Option<usize>) -> Result<(), StageError> {
+        let places = self.known_places(unchanged)?;
+        if places < self.places.len() {
+            self.places.cut(places)?;
+        }
+        let is_whole = self.keyframes.has_ended() && unchanged.is_none();
+        if !is_whole || places < self.queries.len() {
+            // With more keyframes to come, the queries have not ended either.
+            self.queries.cut(places)?;
+        }
+        for index in 0..places {
+            let place = self.places.read(index)?;
+            let restored = self.closer.restore_place::<StageError>(&place);
+            restored.map_err(failed)?;
+        }
+        (self.loops, self.has_finished) = (0, false);
+        self.pending.clear();
+        let mut last = None;
+        for index in 0..self.queries.len() {
+            let query = self.queries.read(index)?;
+            let loops = query.loops().count() as u64;
+            if loops > 0 {
+                last = Some((self.loops, query));
+            }
+            self.loops += loops;
+        }
+        if let Some((before, query)) = last {
+            // An observer that comes now receives the last one.
+            self.loops = before;
+            self.note(&query)?;
+            self.pending.drain(..self.pending.len() - 1);
+        }
+        self.closer.restore_queries(self.queries.len());
+        Ok(())
+    }
+
+    /// Returns how many of the places follow from the keyframes that are there.
+    fn known_places(&mut self, unchanged: Option<usize>) -> Result<usize, StageError> {
+        let keyframes = unchanged.unwrap_or(usize::MAX).min(self.keyframes.len());
+        let places = self.places.len().min(keyframes);
+        if self.keyframes.has_ended() && unchanged.is_none() {
+            return Ok(places);
+        }
+        // A place follows from the keyframes around it.
+        let first = places.saturating_sub(MAX_NEIGHBOURS + 1);
+        let path_m = |index| Ok(self.keyframes.read(index)?.path_m);
+        let path_m: Vec<f64> = (first..keyframes)
+            .map(path_m)
+            .collect::<Result<_, StageError>>()?;
+        let is_incomplete = |place: &usize| {
+            first + neighbours(&path_m, place - first, self.submap_reach_m).end >= keyframes
+        };
+        Ok((first..places).find(is_incomplete).unwrap_or(places))
+    }
+
+    /// Looks for new keyframes. Returns the number of those that are as they were, if some have
+    /// been cut off.
+    fn look(&mut self) -> Result<Option<usize>, StageError> {
+        let known = self.keyframes.len();
+        self.keyframes.refresh()?;
+        let unchanged = self.keyframes.unchanged();
+        let was_cut = unchanged < known || (self.has_finished && !self.keyframes.has_ended());
+        Ok(was_cut.then_some(unchanged))
+    }
+
+    fn step(&mut self) -> Result<Step<LoopHeader>, StageError> {
+        if let Some(found) = self.pending.pop_front() {
+            return Ok(Step::Worked(Some(found)));
+        }
+        let next = self.closer.keyframes();
+        if next < self.keyframes.len() {
+            let pushed = self.keyframes.read(next)?;
+            self.closer.push(&pushed).map_err(input)?;
+            return Ok(Step::Worked(None));
+        }
+        if self.keyframes.has_ended() && !self.has_finished {
+            self.closer.finish();
+            self.has_finished = true;
+        }
+        self.close()
+    }
+
+    /// Describes or queries the next keyframe.
+    fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
+        let mut source = Points(&mut self.keyframes);
+        if let Some(place) = self.closer.describe(&mut source).map_err(failed)? {
+            self.places.append(&place)?;
+            return Ok(Step::Worked(None));
+        }
+        if let Some(query) = self.closer.close(&mut source).map_err(failed)? {
+            self.queries.append(&query)?;
+            self.has_appended = true;
+            self.note(&query)?;
+            return Ok(Step::Worked(self.pending.pop_front()));
+        }
+        if !self.has_finished {
+            return Ok(Step::Idle);
+        }
+        self.queries.end()?;
+        self.has_appended = true;
+        Ok(Step::Ended)
+    }
+
+    /// Counts the loops of a query, which are to be published.
+    fn note(&mut self, query: &Query) -> Result<(), StageError> {
+        for (candidate, _) in query.loops() {
+            let ends = [query.keyframe, candidate.place];
+            let [later, earlier] = ends.map(|index| self.keyframes.read(index));
+            let header = loop_header(self.loops, &later?, &earlier?, candidate);
+            self.loops += 1;
+            self.pending.push_back(header);
+        }
+        Ok(())
+    }
+}
+
+/// Keyframes with their points, read again from the log.
+struct Points<'a>(&'a mut RecordReader<Keyframe>);
+
+impl KeyframeSource for Points<'_> {
+    type Error = StageError;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, StageError> {
+        Ok(self.0.read(index)?)
+    }
+}
+
+fn failed(error: ClosingError<StageError>) -> StageError {
+    match error {
+        ClosingError::Source(error) => error,
+        other => input(other),
+    }
+}
+
+fn input(error: impl std::error::Error) -> StageError {
+    StageError::Input(error.to_string())
+}

@@ -1,0 +1,172 @@
+//! Moving objects: tracks what moves around the vehicle, scan after scan.
+//!
+//! It follows `journal/scans.log`, which has each scan's points and pose. It keeps the objects of
+//! each scan in `journal/objects.log`, and `objects.csv` is made from that log. A restarted process
+//! works through the scans again from the first scan, since an identity can be as old as the run,
+//! and appends the records that the log lacks. Its records depend only on the scans, whenever the
+//! scans arrive.
+
+use std::path::PathBuf;
+
+use gyre_geometry::xy_yaw;
+use gyre_journal::{
+    objects::{LoggedObjects, listed},
+    scans::LoggedScan,
+};
+use gyre_masking::{Library, MaskingConfig};
+use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
+use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
+use gyre_slam::{RecordLog, RecordReader};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+/// Runs the follower to the end of the scans, or until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let config: ObjectsConfig = launch.section("objects")?;
+    let masking: MaskingConfig = launch.section("masking")?;
+    let out = launch.manifest.out.clone();
+    let mut tracking = Tracking {
+        scans: RecordReader::open(&out)?,
+        tracked: RecordLog::open(&out)?,
+        tracker: tracker(&config, &masking)?,
+        config,
+        masking,
+        out,
+        read: 0,
+    };
+    tracking.leave_out_what_was_cut()?;
+    follower::run(launch, &mut tracking)
+}
+
+/// Returns a tracker whose network is computed by the library of learned masks.
+pub fn tracker(
+    config: &ObjectsConfig,
+    masking: &MaskingConfig,
+) -> Result<ObjectTracker, StageError> {
+    let library = Library::find(masking);
+    let library = library.map_err(|error| StageError::Configuration(error.to_string()))?;
+    ObjectTracker::new(config, library.onnx_runtime())
+        .map_err(|error| StageError::Configuration(error.to_string()))
+}
+
+struct Tracking {
+    /// The folder of the results.
+    out: PathBuf,
+    config: ObjectsConfig,
+    masking: MaskingConfig,
+    scans: RecordReader<LoggedScan>,
+    tracked: RecordLog<LoggedObjects>,
+    tracker: ObjectTracker,
+    read: usize,
+}
+
+impl Tracking {
+    /// Looks for new scans. If some of the scans that were read have been cut off, it restarts from
+    /// the first scan.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.scans.refresh()?;
+        if self.scans.unchanged() < self.read {
+            self.tracked.cut(self.scans.unchanged())?;
+            self.scans = RecordReader::open(&self.out)?;
+            self.tracker = tracker(&self.config, &self.masking)?;
+            self.read = 0;
+        }
+        Ok(())
+    }
+
+    /// Cuts off the objects of scans that are not there any more, and the end, if scans may follow.
+    fn leave_out_what_was_cut(&mut self) -> Result<(), StageError> {
+        if !self.scans.has_ended() || self.tracked.len() > self.scans.len() {
+            self.tracked.cut(self.scans.len())?;
+        }
+        Ok(())
+    }
+
+    /// Tracks the objects of the next scan. Returns the message about it, unless the log has them.
+    fn track_next(&mut self) -> Result<Option<ObjectsHeader>, StageError> {
+        let scan = self.scans.read(self.read)?;
+        let placed = PlacedScan {
+            stamp_ns: scan.stamp_ns,
+            pose: scan.pose,
+            twist: scan.twist,
+        };
+        let objects = self
+            .tracker
+            .update(&placed, &scan.points)
+            .map_err(|error| StageError::Input(error.to_string()))?;
+        let known = self.read < self.tracked.len();
+        self.read += 1;
+        if known {
+            return Ok(None);
+        }
+        let header = header(&scan, objects);
+        self.tracked.append(&LoggedObjects {
+            seq: scan.seq,
+            scan: scan.scan,
+            stamp_ns: scan.stamp_ns,
+            objects: objects.to_vec(),
+        })?;
+        Ok(Some(header))
+    }
+}
+
+/// Returns the message about the objects of a scan.
+fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
+    let [x_m, y_m, yaw_rad] = xy_yaw(&scan.pose);
+    let mut header = ObjectsHeader {
+        item: Item {
+            seq: scan.seq,
+            scan: scan.scan,
+            previous_scan: scan.scan,
+            stamp_ns: scan.stamp_ns,
+            ..Item::default()
+        },
+        x_m,
+        y_m,
+        yaw_rad,
+        objects: objects.len() as u64,
+        moving: objects.iter().filter(|object| object.moving).count() as u64,
+        listed: objects.len().min(MAX_LISTED) as u64,
+        ..ObjectsHeader::default()
+    };
+    let away_m = |object: &&Object| (object.position.coords - scan.pose.translation.vector).norm();
+    let mut nearest: Vec<&Object> = objects.iter().collect();
+    nearest.sort_by(|a, b| away_m(a).total_cmp(&away_m(b)));
+    for (place, object) in header.list.iter_mut().zip(nearest) {
+        *place = listed(object);
+    }
+    header
+}
+
+impl Follower for Tracking {
+    type Output = Objects;
+    const LOGS: &'static [LogId] = &[LogId::Scans];
+
+    fn step(&mut self) -> Result<Step<ObjectsHeader>, StageError> {
+        self.look()?;
+        if self.read < self.scans.len() {
+            return Ok(Step::Worked(self.track_next()?));
+        }
+        if !self.scans.has_ended() {
+            return Ok(Step::Idle);
+        }
+        self.tracked.end()?;
+        Ok(Step::Ended)
+    }
+
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(self.tracked.sync()?)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.read as u64,
+            total: self.scans.len() as u64,
+        }
+    }
+}

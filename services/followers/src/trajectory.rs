@@ -1,0 +1,257 @@
+//! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
+//! them and the fixes of GNSS.
+//!
+//! It follows `journal/keyframes.log` and `journal/loops.log`. The log of the fixes is complete
+//! when it starts, or grows: fixes of a live receiver are written to `journal/gnss.csv` here, until
+//! both other logs have ended. A fix counts once both keyframes around it have come.
+//!
+//! During the run, new loops and fixes update the standing estimate, which may depend a little on
+//! their time of arrival. When both logs have ended, the poses are solved again. The last
+//! correction is then a function of the logs alone, and so equals the results that the supervisor
+//! makes from the same logs.
+
+mod live_fixes;
+
+use std::path::PathBuf;
+
+use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
+use gyre_messages::{Correction, CorrectionHeader, Item};
+use gyre_run::SourceConfig;
+use gyre_samples::GnssConfig;
+use gyre_slam::{
+    EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
+    TrajectoryEstimator, TrajectoryOptions,
+};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+use live_fixes::LiveFixes;
+
+/// Runs the follower to the end of both logs, or until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let slam: SlamConfig = launch.section("slam")?;
+    let kind = slam.kind.estimator().ok_or_else(|| {
+        StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
+    })?;
+    let out = &launch.manifest.out;
+    let config: GnssConfig = launch.section("gnss")?;
+    let mut trajectory = Trajectory::open(out, kind, fixes(launch, &config)?)?;
+    // One that is started after the last scan receives no more: that may be of another drive.
+    if config.is_live() && !trajectory.keyframes.has_ended() {
+        trajectory.live_fixes = Some(LiveFixes::open(config, out)?);
+    }
+    follower::run(launch, &mut trajectory)
+}
+
+/// Returns the fixes of GNSS that are known by now; none without `[gnss]`.
+fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
+    let source: SourceConfig = launch.section("source")?;
+    let out = &launch.manifest.out;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(input)?;
+    let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
+    Ok(Fixes::new(fixes, config))
+}
+
+struct Trajectory {
+    /// The folder of the results.
+    out: PathBuf,
+    kind: EstimatorKind,
+    /// The fixes that are later than all keyframes.
+    fixes: Fixes,
+    /// The fixes that arrive during the run.
+    live_fixes: Option<LiveFixes>,
+    keyframes: RecordReader<Keyframe>,
+    queries: RecordReader<Query>,
+    estimator: TrajectoryEstimator,
+    /// The newest keyframe that was read.
+    newest: Option<Keyframe>,
+    /// Keyframes and queries that were read.
+    read: [usize; 2],
+    /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
+    /// corrected no pose yet.
+    corrected: Option<UncertainMotion>,
+    /// True if the poses equal the results.
+    is_final: bool,
+    /// True if something was read since the last correction.
+    has_changed: bool,
+}
+
+impl Trajectory {
+    fn open(out: &std::path::Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
+        let options = TrajectoryOptions {
+            kind,
+            ..TrajectoryOptions::default()
+        };
+        Ok(Self {
+            out: out.to_owned(),
+            kind,
+            keyframes: RecordReader::open(out)?,
+            queries: RecordReader::open(out)?,
+            estimator: TrajectoryEstimator::new(options).with_fixes(fixes.clone()),
+            fixes,
+            live_fixes: None,
+            newest: None,
+            read: [0, 0],
+            corrected: None,
+            is_final: false,
+            has_changed: false,
+        })
+    }
+
+    /// Looks for new records. If some of the records that were read have been cut off, it restarts
+    /// from the first record.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.keyframes.refresh()?;
+        self.queries.refresh()?;
+        let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
+        let was_cut = self
+            .read
+            .iter()
+            .zip(unchanged)
+            .any(|(read, unchanged)| unchanged < *read);
+        if was_cut {
+            *self = Self {
+                live_fixes: self.live_fixes.take(),
+                ..Self::open(&self.out.clone(), self.kind, self.fixes.clone())?
+            };
+        }
+        Ok(())
+    }
+
+    /// Reads the next record; returns false if there is no new record.
+    fn advance(&mut self) -> Result<bool, StageError> {
+        let [keyframes, queries] = self.read;
+        if keyframes < self.keyframes.len() {
+            let keyframe = self.keyframes.read_without_points(keyframes)?;
+            let fixes = self.estimator.fixes().settled();
+            self.estimator.push(&keyframe).map_err(input)?;
+            // Without a new loop or fix the poses before stay where they are.
+            let standing = self.corrected.map(|last| last.then(&keyframe.motion));
+            self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
+            self.newest = Some(keyframe);
+            self.read[0] += 1;
+        } else if queries < self.queries.len() {
+            let query = self.queries.read(queries)?;
+            if query.keyframe >= keyframes {
+                // Its keyframe has been cut off, and the query will be.
+                return Ok(false);
+            }
+            if query.loops().next().is_some() {
+                self.corrected = None;
+            }
+            self.estimator.close(&query).map_err(input)?;
+            self.read[1] += 1;
+        } else {
+            return Ok(false);
+        }
+        self.has_changed = true;
+        Ok(true)
+    }
+
+    /// Takes the fixes that have arrived; at the end of the run all of them.
+    fn take_live_fixes(&mut self) -> Result<(), StageError> {
+        let Some(live) = &mut self.live_fixes else {
+            return Ok(());
+        };
+        if let Some(fixes) = live.take(self.is_final)? {
+            self.fixes = fixes.clone();
+            if self.estimator.replace_fixes(fixes) {
+                self.corrected = None;
+            }
+        }
+        Ok(())
+    }
+
+    /// Corrects the poses by all that was read.
+    fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
+        let Some(newest) = &self.newest else {
+            return Ok(None);
+        };
+        let [keyframes, queries] = self.read;
+        let corrected = match self.corrected {
+            Some(corrected) => corrected,
+            None => {
+                match self.is_final {
+                    true => self.estimator.solve().map_err(input)?,
+                    false => self.estimator.update().map_err(input)?,
+                }
+                self.estimator.pose(keyframes - 1).map_err(input)?
+            }
+        };
+        self.corrected = Some(corrected);
+        let loops = self.estimator.loops().iter();
+        let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
+        let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
+        let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
+        Ok(Some(CorrectionHeader {
+            item: Item {
+                seq: (keyframes + queries + usize::from(self.is_final)) as u64 - 1,
+                scan: newest.scan,
+                previous_scan: newest.scan,
+                stamp_ns: newest.stamp_ns,
+                ..Item::default()
+            },
+            keyframe_seq: newest.seq,
+            keyframes: keyframes as u64,
+            loops: used.count() as u64,
+            x_m,
+            y_m,
+            yaw_rad,
+            keyframe_covariance: covariance::pack(&corrected.covariance),
+        }))
+    }
+}
+
+impl Follower for Trajectory {
+    type Output = Correction;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
+
+    fn step(&mut self) -> Result<Step<CorrectionHeader>, StageError> {
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        self.look()?;
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        // The queries end after the keyframes.
+        let has_ended = self.queries.has_ended() && self.keyframes.has_ended();
+        if has_ended && !self.is_final {
+            (self.has_changed, self.corrected) = (true, None);
+        }
+        self.is_final = has_ended;
+        if self.has_changed {
+            self.has_changed = false;
+            self.take_live_fixes()?;
+            return Ok(Step::Worked(self.correct()?));
+        }
+        Ok(match has_ended {
+            true => Step::Ended,
+            false => Step::Idle,
+        })
+    }
+
+    fn sync(&mut self) -> Result<(), StageError> {
+        let received = self.live_fixes.as_mut();
+        received.map_or(Ok(()), LiveFixes::finish)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.read[1] as u64,
+            total: self.keyframes.len() as u64,
+        }
+    }
+}
+
+fn input(error: impl std::error::Error) -> StageError {
+    StageError::Input(error.to_string())
+}
+
+#[cfg(test)]
+mod tests;

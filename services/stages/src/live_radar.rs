@@ -1,0 +1,32 @@
+//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as
+//! ASTERIX CAT-240 by UDP, and publishes each sweep on `scan`, written directly into shared memory.
+//!
+//! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
+//! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
+//! (the completion time of a scan).
+
+mod ask;
+mod connection;
+mod health_log;
+mod intake;
+mod parser;
+mod radar;
+mod read_delay;
+mod scan_assembly;
+mod settings;
+mod turn_counter;
+
+use gyre_stage::{Launch, StageCounters, StageError, source};
+
+pub use ask::{AskError, Sizes, ask};
+pub use connection::RadarSocket;
+pub use gyre_colossus::PORT;
+pub use intake::{Intake, NoScans};
+pub use parser::RadarParser;
+pub use settings::{Settings, encoder_counts, silence};
+
+/// Receives the scans of a radar until SIGTERM, or until there are enough.
+pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
+    let scans = settings.scans;
+    source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
+}

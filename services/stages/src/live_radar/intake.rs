@@ -1,0 +1,141 @@
+//! Azimuths and configurations of a live source to scans, with counts, whatever the transport.
+
+use std::{fmt::Display, time::Duration};
+
+use gyre_colossus::{Azimuth, BadConfiguration, Configuration, Constants};
+use gyre_messages::ScanHeader;
+use gyre_stage::source::Received;
+use thiserror::Error;
+
+use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
+
+/// Assembles the scans of a live source, and counts losses.
+pub struct Intake {
+    constants: Constants,
+    /// `None` until the radar has sent its configuration.
+    scans: Option<ScanAssembly>,
+    turns: TurnCounter,
+    /// The counts of the source process before this one, if it died.
+    before: Received,
+    missing: u64,
+    damaged: u64,
+    due_ns: Option<i64>,
+}
+
+/// A configuration whose scans do not fit into this run.
+#[derive(Debug, Error)]
+pub enum NoScans {
+    #[error(transparent)]
+    Bad(#[from] BadConfiguration),
+    #[error(
+        "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
+    )]
+    TooLarge {
+        /// The bytes of a scan.
+        bytes: usize,
+        /// The bytes that the run has for a scan.
+        room: usize,
+    },
+}
+
+impl Intake {
+    /// Creates an intake without a configuration.
+    pub fn new(constants: Constants) -> Self {
+        Self {
+            constants,
+            scans: None,
+            turns: TurnCounter::resume(None, 0),
+            before: Received::default(),
+            missing: 0,
+            damaged: 0,
+            due_ns: None,
+        }
+    }
+
+    /// Begins the scans of a configuration of at most `room` bytes; false if it is not new.
+    pub fn configure(&mut self, radar: Configuration, room: usize) -> Result<bool, NoScans> {
+        if self.scans.as_ref().is_some_and(|scans| scans.is_of(&radar)) {
+            return Ok(false);
+        }
+        let new = ScanAssembly::new(radar, self.constants)?;
+        let bytes = new.bytes();
+        if bytes > room {
+            return Err(NoScans::TooLarge { bytes, room });
+        }
+        self.turns.configure(radar.period_ns());
+        self.scans = Some(new);
+        Ok(true)
+    }
+
+    /// Returns whether there is a configuration.
+    pub fn is_configured(&self) -> bool {
+        self.scans.is_some()
+    }
+
+    /// Discards the configuration and the partial scan, for a new connection.
+    pub fn restart(&mut self) {
+        self.scans = None;
+    }
+
+    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); true if a scan is complete.
+    /// Without a configuration it is dropped.
+    pub fn add(
+        &mut self,
+        azimuth: Azimuth<'_>,
+        arrival_ns: i64,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> bool {
+        let scans = self.scans.as_mut();
+        let scan =
+            scans.and_then(|scans| scans.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
+        if let Some(scan) = scan {
+            self.missing += scan.missing as u64;
+            self.due_ns = scan.due_ns;
+        }
+        scan.is_some()
+    }
+
+    /// Counts a message that cannot be used.
+    pub fn damaged(&mut self, reason: impl Display, skipped_bytes: usize) {
+        self.damaged += 1;
+        // There may be thousands in a second.
+        if self.damaged.is_power_of_two() {
+            let so_far = self.damaged;
+            tracing::warn!(
+                skipped_bytes,
+                so_far,
+                "the radar's messages are damaged: {reason}"
+            );
+        }
+    }
+
+    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
+    pub fn pause(&self) -> Option<Duration> {
+        self.scans.as_ref().and_then(ScanAssembly::pause)
+    }
+
+    /// Returns the time when the last scan was complete by the radar's clock, in `CLOCK_MONOTONIC`,
+    /// ns; `None`: not known.
+    pub fn due_ns(&self) -> Option<i64> {
+        self.due_ns
+    }
+
+    /// Continues the counts of a source process that has died.
+    pub fn resume(&mut self, before: Received) {
+        self.turns = TurnCounter::resume(before.last_scan, before.scans_left_out);
+        self.before = before;
+    }
+
+    /// Returns the counts since the start of the run, connections not included.
+    pub fn received(&self) -> Received {
+        let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
+        Received {
+            missing_azimuths: self.before.missing_azimuths + self.missing,
+            scans_left_out: self.turns.left_out(is_open),
+            damaged_messages: self.before.damaged_messages + self.damaged,
+            last_scan: self.turns.last(),
+            ..self.before
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! The assembly of azimuths to scans, for one connection to a radar.
+
+use std::time::Duration;
+
+use gyre_colossus::{
+    Azimuth, BadConfiguration, Configuration, Constants, FoundClock, RadarClock, SweepAssembler,
+};
+use gyre_messages::ScanHeader;
+use gyre_stage::{clock, source::LastScan};
+
+use crate::live_radar::{
+    read_delay::ReadDelay,
+    turn_counter::{AzimuthTime, TurnCounter},
+};
+
+/// The most azimuths that are read at once. The buffers of sockets hold many more.
+const BATCH: f64 = 10.0;
+/// The part of the azimuths up to the end of a turn: the radar may turn faster than configured.
+const BATCH_SHARE: f64 = 0.5;
+
+/// Assembles the azimuths of one connection to scans.
+pub struct ScanAssembly {
+    radar: Configuration,
+    clock: RadarClock,
+    assembler: SweepAssembler,
+    delay: ReadDelay,
+    /// True once the kind of the clock is logged.
+    is_clock_logged: bool,
+    /// True once it is logged that the delay of reception is not known.
+    is_delay_logged: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CompleteScan {
+    /// The number of missing azimuths.
+    pub missing: usize,
+    /// The time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: unknown.
+    pub due_ns: Option<i64>,
+}
+
+impl ScanAssembly {
+    pub fn new(radar: Configuration, constants: Constants) -> Result<Self, BadConfiguration> {
+        Ok(Self {
+            clock: RadarClock::new(&radar),
+            assembler: SweepAssembler::new(&radar, constants)?,
+            delay: ReadDelay::default(),
+            radar,
+            is_clock_logged: false,
+            is_delay_logged: false,
+        })
+    }
+
+    /// Returns the bytes of a scan.
+    pub fn bytes(&self) -> usize {
+        self.assembler.limits().bytes
+    }
+
+    /// Returns whether the turn of the newest azimuth can still become a scan.
+    pub fn is_open(&self) -> bool {
+        self.assembler.is_open()
+    }
+
+    /// Adds an azimuth with its time of arrival, ns since 1970; returns the completed scan.
+    pub fn add(
+        &mut self,
+        azimuth: Azimuth<'_>,
+        arrival_ns: i64,
+        turns: &mut TurnCounter,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Option<CompleteScan> {
+        let at_ns = clock::now_ns();
+        let mut complete = None;
+        for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
+            let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
+            let is_start = self.assembler.is_first(azimuth.encoder);
+            let time = AzimuthTime {
+                fraction: fraction.fract(),
+                stamp_ns,
+                at_ns,
+            };
+            turns.note(time, is_start);
+            complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
+            if complete.is_some() {
+                break;
+            }
+        }
+        self.log_clock();
+        let sweep = complete?;
+        header.set_geometry(&sweep.geometry);
+        let last_ns = header.slot(bytes).stamp_ns[sweep.geometry.azimuths - 1];
+        let due_ns = self.due_ns(last_ns, at_ns);
+        // A clock that was set back in the middle of a sweep: no later stage accepts such times.
+        if let Some(Err(error)) = header.view(bytes).map(|scan| scan.check_times()) {
+            tracing::warn!("a scan is left out: {error}");
+            return None;
+        }
+        turns.add(LastScan {
+            stamp_ns: sweep.geometry.stamp_ns,
+            at_ns,
+        });
+        Some(CompleteScan {
+            missing: sweep.missing,
+            due_ns,
+        })
+    }
+
+    /// Returns when a scan was complete by its last azimuth's stamp, read at `at_ns`.
+    fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
+        if self.clock.found() == Some(FoundClock::Arrival) {
+            return None;
+        }
+        let due_ns = self.delay.add(last_ns, at_ns);
+        if let (None, false, Some(pace)) = (due_ns, self.is_delay_logged, self.delay.pace()) {
+            self.is_delay_logged = true;
+            tracing::info!(
+                "The radar's clock advances {:.2} times as fast as this host's: latencies are those from the reading of a scan.",
+                1.0 / pace
+            );
+        }
+        due_ns
+    }
+
+    /// Logs once which clock the stamps are of.
+    fn log_clock(&mut self) {
+        if let (false, Some(found)) = (self.is_clock_logged, self.clock.found()) {
+            self.is_clock_logged = true;
+            tracing::info!("{found}");
+            if found == FoundClock::Arrival {
+                tracing::info!(
+                    "When a scan was complete is not known: latencies are those from its reading."
+                );
+            }
+        }
+    }
+
+    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
+    pub fn pause(&self) -> Option<Duration> {
+        match self.clock.found() {
+            // Stamps are the times of arrival: each azimuth is read when it arrives.
+            None | Some(FoundClock::Arrival) => return None,
+            Some(_) => {}
+        }
+        let azimuths = (self.assembler.azimuths_left()? * BATCH_SHARE).min(BATCH);
+        let per_azimuth_ns = self.radar.period_ns() as f64 / f64::from(self.radar.azimuth_samples);
+        (azimuths >= 2.0).then(|| Duration::from_nanos((azimuths * per_azimuth_ns) as u64))
+    }
+
+    /// Returns whether a configuration makes the same scans.
+    pub fn is_of(&self, radar: &Configuration) -> bool {
+        is_same(&self.radar, radar)
+    }
+}
+
+/// Returns whether two configurations make the same scans.
+fn is_same(one: &Configuration, other: &Configuration) -> bool {
+    let scans = |of: &Configuration| {
+        let counts = [
+            of.azimuth_samples,
+            of.range_in_bins,
+            of.encoder_size,
+            of.rotation_mhz,
+        ];
+        (counts, of.range_resolution_m().to_bits())
+    };
+    scans(one) == scans(other)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use gyre_colossus::{ClockFormat, Powers};
+
+    use super::*;
+
+    const START_NS: i64 = 1_700_000_000_000_000_000;
+    const AZIMUTHS: u16 = 400;
+
+    fn scans() -> ScanAssembly {
+        let radar = Configuration {
+            azimuth_samples: AZIMUTHS,
+            bin_size: 438,
+            range_in_bins: 16,
+            encoder_size: 5600,
+            rotation_mhz: 4000,
+            ..Configuration::default()
+        };
+        ScanAssembly::new(radar, Constants::default()).unwrap()
+    }
+
+    /// The assembly of scans in the memory of one scan.
+    struct Source {
+        scans: ScanAssembly,
+        turns: TurnCounter,
+        header: ScanHeader,
+        bytes: Vec<u8>,
+    }
+
+    impl Source {
+        fn new() -> Self {
+            let mut turns = TurnCounter::resume(None, 0);
+            turns.configure(250_000_000);
+            Self {
+                scans: scans(),
+                turns,
+                header: ScanHeader::default(),
+                bytes: vec![0; 400 * 16],
+            }
+        }
+
+        /// Adds an azimuth with this time; returns the missing ones of the scan that it completes.
+        fn add(&mut self, row: u16, stamp_ns: i64) -> Option<usize> {
+            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+            let azimuth = Azimuth {
+                sweep_counter: row,
+                encoder: row * 14,
+                seconds,
+                split_seconds,
+                powers: Powers::Eight(&[7; 16]),
+            };
+            let (header, bytes) = (&mut self.header, &mut self.bytes);
+            let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);
+            scan.map(|scan| scan.missing)
+        }
+
+        /// Adds a turn, in whose middle the clock is set by `step_ns`.
+        fn turn(&mut self, start_ns: i64, step_ns: i64) -> Option<usize> {
+            let mut complete = None;
+            for row in 0..AZIMUTHS {
+                let set_ns = if row < AZIMUTHS / 2 { 0 } else { step_ns };
+                let stamp_ns = start_ns + i64::from(row) * 625_000 + set_ns;
+                complete = self.add(row, stamp_ns).or(complete);
+            }
+            complete
+        }
+    }
+
+    #[test]
+    fn a_scan_in_which_the_clock_is_set_back_is_left_out_and_counted() {
+        let mut source = Source::new();
+        let mut turn = |start_ns, step_ns| {
+            let missing = source.turn(start_ns, step_ns);
+            (missing, source.turns.left_out(source.scans.is_open()))
+        };
+        assert_eq!(turn(START_NS, 0), (Some(0), 0));
+        assert_eq!(turn(START_NS + 250_000_000, -20_000_000), (None, 1));
+        assert_eq!(turn(START_NS + 480_000_000, 0), (Some(0), 1));
+    }
+
+    #[test]
+    fn the_source_sleeps_at_most_half_of_the_time_to_the_end_of_a_scan() {
+        let mut source = Source::new();
+        assert_eq!(source.turn(START_NS, 0), Some(0));
+        let mut pauses = 0;
+        for row in 0..AZIMUTHS {
+            let stamp_ns = START_NS + 250_000_000 + i64::from(row) * 625_000;
+            source.add(row, stamp_ns);
+            let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
+            if let Some(pause) = source.scans.pause() {
+                assert!(2 * pause <= left && pause <= Duration::from_micros(6250));
+                pauses += 1;
+            }
+        }
+        assert_eq!(pauses, AZIMUTHS - 3, "the last ones are awaited");
+    }
+
+    #[test]
+    fn a_configuration_that_differs_in_unused_numbers_is_the_same() {
+        let radar = scans().radar;
+        let unused = Configuration {
+            range_gain: f32::NAN,
+            packet_rate: 9,
+            ..radar
+        };
+        assert!(is_same(&radar, &unused));
+        let other = Configuration {
+            range_in_bins: 17,
+            ..radar
+        };
+        assert!(!is_same(&radar, &other));
+    }
+}

@@ -1,0 +1,59 @@
+//! The settings of a source.
+
+use std::time::Duration;
+
+use gyre_colossus::{Address, BadAddress, Constants};
+use gyre_datasets::DatasetOptions;
+use gyre_run::SourceConfig;
+
+use crate::live_radar::parser::RadarParser;
+
+/// Encoder counts per turn of a radar that does not report them, unless `dataset.encoder_counts` is
+/// set.
+const ENCODER_COUNTS: u16 = 5600;
+
+/// The address of a radar, and the properties that it does not send.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The address where the radar is received.
+    pub address: Address,
+    /// Encoder counts per turn, for rounding the angles of a radar that sends by UDP.
+    pub encoder_counts: u16,
+    /// Time without an azimuth after which the run reconnects.
+    pub silence: Duration,
+    /// Scans to receive; `None`: without end.
+    pub scans: Option<u64>,
+    /// Constants of its ranges and angles.
+    pub constants: Constants,
+}
+
+impl Settings {
+    /// Returns the settings of the section `[source]`, with the constants of the section
+    /// `[dataset]`.
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, BadAddress> {
+        Ok(Self {
+            address: Address::parse(&source.address, &source.interface)?,
+            encoder_counts: encoder_counts(options),
+            silence: silence(source),
+            scans: source.scans.map(|scans| scans as u64),
+            constants: options.into(),
+        })
+    }
+
+    pub(crate) fn parser(&self) -> RadarParser {
+        RadarParser::new(self.address.is_udp(), self.encoder_counts)
+    }
+}
+
+/// Returns the encoder counts per turn of a radar that does not report them.
+pub fn encoder_counts(options: &DatasetOptions) -> u16 {
+    options.encoder_counts.unwrap_or(ENCODER_COUNTS)
+}
+
+/// Returns the time without a byte or a message after which something is done about it.
+pub fn silence(source: &SourceConfig) -> Duration {
+    match Duration::try_from_secs_f64(source.silence_s) {
+        Ok(silence) if !silence.is_zero() => silence,
+        _ => Duration::MAX,
+    }
+}

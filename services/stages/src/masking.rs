@@ -1,0 +1,187 @@
+//! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion
+//! compensation.
+//!
+//! [`gyre_masking::Masker`] does the work, with a function of Python where one is given (`python`).
+//! `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of taking scans
+//! from the queue; `azimuths` finds those that were lost. The velocity by Doppler is measured here,
+//! where the rows of the scan are.
+
+mod azimuths;
+mod live;
+mod lossless;
+mod motions;
+mod python;
+mod scans;
+
+use gyre_geometry::Twist;
+use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
+use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
+use gyre_radar::{DopplerEstimator, PlacedRows, PointsConfig, RasterConfig};
+use gyre_samples::DopplerConfig;
+use gyre_stage::{
+    Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
+};
+
+use azimuths::Azimuths;
+use scans::{ScanView, Scans};
+
+pub use python::python;
+
+/// Runs the stage until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    work(launch, launch.section("masking")?, None)
+}
+
+/// Runs the stage until SIGTERM with a mask of your own, in the place of a network.
+pub fn run_with(
+    launch: &Launch,
+    function: Box<dyn MaskFunction>,
+) -> Result<StageCounters, StageError> {
+    if launch.manifest.limits.rasters != 1 {
+        return Err(StageError::Configuration(
+            "a function masks one scan at a time, and the network of this run two: name the function when the run is begun, or choose masking.kind `threshold`"
+                .to_owned(),
+        ));
+    }
+    let mut config: MaskingConfig = launch.section("masking")?;
+    if config.kind == MaskKind::Learned {
+        config.kind = MaskKind::Threshold;
+    }
+    work(launch, config, Some(function))
+}
+
+fn work(
+    launch: &Launch,
+    config: MaskingConfig,
+    function: Option<Box<dyn MaskFunction>>,
+) -> Result<StageCounters, StageError> {
+    let raster: RasterConfig = launch.section("raster")?;
+    let points: PointsConfig = launch.section("points")?;
+    let doppler: DopplerConfig = launch.section("doppler")?;
+    let masker = match function {
+        None => Masker::new(&raster, &points, &config),
+        Some(function) => Masker::with_function(&raster, &points, &config, function),
+    };
+    let mut masking = Masking {
+        raster,
+        config,
+        masker: masker.map_err(|error| StageError::Configuration(error.to_string()))?,
+        azimuths: Azimuths::default(),
+        doppler: doppler.is_used().then(DopplerEstimator::default),
+        min_range_m: points.min_range_m,
+        rows: [PlacedRows::default(), PlacedRows::default()],
+    };
+    stage::run(launch, &mut masking)
+}
+
+struct Masking {
+    raster: RasterConfig,
+    config: MaskingConfig,
+    masker: Masker,
+    azimuths: Azimuths,
+    doppler: Option<DopplerEstimator>,
+    /// Nearer echoes are of the vehicle itself.
+    min_range_m: f32,
+    /// Of the scan and of the previous one.
+    rows: [PlacedRows; 2],
+}
+
+impl Stage for Masking {
+    type Inputs = Scans;
+    type Output = Masked;
+    const HOP: StageId = StageId::Masking;
+
+    fn process(
+        &mut self,
+        input: ScanView<'_>,
+        output: &mut Draft<Masked>,
+    ) -> Result<(), StageError> {
+        let failed = |error: MaskError| match error {
+            MaskError::Function(reason) => StageError::Function(reason),
+            error => input.scan.malformed(error.to_string()),
+        };
+        let [rows, previous_rows] = &mut self.rows;
+        let mut place = |received, twist, known, rows| -> Result<_, StageError> {
+            let mut sweep = sweep(received, twist)?;
+            let starts = received.item().is(flag::BREAK);
+            let lost = self.azimuths.lost(&sweep, known, starts);
+            sweep.scan = PlacedRows::place(rows, &sweep.scan, &lost);
+            Ok(sweep)
+        };
+        let previous = match &input.previous {
+            Some(it) => Some(place(it.scan, it.twist, it.lost, previous_rows)?),
+            None => None,
+        };
+        let sweep = place(input.scan, input.twist, input.lost, rows)?;
+        if let Some(previous) = &previous
+            && !self.masker.can_follow(previous.number)
+        {
+            self.masker.set_previous(previous).map_err(failed)?;
+        }
+        let (header, values) = output.parts::<f32>();
+        let parts =
+            MaskedHeader::split(values, self.raster.n, self.masker.scans()).ok_or_else(|| {
+                input
+                    .scan
+                    .malformed("its rasters do not fit into a message")
+            })?;
+        let follows = previous.map(|previous| previous.number);
+        let twist = self
+            .masker
+            .mask(&sweep, follows, parts.later, parts.earlier)
+            .map_err(failed)?;
+        let points = self
+            .masker
+            .points(&sweep.scan, twist, parts.points)
+            .map_err(|error| input.scan.malformed(error.to_string()))?;
+        // Of the scan alone, so that a restart changes nothing.
+        let velocity = self.doppler.as_mut().map(|doppler| {
+            let velocity = doppler.estimate(&sweep.scan, self.min_range_m);
+            velocity.ok()
+        });
+        *header = self.header(twist, points);
+        let azimuths = input.scan.header().azimuths as usize;
+        header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
+        header.set_turn(input.turn);
+        header.set_distance(input.distance);
+        header.set_velocity(velocity.flatten());
+        Ok(())
+    }
+
+    fn identify(&self, item: &mut Item) {
+        item.set_lost_azimuths(&self.azimuths.last());
+    }
+}
+
+impl Masking {
+    fn header(&self, twist: Option<Twist>, points: usize) -> MaskedHeader {
+        MaskedHeader {
+            n: self.raster.n as u32,
+            rasters: self.masker.scans() as u32,
+            cell_m: self.raster.cell_m,
+            mask: match self.config.kind {
+                MaskKind::None => mask_kind::NONE,
+                MaskKind::Threshold => mask_kind::THRESHOLD,
+                MaskKind::Learned => mask_kind::LEARNED,
+            },
+            twist: twist.map_or([0.0; 3], |twist| {
+                [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps].map(|value| value as f32)
+            }),
+            compensated: twist.is_some().into(),
+            points: points as u32,
+            ..MaskedHeader::default()
+        }
+    }
+}
+
+/// Views a received scan, with the velocity for its motion compensation.
+fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, StageError> {
+    let scan = received.header().view(received.values());
+    let scan =
+        scan.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
+    Ok(Sweep {
+        number: received.item().scan,
+        scan,
+        twist,
+    })
+}

@@ -1,0 +1,128 @@
+//! Lossless mode: every scan, in order.
+
+use gyre_messages::{Item, Scan, Window, flag};
+use gyre_stage::{
+    Launch, Listener, StageError,
+    inputs::Action,
+    reader::{Reader, Received},
+};
+
+/// The queue of masking in lossless mode.
+pub struct InOrder {
+    reader: Reader<Scan>,
+    window: Window,
+    /// True once the first scan is processed. After that no scan is skipped, which would leave a
+    /// gap in the output.
+    started: bool,
+}
+
+impl InOrder {
+    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            reader: Reader::open(launch, None)?,
+            window: launch.manifest.window,
+            started: false,
+        })
+    }
+
+    pub fn receive(&mut self) -> Result<(), StageError> {
+        self.reader.head().map(drop)
+    }
+
+    /// Returns what to do with the current scan when `newest_pose` is the number of the newest
+    /// pose.
+    pub fn next_action(&mut self, newest_pose: Option<u64>) -> Result<Action, StageError> {
+        let Some(head) = self.reader.head()? else {
+            return Ok(Action::Wait);
+        };
+        let (item, received_ns) = (*head.item(), head.received_ns);
+        if item.is(flag::END) {
+            return Ok(Action::End(item));
+        }
+        if !self.started
+            && serves_only_as_previous(&self.window, &item, newest_pose, self.previous().is_some())
+        {
+            return Ok(Action::Keep);
+        }
+        self.started = true;
+        Ok(Action::Process(item, received_ns))
+    }
+
+    /// Returns the current scan if one has been received.
+    pub fn current(&self) -> Option<&Received<Scan>> {
+        self.reader.current()
+    }
+
+    /// Returns the previous scan, if the mask takes two and the chain is unbroken.
+    pub fn previous(&self) -> Option<&Received<Scan>> {
+        self.reader.previous()
+    }
+
+    /// Advances to the next scan.
+    pub fn advance(&mut self) {
+        match self.window.masks_pairs() {
+            true => self.reader.advance(),
+            false => self.reader.release(),
+        }
+    }
+
+    /// Returns the listener that the source notifies.
+    pub fn listener(&self) -> &Listener {
+        self.reader.listener()
+    }
+
+    /// Returns the number of scans that were skipped because they had been received before.
+    pub fn duplicates(&self) -> u64 {
+        self.reader.duplicates()
+    }
+}
+
+/// Returns whether a restarted masking has nothing to publish for an item: its readers have it
+/// already, or its own previous scan is missing and its mask would differ from the one before the
+/// restart.
+fn serves_only_as_previous(
+    window: &Window,
+    item: &Item,
+    newest_pose: Option<u64>,
+    has_previous: bool,
+) -> bool {
+    let has_been_read = newest_pose
+        .is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
+    has_been_read || (window.masks_pairs() && !has_previous && !item.is(flag::BREAK))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(seq: u64) -> Item {
+        Item {
+            seq,
+            ..Item::default()
+        }
+    }
+
+    #[test]
+    fn a_restart_begins_with_the_newest_poses_scan_or_the_previous_one_if_masks_take_two() {
+        let window = |look_back| Window {
+            scans: 4,
+            lag: 2,
+            look_back,
+            live_depth: 0,
+            observers: 0,
+            slam: false,
+            localises: false,
+            objects: false,
+        };
+        let kept = |look_back, published, has_previous| {
+            serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)
+        };
+        assert!(kept(1, 8, false) && !kept(1, 9, false));
+        assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
+        let first = Item {
+            flags: flag::BREAK,
+            ..scan(0)
+        };
+        assert!(!serves_only_as_previous(&window(2), &first, None, false));
+    }
+}

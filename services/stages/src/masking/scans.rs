@@ -1,0 +1,236 @@
+//! The inputs of masking: a scan and the motion for its motion compensation.
+
+use gyre_geometry::Twist;
+use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
+use gyre_radar::LostAzimuths;
+use gyre_samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
+use gyre_stage::{
+    Launch, Listener, StageError,
+    inputs::{Action, Inputs},
+    reader::Received,
+};
+
+use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions};
+
+/// The scans, in lossless or in live mode, and the motions.
+pub struct Scans {
+    queue: Queue,
+    motions: Motions,
+    gyro: Gyro,
+    wheels: Wheels,
+    /// The scan whose samples it has taken last.
+    sampled: Option<u64>,
+    window: Window,
+    /// The motions for the current and for the previous scan.
+    found: [Option<SearchedMotion>; 2],
+    /// Where azimuths of both were lost, if they have poses.
+    lost: [Option<LostAzimuths>; 2],
+}
+
+enum Queue {
+    Lossless(Box<InOrder>),
+    Live(Box<NewestOnly>),
+}
+
+pub struct ScanView<'a> {
+    pub scan: &'a Received<Scan>,
+    /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
+    /// with the yaw rate of the gyro; `None` without such a motion.
+    pub twist: Option<Twist>,
+    /// The turn since the scan before by the gyro.
+    pub turn: Option<GyroTurn>,
+    /// The distance since the scan before by the wheels.
+    pub distance: Option<WheelDistance>,
+    /// Where its azimuths were lost, if it has a pose from before a restart.
+    pub lost: Option<LostAzimuths>,
+    /// The previous scan, if the mask takes two; `None` where the chain starts.
+    pub previous: Option<PreviousScan<'a>>,
+}
+
+/// The scan before the one to mask.
+pub struct PreviousScan<'a> {
+    pub scan: &'a Received<Scan>,
+    /// The velocity used for motion compensation.
+    pub twist: Option<Twist>,
+    /// Where its azimuths were lost, if it has a pose.
+    pub lost: Option<LostAzimuths>,
+}
+
+impl Inputs for Scans {
+    type View<'a> = ScanView<'a>;
+
+    fn open(launch: &Launch) -> Result<Self, StageError> {
+        let motions = Motions::open(launch)?;
+        let queue = match launch.manifest.live {
+            false => Queue::Lossless(Box::new(InOrder::open(launch)?)),
+            true => Queue::Live(Box::new(NewestOnly::open(launch)?)),
+        };
+        Ok(Self {
+            queue,
+            motions,
+            gyro: Gyro::new(&launch.section("gyro")?),
+            wheels: Wheels::new(&launch.section("wheels")?),
+            sampled: None,
+            window: launch.manifest.window,
+            found: [None; 2],
+            lost: [None; 2],
+        })
+    }
+
+    fn next_action(&mut self) -> Result<Action, StageError> {
+        match &mut self.queue {
+            Queue::Lossless(queue) => queue.receive()?,
+            Queue::Live(queue) => queue.receive()?,
+        }
+        self.motions.update()?;
+        // The newest pose decides which scans are still needed, and in live mode where the chain
+        // resumes.
+        let Some(resume_at) = self.motions.resume_at().copied() else {
+            return Ok(Action::Wait);
+        };
+        let newest_pose = self.motions.newest_pose();
+        let action = match &mut self.queue {
+            Queue::Lossless(queue) => queue.next_action(newest_pose)?,
+            Queue::Live(queue) => queue.next_action(&resume_at, newest_pose)?,
+        };
+        match action {
+            Action::Process(item, _) if !self.find_motions(&item) => Ok(Action::Wait),
+            Action::Process(item, _) => {
+                self.take_samples(item.is(flag::BREAK))?;
+                Ok(action)
+            }
+            Action::Keep => {
+                self.take_samples(false)?;
+                Ok(action)
+            }
+            action => Ok(action),
+        }
+    }
+
+    fn view(&self) -> Option<ScanView<'_>> {
+        let (scan, previous) = match &self.queue {
+            Queue::Lossless(queue) => (queue.current(), queue.previous()),
+            Queue::Live(queue) => (queue.current(), queue.previous()),
+        };
+        let [motion, previous_motion] = self.found;
+        let [previous_rate, rate] = self.gyro.sweep_rates_radps();
+        let twist = |motion: Option<SearchedMotion>, rate| {
+            with_yaw_rate(motion.map(|motion| motion.twist()), rate)
+        };
+        let [lost, previous_lost] = self.lost;
+        let previous = previous.map(|scan| PreviousScan {
+            scan,
+            twist: twist(previous_motion, previous_rate),
+            lost: previous_lost,
+        });
+        Some(ScanView {
+            scan: scan?,
+            twist: twist(motion, rate),
+            turn: self.gyro.turn(),
+            distance: self.wheels.distance(),
+            lost,
+            previous,
+        })
+    }
+
+    fn advance(&mut self) {
+        match &mut self.queue {
+            Queue::Lossless(queue) => queue.advance(),
+            Queue::Live(queue) => queue.advance(),
+        }
+    }
+
+    fn listeners(&self) -> Vec<&Listener> {
+        let (scans, lacks_scan) = match &self.queue {
+            Queue::Lossless(queue) => (queue.listener(), queue.current().is_none()),
+            Queue::Live(queue) => (queue.listener(), queue.current().is_none()),
+        };
+        // Motions and poses are read when a scan comes.
+        if lacks_scan && self.motions.resume_at().is_some() {
+            return vec![scans];
+        }
+        let [motions, poses] = self.motions.listeners();
+        vec![scans, motions, poses]
+    }
+
+    fn duplicates(&self) -> u64 {
+        match &self.queue {
+            Queue::Lossless(queue) => queue.duplicates(),
+            Queue::Live(_) => 0,
+        }
+    }
+}
+
+impl Scans {
+    /// Looks up the motions for a scan and the previous one; false while one is missing. They
+    /// depend on the numbers alone, so they are the same after a restart.
+    fn find_motions(&mut self, item: &Item) -> bool {
+        if item.is(flag::BREAK) {
+            self.motions.start_chain(item.seq);
+        }
+        let previous = item
+            .seq
+            .checked_sub(1)
+            .filter(|_| self.window.masks_pairs());
+        let found = [Some(item.seq), previous]
+            .map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
+        self.found = found.map(Option::flatten);
+        self.lost = [Some(item.seq), item.seq.checked_sub(1)].map(|seq| self.motions.lost(seq?));
+        found.iter().all(Option::is_some)
+    }
+
+    /// Hands the samples of the current scan to gyro and wheels, once. Before that it hands over
+    /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
+    /// since.
+    fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
+        let (scans, dropped) = match &mut self.queue {
+            Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),
+            Queue::Live(queue) => {
+                let dropped = queue.take_dropped();
+                ([queue.previous(), queue.current()], dropped)
+            }
+        };
+        let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
+        let [previous, current] = scans.map(|scan| scan.filter(is_new));
+        let Some(current) = current else {
+            return Ok(());
+        };
+        match previous {
+            _ if starts_chain => {
+                self.gyro.clear();
+                self.wheels.clear();
+            }
+            Some(previous) => {
+                let (samples, stamp_ns, span_ns) = samples_of(previous)?;
+                self.gyro.push(samples, stamp_ns, span_ns);
+                self.wheels.push(samples, stamp_ns, span_ns);
+            }
+            None => {
+                self.gyro.drop_scan(&dropped);
+                self.wheels.drop_scan(&dropped);
+            }
+        }
+        let (samples, stamp_ns, span_ns) = samples_of(current)?;
+        self.gyro.push(samples, stamp_ns, span_ns);
+        self.wheels.push(samples, stamp_ns, span_ns);
+        self.sampled = Some(current.item().published);
+        Ok(())
+    }
+
+    fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+        match self.window.lag {
+            0 => Some(None),
+            lag => self.motions.before(seq, lag as u64),
+        }
+    }
+}
+
+/// Returns the samples that come with a scan, its stamp, and the times of its first and last
+/// azimuth.
+fn samples_of(received: &Received<Scan>) -> Result<(&[Sample], i64, [i64; 2]), StageError> {
+    let (header, bytes) = (received.header(), received.values());
+    let parts = header.view(bytes).zip(header.samples(bytes));
+    let (scan, samples) =
+        parts.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
+    Ok((samples, scan.geometry.stamp_ns, scan.span_ns()))
+}

@@ -1,0 +1,141 @@
+//! The refinement stage: registers the searched motions against a map of the last keyframes.
+
+use gyre_geometry::SparsePoint;
+use gyre_journal::{
+    checkpoint::{self, Checkpoint, CheckpointError},
+    continue_when_full,
+};
+use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
+use gyre_radar::PointsConfig;
+use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
+use gyre_scan_matching::{RefinementConfig, Refiner};
+use gyre_stage::{
+    Launch, Stage, StageCounters, StageError,
+    inputs::{Joined, JoinedView},
+    reader::Received,
+    stage,
+    writer::Draft,
+};
+
+/// Runs the stage until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let points: PointsConfig = launch.section("points")?;
+    let config: RefinementConfig = launch.section("refinement")?;
+    let gyro: GyroConfig = launch.section("gyro")?;
+    let wheels: WheelsConfig = launch.section("wheels")?;
+    let doppler: DopplerConfig = launch.section("doppler")?;
+    let refiner = Refiner::new(&config, points.capacity)
+        .map_err(|error| StageError::Configuration(error.to_string()))?
+        .with_gyro(&gyro)
+        .with_wheels(&wheels)
+        .with_doppler(&doppler);
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let manifest = &launch.manifest;
+    if manifest.live {
+        continue_when_full();
+    }
+    let path = checkpoint::path(&manifest.out);
+    let window = manifest.window.scans + manifest.window.look_back;
+    let checkpoint = Checkpoint::open(&path, window, config.keyframes, refiner.keyframe_cells())
+        .map_err(unusable)?;
+    let mut stage = RefinementStage {
+        refiner,
+        checkpoint,
+        next: None,
+    };
+    stage::run(launch, &mut stage)
+}
+
+/// The refiner and the checkpoint of its state.
+struct RefinementStage {
+    refiner: Refiner,
+    checkpoint: Checkpoint,
+    /// The item that the refiner expects next; `None` after a start.
+    next: Option<u64>,
+}
+
+impl Stage for RefinementStage {
+    type Inputs = Joined<Masked, Motion>;
+    type Output = Refined;
+    const HOP: StageId = StageId::Refinement;
+
+    fn process(
+        &mut self,
+        input: JoinedView<'_, Masked, Motion>,
+        output: &mut Draft<Refined>,
+    ) -> Result<(), StageError> {
+        let (item, motion) = (*input.pair.current.item(), input.other.header().motion);
+        self.restore_state_before(&item)?;
+        output.header().motion = match input.pair.previous {
+            Some(previous) if !item.is(flag::BREAK) => {
+                let (masked, before) = (input.pair.current.header(), previous.header());
+                self.refiner.expect_azimuth_errors(
+                    before.azimuth_variance_rad2 + masked.azimuth_variance_rad2,
+                );
+                self.refiner.expect_turn(masked.turn());
+                self.refiner.expect_distance(masked.distance());
+                let velocities = [before.velocity(), masked.velocity()];
+                self.refiner.expect_velocities(velocities);
+                let refined = self.refiner.refine(
+                    item.seq,
+                    points(input.pair.current)?,
+                    points(previous)?,
+                    &motion.motion().motion,
+                    motion.interval_ns as f64 * 1e-9,
+                );
+                let mut motion = motion.refined(&refined);
+                let (turn, distance) = (masked.turn(), masked.distance());
+                motion.refinement.gyro_turn_rad = turn.map_or(0.0, |it| it.yaw_rad);
+                motion.refinement.wheel_distance_m = distance.map_or(0.0, |it| it.distance_m);
+                motion
+            }
+            _ => motion,
+        };
+        self.next = Some(item.seq.saturating_add(1));
+        let motion = checkpoint::checksum(&output.header().motion);
+        self.checkpoint
+            .write(item.seq, motion, &self.refiner)
+            .map_err(unusable)
+    }
+}
+
+impl RefinementStage {
+    /// Restores the state of the refiner before this item.
+    fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
+        let starts_chain = item.is(flag::BREAK);
+        if self.next != Some(item.seq) {
+            let before = item.seq.saturating_sub(1);
+            let restored = self.checkpoint.restore(before, &mut self.refiner);
+            // A chain continues only with the state of gyro, wheels and Doppler, which the first
+            // chain lacks.
+            restored.or_else(|error| match starts_chain {
+                true => Ok(()),
+                false => Err(unusable(error)),
+            })?;
+        }
+        if starts_chain {
+            self.refiner.reset();
+        }
+        Ok(())
+    }
+}
+
+fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
+    masked
+        .header()
+        .points(masked.values())
+        .ok_or_else(|| masked.malformed("its points do not fit its header"))
+}
+
+fn unusable(error: CheckpointError) -> StageError {
+    match error {
+        // A process that was killed, and is not gone yet.
+        CheckpointError::Busy(_) => StageError::Transport {
+            action: "open the checkpoint".to_owned(),
+            reason: error.to_string(),
+        },
+        _ => StageError::Input(error.to_string()),
+    }
+}

@@ -1,0 +1,50 @@
+//! The joint-search stage: an exhaustive search for rotation and translation between consecutive
+//! scans over every angle (Masking by Moving; `raw` in Weston et al., Table III). It replaces both
+//! stages of the decoupled search.
+
+use gyre_messages::{Masked, Motion, MotionEstimate, StageId};
+use gyre_radar::raster::RasterConfig;
+use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch};
+use gyre_stage::{
+    Launch, Stage, StageCounters, StageError,
+    inputs::{PairView, Pairs},
+    stage,
+    writer::Draft,
+};
+
+/// Runs the stage until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let raster: RasterConfig = launch.section("raster")?;
+    let config: ExhaustiveConfig = launch.section("exhaustive")?;
+    let search = ExhaustiveSearch::new(raster.n, raster.cell_m.into(), &config)
+        .map_err(|error| StageError::Configuration(error.to_string()))?;
+    stage::run(launch, &mut JointStage { search })
+}
+
+struct JointStage {
+    search: ExhaustiveSearch,
+}
+
+impl Stage for JointStage {
+    type Inputs = Pairs<Masked>;
+    type Output = Motion;
+    const HOP: StageId = StageId::JointSearch;
+
+    fn process(
+        &mut self,
+        input: PairView<'_, Masked>,
+        output: &mut Draft<Motion>,
+    ) -> Result<(), StageError> {
+        let pair = input.rasters()?;
+        let found = pair
+            .earlier
+            .map(|earlier| self.search.search(pair.later, earlier))
+            .transpose()
+            .map_err(|error| input.current.malformed(error.to_string()))?;
+        output.header().motion = found.map_or_else(MotionEstimate::default, |found| {
+            let rotation = (&found.rotation).into();
+            MotionEstimate::from_search(&found.motion, rotation, input.interval_ns())
+        });
+        Ok(())
+    }
+}

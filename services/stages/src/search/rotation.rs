@@ -1,0 +1,60 @@
+//! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
+//! (Weston et al., Sec. III-C, step 1).
+
+use gyre_messages::{Masked, Rotation, RotationEstimate, StageId};
+use gyre_radar::raster::RasterConfig;
+use gyre_scan_matching::{RotationConfig, RotationMatch, SequentialRotation};
+use gyre_stage::{
+    Launch, Stage, StageCounters, StageError,
+    inputs::{PairView, Pairs},
+    stage,
+    writer::Draft,
+};
+
+/// Finds the rotation between two scans; `None` where the chain of motions starts.
+pub type Search =
+    Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
+
+/// Runs the stage until SIGTERM.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let raster: RasterConfig = launch.section("raster")?;
+    let config: RotationConfig = launch.section("rotation")?;
+    let mut rotation = SequentialRotation::new(raster.n, &config)
+        .map_err(|error| StageError::Configuration(error.to_string()))?;
+    let search = move |input: &PairView<'_, Masked>| {
+        let (seq, pair) = (input.current.item().seq, input.rasters()?);
+        let turn = input.current.header().turn().map(|turn| turn.yaw_rad);
+        rotation
+            .next(seq, pair.later, pair.earlier, pair.earlier_changed, turn)
+            .map_err(|error| input.current.malformed(error.to_string()))
+    };
+    run_with(launch, Box::new(search))
+}
+
+/// Runs the stage until SIGTERM with a search of your own.
+pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
+    stage::run(launch, &mut RotationStage { search })
+}
+
+struct RotationStage {
+    search: Search,
+}
+
+impl Stage for RotationStage {
+    type Inputs = Pairs<Masked>;
+    type Output = Rotation;
+    const HOP: StageId = StageId::RotationSearch;
+
+    fn process(
+        &mut self,
+        input: PairView<'_, Masked>,
+        output: &mut Draft<Rotation>,
+    ) -> Result<(), StageError> {
+        let found = (self.search)(&input)?;
+        output.header().rotation = found
+            .as_ref()
+            .map(RotationEstimate::from)
+            .unwrap_or_default();
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! The row of a drive: `rows/NAME.json`. The rows are the table.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use gyre_run::COMPLETE;
+use gyre_terminal::Failure;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::batch::{
+    Drive, Outcome,
+    figures::{self, Values},
+};
+
+/// The settings that the drives of a batch have in common.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// The configuration of drives without a configuration, an absolute path; `None`: by their
+    /// formats and scans.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub configuration: Option<PathBuf>,
+    /// Overrides of each configuration, `section.key=value`. Overrides of a drive have precedence.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
+}
+
+/// The outcome of a drive, and its results.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    pub drive: Drive,
+    /// The settings that it was computed with.
+    pub settings: Settings,
+    pub outcome: Outcome,
+    /// The reason why it is not complete, in a sentence; else empty.
+    pub sentence: String,
+    /// The values of both tables by column; empty unless all scans were played.
+    pub values: Values,
+}
+
+impl Row {
+    /// The row of a drive that has ended in the folder of a batch.
+    pub fn of(
+        batch: &Path,
+        drive: &Drive,
+        settings: &Settings,
+        outcome: Outcome,
+        sentence: impl Into<String>,
+    ) -> Self {
+        let mut row = Self {
+            drive: drive.clone(),
+            settings: settings.clone(),
+            outcome,
+            sentence: sentence.into(),
+            values: Values::new(),
+        };
+        if outcome.has_results() {
+            match figures::read(&Self::results(batch, drive)) {
+                Ok(values) => row.values = values,
+                Err(error) => (row.outcome, row.sentence) = (Outcome::Failed, error.to_string()),
+            }
+        }
+        row
+    }
+
+    /// Returns the folder of a drive's results in the folder of a batch.
+    pub fn results(batch: &Path, drive: &Drive) -> PathBuf {
+        batch.join("drives").join(&drive.name)
+    }
+
+    fn path(batch: &Path, drive: &Drive) -> PathBuf {
+        batch.join("rows").join(format!("{}.json", drive.name))
+    }
+
+    /// Writes it as a whole, so that it is there or not, whatever is killed.
+    pub fn write(&self, batch: &Path) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(self)?;
+        Ok(gyre_storage::write(&Self::path(batch, &self.drive), text)?)
+    }
+
+    /// Reads the row of a drive with these settings, whose results are there if it had any. Without
+    /// one the outcome is `not-run`.
+    pub fn read(batch: &Path, drive: &Drive, settings: &Settings) -> Result<Self, Failure> {
+        let not_run = |sentence: &str| Self::of(batch, drive, settings, Outcome::NotRun, sentence);
+        let path = Self::path(batch, drive);
+        let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Ok(not_run("it has not been computed yet"));
+            }
+            Err(error) => return Err(format!("cannot read {}: {error}", path.display()).into()),
+        };
+        let row: Self = match serde_json::from_str(&text) {
+            Ok(row) => row,
+            Err(error) => return Ok(not_run(&figures::unknown(&path, error).to_string())),
+        };
+        // A run that begins removes the results before it.
+        let has_results = || Self::results(batch, drive).join(COMPLETE).exists();
+        Ok(match row.outcome.has_results() && !has_results() {
+            _ if (&row.drive, &row.settings) != (drive, settings) => {
+                not_run("it was computed with other settings")
+            }
+            true => not_run("its results are being computed again, or were removed"),
+            false => row,
+        })
+    }
+
+    /// Returns a line about it; `earlier`: the drive had ended so before.
+    pub fn line(&self, earlier: bool) -> String {
+        let (name, outcome) = (&self.drive.name, self.outcome);
+        let earlier = if earlier { " before" } else { "" };
+        match (outcome, self.values.get("poses")) {
+            (Outcome::Complete, Some(poses)) => {
+                let ate_m = self.values.get("ate_rmse_m").and_then(Value::as_f64);
+                let ate = ate_m.map_or(String::new(), |ate_m| format!(", ATE {ate_m:.3} m"));
+                format!("{name}: complete{earlier}, {poses} poses{ate}")
+            }
+            _ => format!("{name}: {outcome}{earlier}: {}", self.sentence),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_complete_drive_without_its_results_is_a_failure() {
+        let out = tempfile::tempdir().unwrap();
+        let drive = Drive {
+            name: "a".to_owned(),
+            path: "data/a".to_owned(),
+            configuration: None,
+            set: Vec::new(),
+        };
+        let settings = Settings::default();
+        let row = Row::of(out.path(), &drive, &settings, Outcome::Complete, "");
+        assert_eq!(row.outcome, Outcome::Failed);
+        assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
+    }
+}

@@ -1,0 +1,133 @@
+//! The table of a batch: `results.csv` and, drive by drive in the same order, `times.csv`.
+
+use std::path::Path;
+
+use gyre_terminal::Failure;
+use serde_json::Value;
+
+use crate::batch::{
+    List, Row, Settings,
+    figures::{Column, FIGURES, TIMES},
+};
+
+/// The file of the results that follow from the drives and their configurations: the same bytes
+/// whatever was killed.
+pub const RESULTS: &str = "results.csv";
+/// The file of all others.
+pub const TIMES_FILE: &str = "times.csv";
+
+/// Writes both files from the rows of all drives of a list, which are returned.
+pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, Failure> {
+    if !out.join("rows").is_dir() {
+        let out = out.display();
+        return Err(format!(
+            "{out} is not the folder of a batch: no drive has been computed there"
+        )
+        .into());
+    }
+    let rows = list
+        .drives
+        .iter()
+        .map(|drive| Row::read(out, drive, settings));
+    let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+    let head = |row: &Row| {
+        let Row {
+            drive, sentence, ..
+        } = row;
+        let outcome = row.outcome.to_string();
+        vec![
+            drive.name.clone(),
+            drive.path.clone(),
+            outcome,
+            sentence.clone(),
+        ]
+    };
+    let results = csv(
+        &rows,
+        &["name", "drive", "outcome", "sentence"],
+        head,
+        &FIGURES,
+    )?;
+    gyre_storage::write(&out.join(RESULTS), results)?;
+    let times = csv(&rows, &["name"], |row| vec![row.drive.name.clone()], &TIMES)?;
+    gyre_storage::write(&out.join(TIMES_FILE), times)?;
+    Ok(rows)
+}
+
+/// Returns a table: of each row the first cells, then its values.
+fn csv(
+    rows: &[Row],
+    names: &[&str],
+    head: fn(&Row) -> Vec<String>,
+    columns: &[Column],
+) -> Result<Vec<u8>, Failure> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(names.iter().copied().chain(columns.iter().map(|it| it.0)))?;
+    for row in rows {
+        let values = columns.iter().map(|(name, _)| match row.values.get(*name) {
+            None => String::new(),
+            Some(Value::String(text)) => text.clone(),
+            Some(other) => other.to_string(),
+        });
+        writer.write_record(head(row).into_iter().chain(values))?;
+    }
+    Ok(writer.into_inner()?)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use super::*;
+    use crate::batch::Outcome;
+
+    #[test]
+    fn the_table_has_a_line_for_each_drive_in_the_order_of_the_list() {
+        let out = tempfile::tempdir().unwrap();
+        let path = out.path().join("list.txt");
+        fs::write(&path, "b\na\nc\n").unwrap();
+        let list = List::read(&path).unwrap();
+        fs::create_dir(out.path().join("rows")).unwrap();
+        let settings = Settings::default();
+        let [b, a, c] = &list.drives[..] else {
+            panic!("{list:?}")
+        };
+        let mut row = Row::of(out.path(), a, &settings, Outcome::NotRun, "");
+        row.outcome = Outcome::Complete;
+        row.values.insert("ate_rmse_m".to_owned(), 0.25.into());
+        row.write(out.path()).unwrap();
+        let without = write(&list, &settings, out.path()).unwrap();
+        assert!(without[1].line(false).contains("a: not-run: its results"));
+        let results = out.path().join("drives/a/journal");
+        fs::create_dir_all(&results).unwrap();
+        fs::write(results.join("complete"), "").unwrap();
+        assert_eq!(Row::read(out.path(), a, &settings).unwrap(), row);
+        let other = Settings {
+            set: vec!["raster.n=127".to_owned()],
+            ..settings.clone()
+        };
+        let row = Row::of(out.path(), b, &other, Outcome::Failed, "");
+        row.write(out.path()).unwrap();
+        fs::write(out.path().join(format!("rows/{}.json", c.name)), "{").unwrap();
+
+        write(&list, &settings, out.path()).unwrap();
+        let mut results = csv::Reader::from_path(out.path().join(RESULTS)).unwrap();
+        let header = results.headers().unwrap().clone();
+        let column = |name| header.iter().position(|column| column == name).unwrap();
+        let records: Vec<_> = results.records().map(Result::unwrap).collect();
+        let cells = |name| -> Vec<String> {
+            records
+                .iter()
+                .map(|it| it[column(name)].to_owned())
+                .collect()
+        };
+        assert_eq!(cells("name"), ["b", "a", "c"]);
+        assert_eq!(cells("outcome"), ["not-run", "complete", "not-run"]);
+        assert_eq!(cells("ate_rmse_m"), ["", "0.25", ""]);
+        assert!(cells("sentence")[0].contains("other settings"));
+        assert!(cells("sentence")[2].contains("c.json is not what"));
+        let times = fs::read_to_string(out.path().join(TIMES_FILE)).unwrap();
+        assert_eq!(times.lines().count(), 4);
+    }
+}

@@ -1,0 +1,199 @@
+//! A program alone in the place of a stage: its process in a run of its own, and this process in
+//! place of the rest of the run.
+
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+
+use gyre_messages::{Item, Pose, PoseHeader, StageId, flag};
+use gyre_stage::{Manifest, StageError, wake::Signals};
+use gyre_supervise::{
+    Death, Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
+};
+
+use crate::conformance::{ProgramError, topics::StageTopics};
+
+/// A program that stands in for a stage, and the run that it sees.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The stage that it replaces.
+    pub stage: StageId,
+    /// The program and its arguments.
+    pub command: Vec<String>,
+    /// The priority of its process.
+    pub scheduling: Scheduling,
+    /// The program `gyre`: the guardian, and Gyre's own stages.
+    pub gyre: String,
+    /// The manifest of the run, without prefix and root.
+    pub manifest: Manifest,
+    /// The configuration of the run, TOML.
+    pub configuration: String,
+}
+
+impl Candidate {
+    /// Returns the topics of the stage.
+    pub(crate) fn topics(&self) -> StageTopics {
+        StageTopics::of(self.stage, &self.manifest)
+    }
+
+    /// Returns the command of Gyre's own stage.
+    pub(crate) fn own_command(&self, stage: StageId) -> Vec<String> {
+        [&self.gyre, "stage", stage.name()]
+            .map(str::to_owned)
+            .into()
+    }
+
+    /// Creates a run that writes to `out`, with or without its services.
+    pub(crate) fn rig<'a>(
+        &self,
+        out: PathBuf,
+        signals: &'a Signals,
+        has_services: bool,
+    ) -> Result<Rig<'a>, ProgramError> {
+        for folder in ["log", "journal"] {
+            let path = out.join(folder);
+            let created = gyre_storage::create_folder(&path);
+            created.map_err(|error| ProgramError::file(&path)(error.source))?;
+        }
+        let manifest = Manifest {
+            out,
+            ..self.manifest.clone()
+        };
+        let guardian = [&self.gyre, "guard"].map(str::to_owned);
+        let create = match has_services {
+            true => Rig::new,
+            false => Rig::without_services,
+        };
+        Ok(create(manifest, &self.configuration, &guardian, signals)?)
+    }
+}
+
+/// A program in a run of its own, which this process feeds and receives from.
+pub(crate) struct Harness<'a> {
+    // Dropped in this order: process, ports, run.
+    process: Option<Process>,
+    /// The publishers of the inputs by topic.
+    pub feeds: BTreeMap<&'static str, Box<dyn Feed>>,
+    /// The reader of the output.
+    pub output: Box<dyn Tap>,
+    /// The run.
+    pub rig: Rig<'a>,
+    stage: StageId,
+    /// The topics of the stage.
+    pub topics: StageTopics,
+}
+
+/// A message that a program has sent.
+pub(crate) enum Sent {
+    /// A message that keeps the rules of its fields.
+    Message(Recorded),
+    /// A message that every reader refuses, and a sentence about the rule that it breaks.
+    Malformed { seq: u64, sentence: String },
+}
+
+impl<'a> Harness<'a> {
+    /// Opens the topics of a stage. No process is started.
+    pub(crate) fn open(rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
+        let topics = StageTopics::of(stage, rig.manifest());
+        let mut harness = Self {
+            process: None,
+            feeds: BTreeMap::new(),
+            output: rig.tap(topics.output)?,
+            rig,
+            stage,
+            topics,
+        };
+        harness.open_feeds()?;
+        Ok(harness)
+    }
+
+    /// Opens the publishers of the inputs, with empty histories.
+    pub(crate) fn open_feeds(&mut self) -> Result<(), StageError> {
+        self.feeds.clear();
+        for (topic, _) in &self.topics.inputs {
+            self.feeds.insert(topic, self.rig.feed(topic)?);
+        }
+        Ok(())
+    }
+
+    /// Starts the process.
+    pub(crate) fn start(
+        &mut self,
+        command: &[String],
+        scheduling: &Scheduling,
+    ) -> Result<(), ProgramError> {
+        self.process = Some(self.rig.start(self.stage.name(), command, scheduling)?);
+        Ok(())
+    }
+
+    /// Answers the subscribe handshakes of the process; returns the topics that it has notified.
+    pub(crate) fn answer_handshakes(&self) -> Result<Vec<&'static str>, StageError> {
+        let mut notified = Vec::new();
+        for (topic, feed) in &self.feeds {
+            if feed.answer_handshakes()? {
+                notified.push(*topic);
+            }
+        }
+        Ok(notified)
+    }
+
+    /// Connects to all subscribers, whether they have notified or not.
+    pub(crate) fn connect(&self) -> Result<(), StageError> {
+        self.feeds.values().try_for_each(|feed| feed.connect())
+    }
+
+    /// Returns whether the process has opened the topic that it publishes.
+    pub(crate) fn has_publisher(&self) -> bool {
+        self.rig.has_publisher(self.stage)
+    }
+
+    /// Publishes a message on a topic, if it is one of the inputs.
+    pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
+        let feed = self.feeds.get(topic);
+        feed.map_or(Ok(()), |feed| feed.send(message))
+    }
+
+    /// Receives the next message of the process; `None` if there is no message yet.
+    pub(crate) fn receive(&self) -> Result<Option<Sent>, StageError> {
+        match self.output.receive() {
+            Ok(message) => Ok(message.map(Sent::Message)),
+            Err(StageError::Malformed { seq, reason, .. }) => Ok(Some(Sent::Malformed {
+                seq,
+                sentence: format!("item {seq} cannot be read by any stage: {reason}"),
+            })),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Sleeps until the process has sent something or `limit` has passed; true on a request to
+    /// stop.
+    pub(crate) fn sleep(&self, limit: Duration) -> Result<bool, StageError> {
+        self.rig.sleep(&[self.output.as_ref()], limit)
+    }
+
+    /// Returns the end of the process; `None` while it runs or before it is started.
+    pub(crate) fn death(&mut self) -> Option<Death> {
+        self.process.as_mut().and_then(Process::death)
+    }
+
+    /// Sends SIGTERM.
+    pub(crate) fn terminate(&self) {
+        self.process.iter().for_each(Process::terminate);
+    }
+
+    /// Kills the process with its group, and waits for its end.
+    pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
+        self.process.take().map_or(Ok(()), |it| Ok(it.kill()?))
+    }
+}
+
+/// Returns the first message of a sink without poses.
+pub(crate) fn start_of_trajectory() -> Recorded {
+    let start = PoseHeader {
+        item: Item {
+            flags: flag::BASE | flag::SYNC,
+            ..Item::default()
+        },
+        ..PoseHeader::default()
+    };
+    Recorded::of::<Pose>(&start, &[], 0)
+}

@@ -1,0 +1,99 @@
+//! Inputs that break the contract, and that each reader has to refuse.
+
+use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
+
+use crate::conformance::result::floats;
+
+/// A message that no stage may send, after the name of its fault.
+pub(crate) type Malformed = (&'static str, Recorded);
+
+/// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
+pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
+    let item = valid.item();
+    let mut unknown = item;
+    unknown.flags |= 16;
+    let mut late = item;
+    late.previous_scan = item.scan + 1;
+    let mut all = vec![
+        ("an unknown flag", valid.about(&unknown)),
+        ("a previous scan after its scan", valid.about(&late)),
+    ];
+    all.extend(match topic {
+        Scan::TOPIC => scans(valid)?,
+        Masked::TOPIC => masks(valid)?,
+        Rotation::TOPIC => changes::<Rotation>(
+            valid,
+            &[
+                ("an angle that is NaN", &|h| h.rotation.angle_rad = f64::NAN),
+                ("a negative variance", &|h| h.rotation.variance_rad2 = -1.0),
+            ],
+        )?,
+        Pose::TOPIC => changes::<Pose>(valid, &[("a pose that is NaN", &|h| h.x_m = f64::NAN)])?,
+        // The topic `refined` has the same header.
+        _ => changes::<Motion>(
+            valid,
+            &[
+                ("a motion that is NaN", &|h| h.motion.x_m = f64::NAN),
+                ("a covariance that is none", &|h| {
+                    h.motion.covariance[0] = -1.0
+                }),
+            ],
+        )?,
+    });
+    Ok(all)
+}
+
+/// A fault of a header, and a function that makes it.
+type Change<'a, M> = (&'static str, &'a dyn Fn(&mut <M as Message>::Header));
+
+fn changes<M: Message<Header: Copy>>(
+    valid: &Recorded,
+    changes: &[Change<'_, M>],
+) -> Result<Vec<Malformed>, StageError> {
+    let changed = changes.iter().map(|(name, change)| {
+        let mut header = valid.header::<M>()?;
+        change(&mut header);
+        Ok((*name, valid.with::<M>(&header)))
+    });
+    changed.collect()
+}
+
+fn scans(valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
+    changes::<Scan>(
+        valid,
+        &[
+            ("an angle that is NaN", &|h| h.azimuth_rad[3] = f32::NAN),
+            ("a payload shorter than its header says", &|h| {
+                h.first_byte = u32::MAX
+            }),
+        ],
+    )
+}
+
+fn masks(valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
+    let mut all = changes::<Masked>(
+        valid,
+        &[
+            ("a velocity that is NaN", &|h| h.twist[0] = f32::NAN),
+            ("rasters of another size", &|h| h.n += 1),
+            ("a payload shorter than its header says", &|h| {
+                h.points = u32::MAX
+            }),
+        ],
+    )?;
+    let header = valid.header::<Masked>()?;
+    let mut values = floats(&valid.payload);
+    let points = header.points(&values).unwrap_or_default().len() * 5;
+    if points > 0 {
+        let blocks = (header.n as usize * header.n as usize).div_ceil(16) * 16;
+        values[blocks * header.rasters as usize + 2] = f32::NAN;
+        let payload = bytemuck::cast_slice(&values);
+        all.push((
+            "a point that is NaN",
+            Recorded::of::<Masked>(&header, payload, 0),
+        ));
+    }
+    Ok(all)
+}

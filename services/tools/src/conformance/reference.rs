@@ -1,0 +1,271 @@
+//! The inputs: the results of Gyre's own stages for the scans. The stages run as in a pipeline,
+//! between a source and a sink that are part of this process and lose nothing.
+
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{
+    Hop, Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId,
+    compose, flag,
+};
+use gyre_radar::continues;
+use gyre_stage::{clock, wake::Signals};
+use gyre_supervise::{
+    Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
+};
+
+use crate::conformance::{
+    ProgramError,
+    harness::start_of_trajectory,
+    test::{InputScans, Test},
+    topics::StageTopics,
+};
+
+/// Time between two polls of what does not wake the tester.
+pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);
+
+/// The messages of a whole run by topic: item after item, then the end of the stream.
+#[derive(Debug, Default)]
+pub(crate) struct Reference(BTreeMap<&'static str, Vec<Recorded>>);
+
+impl Reference {
+    /// Returns the message of a topic about item `seq`; the message after the last item is the end.
+    pub(crate) fn get(&self, topic: &str, seq: u64) -> Option<&Recorded> {
+        self.0.get(topic)?.get(seq as usize)
+    }
+
+    /// Returns the messages of a topic.
+    pub(crate) fn topic(&self, topic: &str) -> &[Recorded] {
+        self.0.get(topic).map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns the number of the item that ends the stream, which is the number of scans.
+    pub(crate) fn end(&self) -> u64 {
+        self.topic(Pose::TOPIC).len().saturating_sub(1) as u64
+    }
+
+    /// Reads the scans and lets Gyre's own stages process them.
+    pub(crate) fn compute(
+        test: &Test,
+        scans: &mut InputScans,
+        signals: &Signals,
+    ) -> Result<Self, ProgramError> {
+        let scans = read(scans)?;
+        if scans.len() < 3 {
+            return Err(ProgramError::TooFew(scans.len().saturating_sub(1)));
+        }
+        let rig = test.rig("own", signals, true)?;
+        OwnPipeline::begin(test, &rig, scans)?.run()
+    }
+
+    fn push(&mut self, topic: &'static str, message: Recorded) {
+        self.0.entry(topic).or_default().push(message);
+    }
+}
+
+/// Reads the scans, as the source does; the end of the stream follows.
+fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ProgramError> {
+    let mut read: Vec<Recorded> = Vec::new();
+    let mut bytes = vec![0; scans.dataset.limits().bytes];
+    let mut before: Option<Item> = None;
+    for index in scans.played.clone() {
+        let mut header = ScanHeader::default();
+        let Ok(geometry) = scans.dataset.read(index, header.slot(&mut bytes)) else {
+            continue;
+        };
+        header.set_geometry(&geometry);
+        let follows = before.filter(|it| continues(it.stamp_ns, header.item.stamp_ns));
+        let seq = read.len() as u64;
+        header.item = Item {
+            seq,
+            scan: index as u64,
+            previous_scan: follows.map_or(index as u64, |before| before.scan),
+            published: seq,
+            flags: if follows.is_none() { flag::BREAK } else { 0 },
+            ..header.item
+        };
+        before = Some(header.item);
+        read.push(Recorded::of::<Scan>(&header, &bytes, 0));
+    }
+    let end = ScanHeader {
+        item: Item {
+            seq: read.len() as u64,
+            published: read.len() as u64,
+            flags: flag::END,
+            ..Item::default()
+        },
+        ..ScanHeader::default()
+    };
+    read.push(Recorded::of::<Scan>(&end, &[], 0));
+    Ok(read)
+}
+
+/// A pipeline of Gyre's own stages whose source and sink are here.
+struct OwnPipeline<'a> {
+    // Dropped in this order: processes, ports, run.
+    processes: Vec<(StageId, Process)>,
+    scans: Box<dyn Feed>,
+    poses: Box<dyn Feed>,
+    taps: Vec<(&'static str, Box<dyn Tap>)>,
+    rig: &'a Rig<'a>,
+    /// Time without progress after which it has failed.
+    stall_timeout: Duration,
+    reference: Reference,
+    last_pose: Option<PoseHeader>,
+    /// The topic of the motions that poses are composed of.
+    motions: &'static str,
+    unsent: std::iter::Peekable<std::vec::IntoIter<Recorded>>,
+}
+
+impl<'a> OwnPipeline<'a> {
+    fn begin(test: &Test, rig: &'a Rig<'a>, scans: Vec<Recorded>) -> Result<Self, ProgramError> {
+        let manifest = rig.manifest();
+        let mut stages = test.stages.clone();
+        stages.retain(|it| !matches!(it, StageId::RadarReplay | StageId::PoseIntegration));
+        let mut taps = Vec::new();
+        for stage in &stages {
+            let topic = StageTopics::of(*stage, manifest).output;
+            taps.push((topic, rig.tap(topic)?));
+        }
+        let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
+        poses.send(&start_of_trajectory())?;
+        let mut processes = Vec::new();
+        for stage in stages {
+            let command = test.candidate.own_command(stage);
+            let process = rig.start(stage.name(), &command, &Scheduling::default())?;
+            processes.push((stage, process));
+        }
+        Ok(Self {
+            processes,
+            scans: scan_feed,
+            poses,
+            taps,
+            rig,
+            stall_timeout: test.demands.start_timeout,
+            reference: Reference::default(),
+            last_pose: None,
+            motions: if manifest.refines {
+                Refined::TOPIC
+            } else {
+                Motion::TOPIC
+            },
+            unsent: scans.into_iter().peekable(),
+        })
+    }
+
+    fn run(mut self) -> Result<Reference, ProgramError> {
+        let mut progress = Instant::now();
+        while !self.has_ended() {
+            self.scans.answer_handshakes()?;
+            self.poses.answer_handshakes()?;
+            if self.receive()? | self.integrate()? | self.admit()? {
+                progress = Instant::now();
+            } else {
+                self.require_living(progress.elapsed())?;
+                let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
+                if self.rig.sleep(&taps, POLL_PERIOD)? {
+                    return Err(ProgramError::Interrupted);
+                }
+            }
+        }
+        Ok(self.reference)
+    }
+
+    /// Returns whether all have sent the end of the stream.
+    fn has_ended(&self) -> bool {
+        let has_end = |topic| {
+            let last = self.reference.topic(topic).last();
+            last.is_some_and(|last| last.item().is(flag::END))
+        };
+        has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
+    }
+
+    fn receive(&mut self) -> Result<bool, ProgramError> {
+        let mut any = false;
+        for (topic, tap) in &self.taps {
+            while let Some(message) = tap.receive()? {
+                self.reference.push(topic, message);
+                any = true;
+            }
+        }
+        Ok(any)
+    }
+
+    /// Publishes the pose of an item that all stages have answered; returns whether there was one.
+    fn integrate(&mut self) -> Result<bool, ProgramError> {
+        let next = self.reference.topic(Pose::TOPIC).len() as u64;
+        let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
+        if !self.taps.iter().all(is_done) {
+            return Ok(false);
+        }
+        let Some(motion) = self.reference.get(self.motions, next) else {
+            return Ok(false);
+        };
+        let pose = self.pose(&motion.header::<Motion>()?);
+        self.last_pose = Some(pose).filter(|pose| !pose.item.is(flag::END));
+        let pose = Recorded::of::<Pose>(&pose, &[], 0);
+        self.poses.send(&pose)?;
+        self.reference.push(Pose::TOPIC, pose);
+        Ok(true)
+    }
+
+    fn pose(&self, motion: &MotionHeader) -> PoseHeader {
+        let mut pose = PoseHeader {
+            item: motion.item,
+            ..PoseHeader::default()
+        };
+        if !motion.item.is(flag::END) {
+            pose = compose(self.last_pose.as_ref(), motion);
+            pose.item.flags |= flag::SYNC;
+        }
+        pose
+    }
+
+    /// Publishes the scans that the window admits; returns whether there was one.
+    fn admit(&mut self) -> Result<bool, ProgramError> {
+        let newest = (self.reference.topic(Pose::TOPIC).len() as u64).checked_sub(1);
+        let window = self.rig.manifest().window;
+        let mut any = false;
+        while let Some(scan) = self
+            .unsent
+            .next_if(|it| window.admits(it.item().seq, newest))
+        {
+            let now_ns = clock::now_ns();
+            let mut item = scan.item();
+            // Any but 0, which a stage may write that does not copy it.
+            (item.due_ns, item.generation) = (now_ns, 1);
+            *item.hop_mut(StageId::RadarReplay) = Hop {
+                received_ns: now_ns,
+                started_ns: now_ns,
+                finished_ns: now_ns,
+                published_ns: now_ns,
+            };
+            let scan = scan.about(&item);
+            self.scans.send(&scan)?;
+            self.reference.push(Scan::TOPIC, scan);
+            any = true;
+        }
+        Ok(any)
+    }
+
+    fn require_living(&mut self, idle: Duration) -> Result<(), ProgramError> {
+        for (stage, process) in &mut self.processes {
+            if let Some(death) = process.death() {
+                return Err(ProgramError::Own {
+                    stage: stage.name(),
+                    reason: death.last_output.unwrap_or(death.cause),
+                });
+            }
+        }
+        match idle < self.stall_timeout {
+            true => Ok(()),
+            false => Err(ProgramError::Own {
+                stage: "pipeline",
+                reason: format!("it made no progress for {idle:.0?}"),
+            }),
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The report of a test, as a table and as JSON.
+
+use std::fmt;
+
+use gyre_run::latency::Durations;
+use serde::Serialize;
+
+use crate::conformance::rule::{Rule, Verdict};
+
+/// The result of the test of a program.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The stage that it replaces.
+    pub stage: &'static str,
+    /// The program and its arguments.
+    pub command: Vec<String>,
+    /// The scans that its inputs were computed from.
+    pub scans: usize,
+    /// The verdicts, in the order of the contract.
+    pub rules: Vec<Judged>,
+    /// The time of its work on an item by its own stamps, with the window full.
+    pub work: Option<Work>,
+    /// The time from sending it an item to reading its answer, one item at a time; `None` unless
+    /// there is a budget.
+    pub answers: Option<Work>,
+    /// The work of Gyre's own stage on the same inputs, directly after.
+    pub own_work: Option<Work>,
+    /// The difference between its results and the results of Gyre's own stage.
+    pub deviation: Option<String>,
+}
+
+/// A rule and the verdict on it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Judged {
+    pub rule: Rule,
+    /// The section of the contract.
+    pub section: &'static str,
+    /// The conduct of a program that keeps it.
+    pub says: &'static str,
+    #[serde(flatten)]
+    pub verdict: Verdict,
+}
+
+/// Items that are not measured: buffers grow, and memory is touched for the first time.
+const WARM_UP: usize = 4;
+/// The minimum number of items for a 99th percentile.
+const PERCENTILE_ITEMS: u64 = 100;
+
+/// Times of work on an item, without the first four items.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Work {
+    pub items: u64,
+    /// Median, ms.
+    pub p50_ms: f64,
+    /// 99th percentile, ms; `None` of fewer than a hundred items.
+    pub p99_ms: Option<f64>,
+    /// Maximum, ms.
+    pub max_ms: f64,
+}
+
+impl Work {
+    /// The figures of these times, ns, in the order of the items; `None` without one.
+    pub(crate) fn of(times_ns: impl Iterator<Item = i64>) -> Option<Self> {
+        let mut times = Durations::default();
+        times_ns.skip(WARM_UP).for_each(|ns| times.add(ns));
+        let at = |share| times.at(share).map(|ns| ns as f64 * 1e-6);
+        Some(Self {
+            items: times.count(),
+            p50_ms: at(0.5)?,
+            p99_ms: at(0.99).filter(|_| times.count() >= PERCENTILE_ITEMS),
+            max_ms: at(1.0)?,
+        })
+    }
+
+    /// Returns the figure that a budget is for, ms, and its name: the 99th percentile, of few items
+    /// the maximum.
+    pub(crate) fn judged(&self) -> (f64, &'static str) {
+        match self.p99_ms {
+            Some(p99_ms) => (p99_ms, "99th percentile"),
+            None => (self.max_ms, "maximum"),
+        }
+    }
+}
+
+impl Report {
+    /// Returns whether no rule is broken, and none was not reached.
+    pub fn conforms(&self) -> bool {
+        let fails =
+            |judged: &Judged| matches!(judged.verdict, Verdict::Broken(_) | Verdict::NotReached);
+        !self.rules.iter().any(fails)
+    }
+
+    /// Returns the number of rules that are broken.
+    pub fn broken(&self) -> usize {
+        let rules = self.rules.iter();
+        rules
+            .filter(|judged| matches!(judged.verdict, Verdict::Broken(_)))
+            .count()
+    }
+}
+
+impl fmt::Display for Work {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            items,
+            p50_ms,
+            p99_ms,
+            max_ms,
+        } = self;
+        write!(f, "p50 {p50_ms:.2} ms, ")?;
+        if let Some(p99_ms) = p99_ms {
+            write!(f, "p99 {p99_ms:.2} ms, ")?;
+        }
+        write!(f, "max {max_ms:.2} ms of {items} items")
+    }
+}
+
+impl fmt::Display for Judged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (word, sentences) = match &self.verdict {
+            Verdict::Kept => ("kept", &[][..]),
+            Verdict::Broken(sentences) => ("BROKEN", sentences.as_slice()),
+            Verdict::DoesNotApply(_) => ("-", &[][..]),
+            Verdict::NotReached => ("not reached", &[][..]),
+        };
+        write!(f, "{word:<12} {:<16} {}", self.section, self.says)?;
+        if let Verdict::DoesNotApply(reason) = self.verdict {
+            write!(f, ": {reason}")?;
+        }
+        sentences
+            .iter()
+            .try_for_each(|sentence| write!(f, "\n{:<30}{sentence}", ""))
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for judged in &self.rules {
+            writeln!(f, "{judged}")?;
+        }
+        writeln!(f)?;
+        if let Some(work) = &self.work {
+            writeln!(f, "work on an item  {work}")?;
+        }
+        if let Some(answers) = &self.answers {
+            writeln!(f, "until the answer {answers}")?;
+        }
+        if let Some(own) = &self.own_work {
+            writeln!(f, "our own stage    {own}")?;
+            if let Some(work) = &self.work {
+                writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
+            }
+        }
+        if let Some(deviation) = &self.deviation {
+            writeln!(f, "results          {deviation}")?;
+        }
+        let stage = self.stage;
+        match (self.conforms(), self.broken()) {
+            (true, _) => write!(f, "{stage}: conforms"),
+            (false, 0) => write!(f, "{stage}: not all could be tested"),
+            (false, broken) => write!(f, "{stage}: breaks the contract in {broken} of its rules"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(times_ms: &[i64]) -> Option<Work> {
+        Work::of(times_ms.iter().map(|ms| ms * 1_000_000))
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 2e-3 * b
+    }
+
+    #[test]
+    fn the_maximum_of_few_items_is_called_so_and_the_first_items_do_not_count() {
+        let times = [&[900, 80, 70, 60][..], &[2; 19], &[5]].concat();
+        let work = of(&times);
+        assert!(work.is_some_and(|it| it.items == 20 && it.p99_ms.is_none()));
+        let judged = work.map(|it| it.judged());
+        assert!(judged.is_some_and(|(ms, name)| near(ms, 5.0) && name == "maximum"));
+        assert_eq!(of(&times[..4]), None);
+    }
+
+    #[test]
+    fn a_hundred_items_have_a_percentile() {
+        let times = [&[0; 4][..], &[2; 198], &[5, 9]].concat();
+        let work = of(&times);
+        assert!(work.is_some_and(|it| it.p99_ms.is_some_and(|ms| near(ms, 2.0))));
+        assert!(work.is_some_and(|it| near(it.max_ms, 9.0)));
+    }
+
+    #[test]
+    fn a_rule_that_was_not_reached_is_not_broken() {
+        let report = |verdict| Report {
+            stage: "masking",
+            command: Vec::new(),
+            scans: 8,
+            rules: vec![Judged {
+                rule: Rule::Resumes,
+                section: Rule::Resumes.section(),
+                says: Rule::Resumes.says(),
+                verdict,
+            }],
+            work: None,
+            answers: None,
+            own_work: None,
+            deviation: None,
+        };
+        let not_reached = report(Verdict::NotReached);
+        assert!(!not_reached.conforms() && not_reached.broken() == 0);
+        assert_eq!(report(Verdict::Broken(Vec::new())).broken(), 1);
+    }
+}

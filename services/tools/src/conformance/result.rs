@@ -1,0 +1,220 @@
+//! The result in a message: its bytes, and the differences of results.
+
+use bytemuck::{cast_slice, pod_read_unaligned};
+use gyre_geometry::wrap_angle;
+use gyre_messages::{
+    Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
+    ScanHeader, flag,
+};
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
+use serde::Serialize;
+
+/// Returns the bytes of a message that its inputs determine: all but the times of its processing,
+/// its sender, and the unused part of its payload.
+pub(crate) fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
+    let item = message.item();
+    let item = Item {
+        due_ns: 0,
+        generation: 0,
+        numbered_from: 0,
+        flags: item.flags & !flag::SYNC,
+        hops: Default::default(),
+        ..item
+    };
+    if item.is(flag::END) {
+        return Ok([item.seq, item.flags.into()].map(u64::to_le_bytes).concat());
+    }
+    let message = message.about(&item);
+    match topic {
+        Scan::TOPIC => scan(&message),
+        Masked::TOPIC => masked(&message),
+        _ => Ok(message.header_bytes().to_vec()),
+    }
+}
+
+/// Returns the header without the unused rows of its tables, and the rows of the sweep.
+fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
+    let mut header: ScanHeader = message.header::<Scan>()?;
+    let azimuths = header.azimuths as usize;
+    header.azimuth_stamp_ns[azimuths..].fill(0);
+    header.azimuth_rad[azimuths..].fill(0.0);
+    header.azimuth_flags[azimuths..].fill(0);
+    let sweep = header.view(&message.payload);
+    let rows = sweep
+        .iter()
+        .flat_map(|sweep| (0..azimuths).flat_map(|row| sweep.row(row).to_vec()));
+    let rows: Vec<u8> = rows.collect();
+    // Where in the payload the rows are is no result.
+    (header.first_byte, header.stride) = (0, 0);
+    Ok([message.with::<Scan>(&header).header_bytes(), &rows].concat())
+}
+
+fn masked(message: &Recorded) -> Result<Vec<u8>, StageError> {
+    let header = message.header::<Masked>()?;
+    let values = floats(&message.payload);
+    let mut bytes = message.header_bytes().to_vec();
+    for raster in rasters(&header, &values) {
+        bytes.extend_from_slice(cast_slice(&raster));
+    }
+    bytes.extend_from_slice(cast_slice(header.points(&values).unwrap_or_default()));
+    Ok(bytes)
+}
+
+/// Returns the values of a payload, which need not be aligned.
+pub(crate) fn floats(payload: &[u8]) -> Vec<f32> {
+    payload.chunks_exact(4).map(pod_read_unaligned).collect()
+}
+
+/// Returns the cells of the rasters, row after row.
+fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
+    let pair = header.pair(values, Some((header, values)));
+    let Some(pair) = pair else {
+        return Vec::new();
+    };
+    let earlier = pair.earlier.filter(|_| pair.earlier_changed);
+    let views = std::iter::once(pair.later).chain(earlier);
+    views.map(|view| view.iter().copied().collect()).collect()
+}
+
+/// The differences of results that have other bytes.
+#[derive(Debug, Default)]
+pub(crate) struct Differences {
+    /// Mean absolute difference of the cells of the rasters.
+    mask: Vec<f64>,
+    /// Sum of the means of the cells of the first rasters.
+    mask_levels: f64,
+    /// Length of the difference of the translations, m.
+    translation_m: Vec<f64>,
+    /// Absolute difference of the yaws, degrees.
+    rotation_deg: Vec<f64>,
+}
+
+impl Differences {
+    /// Adds two results for an item; returns the differences of masks, of translation (m) and of
+    /// rotation (deg).
+    pub(crate) fn add(
+        &mut self,
+        topic: &str,
+        one: &Recorded,
+        other: &Recorded,
+    ) -> Result<[Option<f64>; 3], StageError> {
+        match topic {
+            Scan::TOPIC => Ok([None; 3]),
+            Masked::TOPIC => {
+                let [one, other] = [cells(one)?, cells(other)?];
+                let pairs = || one.iter().zip(&other);
+                let mean = |sum: f64| sum / pairs().count().max(1) as f64;
+                let difference = mean(pairs().map(|(a, b)| f64::from((a - b).abs())).sum());
+                self.mask.push(difference);
+                self.mask_levels += mean(pairs().map(|(a, _)| f64::from(*a)).sum());
+                Ok([Some(difference), None, None])
+            }
+            _ => {
+                let (one, other) = (planar(topic, one)?, planar(topic, other)?);
+                let rotation_deg = wrap_angle(other[2] - one[2]).to_degrees().abs();
+                self.rotation_deg.push(rotation_deg);
+                let translation_m = (other[0] - one[0]).hypot(other[1] - one[1]);
+                let translation_m = (topic != Rotation::TOPIC).then_some(translation_m);
+                self.translation_m.extend(translation_m);
+                Ok([None, translation_m, Some(rotation_deg)])
+            }
+        }
+    }
+
+    /// Returns their percentiles.
+    pub(crate) fn spreads(&self) -> Spreads {
+        let count = self.mask.len();
+        Spreads {
+            mask: Spread::of(&self.mask),
+            mask_level: (count > 0).then(|| self.mask_levels / count as f64),
+            translation_m: Spread::of(&self.translation_m),
+            rotation_deg: Spread::of(&self.rotation_deg),
+        }
+    }
+}
+
+fn cells(message: &Recorded) -> Result<Vec<f32>, StageError> {
+    let header = message.header::<Masked>()?;
+    Ok(rasters(&header, &floats(&message.payload)).concat())
+}
+
+/// The differences of results; `None` where the stage's results have no such part, or all are
+/// equal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spreads {
+    /// Mean absolute difference of the cells of the rasters.
+    pub mask: Option<Spread>,
+    /// Mean of the cells of the first rasters, for comparison.
+    pub mask_level: Option<f64>,
+    /// Difference of the translations, m.
+    pub translation_m: Option<Spread>,
+    /// Difference of the rotations, degrees.
+    pub rotation_deg: Option<Spread>,
+}
+
+/// Percentiles of differences.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+impl Spreads {
+    /// Returns the rows of a table.
+    pub(crate) fn rows(&self) -> Vec<String> {
+        let rows = [
+            ("mask", self.mask, ""),
+            ("translation", self.translation_m, " m"),
+            ("rotation", self.rotation_deg, " deg"),
+        ];
+        let row = |(name, spread, unit): (&str, Option<Spread>, &str)| {
+            let Spread { p50, p99, max } = spread?;
+            Some(format!(
+                "{name:<13} p50 {p50:.4}{unit}, p99 {p99:.4}{unit}, max {max:.4}{unit}"
+            ))
+        };
+        let level = self.mask_level;
+        let level = level.map(|level| format!("where the mean of the real ones is {level:.4}"));
+        rows.into_iter().filter_map(row).chain(level).collect()
+    }
+
+    /// Returns whether nothing that is measured differs.
+    pub(crate) fn are_zero(&self) -> bool {
+        let all = [self.mask, self.translation_m, self.rotation_deg];
+        all.into_iter().flatten().all(|spread| spread.max == 0.0)
+    }
+}
+
+impl Spread {
+    fn of(values: &[f64]) -> Option<Self> {
+        let mut values = values.to_vec();
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| values[((values.len() - 1) as f64 * share).ceil() as usize];
+        let max = *values.last()?;
+        Some(Self {
+            p50: at(0.5),
+            p99: at(0.99),
+            max,
+        })
+    }
+}
+
+/// Returns the result of a search, a refinement or a composition: x, y (m), yaw (rad).
+fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], StageError> {
+    let motion =
+        |header: MotionHeader| [header.motion.x_m, header.motion.y_m, header.motion.yaw_rad];
+    Ok(match topic {
+        Rotation::TOPIC => [0.0, 0.0, message.header::<Rotation>()?.rotation.angle_rad],
+        Motion::TOPIC => motion(message.header::<Motion>()?),
+        Refined::TOPIC => motion(message.header::<Refined>()?),
+        _ => {
+            let pose = message.header::<Pose>()?;
+            [pose.x_m, pose.y_m, pose.yaw_rad]
+        }
+    })
+}

@@ -1,0 +1,122 @@
+//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the
+//! stage, its results are compared with the stage's and timed, and nobody uses them.
+//!
+//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it
+//! nor fails with it. The program gets the observed items one at a time. The only cost for the
+//! observed run is processor time.
+//!
+//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
+//! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
+
+mod life;
+mod observation;
+mod record;
+mod renumbering;
+mod report;
+mod shadowing;
+
+use std::{fs, path::PathBuf, time::Duration};
+
+use gyre_messages::{StageId, Window};
+use gyre_stage::{Manifest, observer::ObservedRun, wake::Signals};
+use gyre_supervise::Scheduling;
+
+use crate::conformance::{Candidate, ProgramError};
+
+pub use record::Counts;
+pub use report::{Beside, Report, Verdict};
+
+use life::ShadowProgram;
+use record::Record;
+use shadowing::Shadowing;
+
+/// The program, the stage that it shadows, and the limits of the comparison.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub stage: StageId,
+    /// The program and its arguments.
+    pub command: Vec<String>,
+    /// The program of the guardian, which ends the shadow if this process is killed.
+    pub gyre: String,
+    /// The priority of the shadow.
+    pub scheduling: Scheduling,
+    /// Time for it to open its topics.
+    pub start_timeout: Duration,
+    /// Time for an item.
+    pub item_timeout: Duration,
+    /// Items to compare; `None`: until the run ends.
+    pub scans: Option<u64>,
+    /// Time after which it ends.
+    pub duration: Option<Duration>,
+    /// A folder for `shadow.json`, `shadow.csv`, and the output of the program, `shadow.txt`.
+    pub report: Option<PathBuf>,
+}
+
+/// The stages that can have a shadow: those between source and sink.
+pub const STAGES: [StageId; 5] = [
+    StageId::Masking,
+    StageId::RotationSearch,
+    StageId::TranslationSearch,
+    StageId::JointSearch,
+    StageId::Refinement,
+];
+
+/// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
+/// requests a stop. `observe` receives lines about the progress. Faults of the program are in the
+/// report, not in the error.
+pub fn shadow(
+    run: &ObservedRun,
+    options: &Options,
+    observe: &mut dyn FnMut(&str),
+) -> Result<Report, ProgramError> {
+    let signals = Signals::install()?;
+    let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
+    if let Some(folder) = &options.report {
+        let created = gyre_storage::create_folder(folder);
+        created.map_err(|error| ProgramError::file(folder)(error.source))?;
+    }
+    let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
+    let folder = folder.map_err(ProgramError::file(&std::env::temp_dir()))?;
+    let program = ShadowProgram {
+        candidate: candidate(run, options)?,
+        folder: folder.path().to_owned(),
+        output: in_report("shadow.txt"),
+    };
+    if let Some(path) = &program.output {
+        fs::write(path, "").map_err(ProgramError::file(path))?;
+    }
+    let topic = program.candidate.topics().output;
+    let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
+    let shadowing = Shadowing::begin(options, &program, run, &signals, record)?;
+    let record = shadowing.run(observe)?;
+    let report = Report::of(options.stage.name(), &options.command, &record);
+    if let Some(path) = in_report("shadow.json") {
+        let text = serde_json::to_string_pretty(&report)?;
+        fs::write(&path, text).map_err(ProgramError::file(&path))?;
+    }
+    Ok(report)
+}
+
+/// Returns the program, in a run like the observed one but lossless: the scans that the run's
+/// masking has dropped are not sent at all.
+fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, ProgramError> {
+    let manifest = run.manifest();
+    let configuration = manifest.root.join("config.toml");
+    Ok(Candidate {
+        stage: options.stage,
+        command: options.command.clone(),
+        scheduling: options.scheduling.clone(),
+        gyre: options.gyre.clone(),
+        manifest: Manifest {
+            live: false,
+            window: Window {
+                live_depth: 0,
+                observers: 0,
+                ..manifest.window
+            },
+            ..manifest.clone()
+        },
+        configuration: fs::read_to_string(&configuration)
+            .map_err(ProgramError::file(&configuration))?,
+    })
+}

@@ -1,0 +1,221 @@
+//! The observed items of the run: the inputs of the stage, and its output.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use gyre_messages::{StageId, flag};
+use gyre_stage::{
+    Listener, StageError,
+    observer::{ObservedRun, TopicObserver},
+};
+use gyre_supervise::rig::Recorded;
+
+use crate::conformance::topics::{Direction, StageTopics};
+
+/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
+/// mode most scans never become an item.
+const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
+
+/// An item of the stage, with all messages that it is about.
+#[derive(Clone, Debug)]
+pub(crate) struct Observed {
+    /// The inputs that lead down the stream, by topic.
+    pub inputs: Vec<(&'static str, Recorded)>,
+    /// The output of the stage of the run.
+    pub output: Recorded,
+    /// For masking: the feedback to the items before, without a gap, as far back as it may need.
+    pub before: Vec<Feedback>,
+    /// True if a stage that begins here can give the result of one that has seen all before.
+    pub can_open: bool,
+}
+
+/// The feedback to an earlier item.
+#[derive(Clone, Debug)]
+pub(crate) struct Feedback {
+    pub seq: u64,
+    breaks: bool,
+    /// The motion as searched.
+    pub motion: Recorded,
+    pub pose: Recorded,
+}
+
+impl Observed {
+    pub(crate) fn seq(&self) -> u64 {
+        self.output.item().seq
+    }
+
+    /// Returns whether the chain of motions starts here.
+    pub(crate) fn breaks(&self) -> bool {
+        self.output.item().is(flag::BREAK)
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        let inputs = self.inputs.iter().map(|(_, it)| it.payload.len());
+        inputs.sum::<usize>() + self.output.payload.len()
+    }
+}
+
+/// The observers of a stage's topics, and the items that their messages make.
+pub(crate) struct Observation<'run> {
+    run: &'run ObservedRun,
+    /// The inputs, the output, then the feedback.
+    topics: Vec<&'static str>,
+    observers: Vec<Box<dyn TopicObserver + 'run>>,
+    forward: usize,
+    lag: u64,
+    /// The messages of incomplete items, by the number of the scan at its source, because masking
+    /// renumbers scans.
+    incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
+    incomplete_bytes: usize,
+    /// The last items without a gap: those that the lag reaches from an item and from the one
+    /// before.
+    recent: VecDeque<Feedback>,
+    last: Option<u64>,
+    /// Items of the stage that were not seen whole.
+    pub missed: u64,
+    /// The number of places with missing items.
+    pub gaps: u64,
+}
+
+impl<'run> Observation<'run> {
+    /// Observes the topics of a stage.
+    pub(crate) fn of(
+        run: &'run ObservedRun,
+        stage: StageId,
+        stage_topics: &StageTopics,
+    ) -> Result<Self, StageError> {
+        let inputs = stage_topics.leading(Direction::Forward);
+        let mut topics: Vec<_> = inputs.chain([stage_topics.output]).collect();
+        let forward = topics.len() - 1;
+        if stage == StageId::Masking {
+            topics.extend(stage_topics.leading(Direction::Feedback));
+        }
+        let mut observers = Vec::new();
+        for topic in &topics {
+            observers.extend(run.observe_topic(topic)?);
+        }
+        Ok(Self {
+            run,
+            observers,
+            topics,
+            forward,
+            lag: run.manifest().window.lag as u64,
+            incomplete: BTreeMap::new(),
+            incomplete_bytes: 0,
+            recent: VecDeque::new(),
+            last: None,
+            missed: 0,
+            gaps: 0,
+        })
+    }
+
+    /// Empties the queues; returns the items that are complete with it.
+    pub(crate) fn take(&mut self) -> Result<Vec<Observed>, StageError> {
+        let mut complete = Vec::new();
+        for place in 0..self.observers.len() {
+            loop {
+                match self.observers[place].take() {
+                    Ok(Some(message)) => {
+                        complete.extend(self.add(place, Recorded::from_bytes(message)));
+                    }
+                    Ok(None) => break,
+                    // The run judges the messages of its stages. The item counts as missed.
+                    Err(StageError::Malformed { .. }) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        Ok(complete)
+    }
+
+    /// Returns the listeners that the publishers notify.
+    pub(crate) fn listeners(&self) -> impl Iterator<Item = &Listener> {
+        self.observers.iter().map(|it| it.listener())
+    }
+
+    /// Returns whether the stream or the run has ended.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.run.has_ended() || self.observers.iter().all(|it| it.has_ended())
+    }
+
+    fn add(&mut self, place: usize, message: Recorded) -> Option<Observed> {
+        let published = message.item().published;
+        let topics = self.topics.len();
+        let messages = self.incomplete.entry(published);
+        let messages = messages.or_insert_with(|| vec![None; topics]);
+        self.incomplete_bytes += message.payload.len();
+        let replaced = messages[place].replace(message);
+        self.incomplete_bytes -= replaced.map_or(0, |it| it.payload.len());
+        if messages.iter().all(Option::is_some) {
+            return self.complete(published);
+        }
+        while self.incomplete_bytes > MAX_INCOMPLETE_BYTES
+            && let Some((_, messages)) = self.incomplete.pop_first()
+        {
+            self.incomplete_bytes -= bytes(&messages);
+        }
+        None
+    }
+
+    fn complete(&mut self, published: u64) -> Option<Observed> {
+        // Each topic comes in order: a missing message of an earlier item does not come any more.
+        let later = self.incomplete.split_off(&published.saturating_add(1));
+        let mut earlier = std::mem::replace(&mut self.incomplete, later);
+        self.incomplete_bytes -= earlier.values().map(|it| bytes(it)).sum::<usize>();
+        let messages: Option<Vec<_>> = earlier.remove(&published)?.into_iter().collect();
+        let mut messages = messages?.into_iter();
+        let topics = self.topics.iter().copied();
+        let inputs: Vec<_> = topics.zip(messages.by_ref().take(self.forward)).collect();
+        let output = messages.next()?;
+        let seq = output.item().seq;
+        self.count_missed(seq);
+        let mut observed = Observed {
+            inputs,
+            output,
+            before: Vec::new(),
+            can_open: true,
+        };
+        if let (Some(motion), Some(pose)) = (messages.next(), messages.next()) {
+            self.add_feedback(&mut observed);
+            self.recent.push_back(Feedback {
+                seq,
+                breaks: observed.breaks(),
+                motion,
+                pose,
+            });
+            while self.recent.len() as u64 > self.lag + 1 {
+                self.recent.pop_front();
+            }
+        }
+        Some(observed)
+    }
+
+    fn count_missed(&mut self, seq: u64) {
+        let expected = self.last.map_or(seq, |last| last.saturating_add(1));
+        if seq != expected {
+            self.missed += seq.saturating_sub(expected);
+            self.gaps += 1;
+            self.recent.clear();
+        }
+        self.last = Some(seq);
+    }
+
+    /// Adds the feedback to earlier items that masking needs.
+    fn add_feedback(&self, observed: &mut Observed) {
+        let (seq, lag) = (observed.seq(), self.lag);
+        observed.before = self.recent.iter().cloned().collect();
+        let before = &observed.before;
+        let has_all = before.len() as u64 > lag;
+        // A chain that has just begun is compensated by nothing.
+        let begins_before = before
+            .iter()
+            .any(|it| it.breaks && it.seq.saturating_add(lag) > seq);
+        observed.can_open = match observed.breaks() {
+            true => seq == 0 || has_all,
+            false => has_all && !begins_before,
+        };
+    }
+}
+
+fn bytes(messages: &[Option<Recorded>]) -> usize {
+    messages.iter().flatten().map(|it| it.payload.len()).sum()
+}

@@ -1,0 +1,198 @@
+//! The record of a comparison: counts, differences, times, and a row of `shadow.csv` for each item.
+
+use std::{fs::File, path::Path};
+
+use gyre_messages::{Item, StageId};
+use gyre_run::latency::Durations;
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
+use serde::Serialize;
+
+use crate::conformance::{
+    ProgramError,
+    item::work_ns,
+    result::{Differences, result_bytes},
+};
+
+/// Sentences about breaches and deaths that are kept; more are counted.
+const SENTENCES: usize = 5;
+
+/// The fates of the observed items.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Items of the stage that were seen whole.
+    pub observed: u64,
+    /// Items whose results were compared.
+    pub compared: u64,
+    /// Compared items with the same bytes.
+    pub identical: u64,
+    /// Items that only opened the stream for the shadow: at its start, after a gap and after
+    /// skipped items.
+    pub opening: u64,
+    /// Items that were left out because the shadow was behind.
+    pub skipped: u64,
+    /// Items that passed while the shadow was starting.
+    pub while_starting: u64,
+    /// Items that the shadow had and did not answer, or not in a form that can be read.
+    pub unanswered: u64,
+    /// Items that were not sent to it any more when the comparison ended.
+    pub left: u64,
+    /// Items that were not seen whole.
+    pub missed: u64,
+    /// Gaps of missed items.
+    pub gaps: u64,
+    /// Starts of the shadow.
+    pub starts: u64,
+    /// Ends of the shadow that were not asked for.
+    pub deaths: u64,
+    /// The number of kills because the program did not start or answer in time.
+    pub hangs: u64,
+    /// Breaches of the contract of a stage.
+    pub breaches: u64,
+}
+
+/// Times of the shadow and of the stage of the run, for the same items.
+#[derive(Debug, Default)]
+pub(crate) struct Times {
+    pub shadow: Durations,
+    pub real: Durations,
+}
+
+/// All that is recorded.
+pub(crate) struct Record {
+    stage: StageId,
+    topic: &'static str,
+    rows: Option<csv::Writer<File>>,
+    pub counts: Counts,
+    pub differences: Differences,
+    pub work: Times,
+    pub answer: Times,
+    pub breaches: Vec<String>,
+    pub ends: Vec<String>,
+}
+
+/// A pair of results for an item.
+pub(crate) struct Pair<'a> {
+    /// Of the run.
+    pub real: &'a Recorded,
+    /// Of the shadow, about the same item.
+    pub shadow: &'a Recorded,
+    /// From the shadow's input to its output, ns; `None` if it had more than this item to work on.
+    pub answer_ns: Option<i64>,
+}
+
+/// A row of `shadow.csv`.
+#[derive(Debug, Serialize)]
+struct ComparedItem {
+    seq: u64,
+    scan: u64,
+    stamp_ns: i64,
+    identical: u8,
+    mask_difference: Option<f64>,
+    translation_m: Option<f64>,
+    rotation_deg: Option<f64>,
+    shadow_work_ms: f64,
+    real_work_ms: f64,
+    shadow_answer_ms: Option<f64>,
+    real_answer_ms: Option<f64>,
+}
+
+impl Record {
+    /// Begins a record; with `rows` each item becomes a row of this file.
+    pub(crate) fn new(
+        stage: StageId,
+        topic: &'static str,
+        rows: Option<&Path>,
+    ) -> Result<Self, ProgramError> {
+        let rows = rows.map(|path| {
+            let file = File::create(path).map_err(ProgramError::file(path));
+            file.map(csv::Writer::from_writer)
+        });
+        Ok(Self {
+            stage,
+            topic,
+            rows: rows.transpose()?,
+            counts: Counts::default(),
+            differences: Differences::default(),
+            work: Times::default(),
+            answer: Times::default(),
+            breaches: Vec::new(),
+            ends: Vec::new(),
+        })
+    }
+
+    /// Compares the results for an item.
+    pub(crate) fn compare(&mut self, pair: &Pair<'_>) -> Result<(), ProgramError> {
+        let identical =
+            result_bytes(self.topic, pair.real)? == result_bytes(self.topic, pair.shadow)?;
+        self.counts.compared += 1;
+        self.counts.identical += u64::from(identical);
+        let row = self.row(pair, identical)?;
+        if let Some(rows) = &mut self.rows {
+            rows.serialize(row)?;
+            // At once: a person or a script reads them as they come.
+            rows.flush().map_err(csv::Error::from)?;
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, pair: &Pair<'_>, identical: bool) -> Result<ComparedItem, StageError> {
+        let (real, shadow) = (pair.real.item(), pair.shadow.item());
+        let [mask_difference, translation_m, rotation_deg] = match identical {
+            true => [None; 3],
+            false => self.differences.add(self.topic, pair.real, pair.shadow)?,
+        };
+        let (shadow_work_ns, real_work_ns) =
+            (work_ns(self.stage, &shadow), work_ns(self.stage, &real));
+        self.work.shadow.add(shadow_work_ns);
+        self.work.real.add(real_work_ns);
+        let answers = pair.answer_ns.zip(self.answer_ns(&real));
+        if let Some((shadow_ns, real_ns)) = answers {
+            self.answer.shadow.add(shadow_ns);
+            self.answer.real.add(real_ns);
+        }
+        Ok(ComparedItem {
+            seq: real.seq,
+            scan: real.scan,
+            stamp_ns: real.stamp_ns,
+            identical: identical.into(),
+            mask_difference,
+            translation_m,
+            rotation_deg,
+            shadow_work_ms: ms(shadow_work_ns),
+            real_work_ms: ms(real_work_ns),
+            shadow_answer_ms: answers.map(|(shadow_ns, _)| ms(shadow_ns)),
+            real_answer_ms: answers.map(|(_, real_ns)| ms(real_ns)),
+        })
+    }
+
+    /// Returns the time from the publication of an item's last input to the publication of the
+    /// item, in the run.
+    fn answer_ns(&self, item: &Item) -> Option<i64> {
+        let stage = self.stage as usize;
+        let before = item.hops[..stage].iter().map(|hop| hop.published_ns).max();
+        let before = before.filter(|published_ns| *published_ns > 0)?;
+        Some(item.hops[stage].published_ns.saturating_sub(before))
+    }
+
+    /// Notes a breach of the contract.
+    pub(crate) fn breach(&mut self, sentence: String) {
+        self.counts.breaches += 1;
+        keep(&mut self.breaches, sentence);
+    }
+
+    /// Notes the end of the shadow.
+    pub(crate) fn ended(&mut self, sentence: String) {
+        keep(&mut self.ends, sentence);
+    }
+}
+
+fn keep(sentences: &mut Vec<String>, sentence: String) {
+    if sentences.len() < SENTENCES {
+        sentences.push(sentence);
+    }
+}
+
+fn ms(ns: i64) -> f64 {
+    ns as f64 / 1e6
+}

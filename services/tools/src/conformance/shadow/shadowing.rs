@@ -1,0 +1,339 @@
+//! The loop: takes the items of the run, starts the shadow, sends it item after item, and compares
+//! its answers.
+
+mod answers;
+
+use std::{
+    collections::VecDeque,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::StageId;
+use gyre_stage::{
+    Listener, clock,
+    observer::ObservedRun,
+    wake::{MAX_WAIT, Signals},
+};
+
+use super::{
+    Options,
+    life::{Life, ShadowProgram},
+    observation::{Observation, Observed},
+    record::Record,
+    renumbering::{Entry, Renumbering, SentItem},
+};
+use crate::conformance::ProgramError;
+
+/// Items that wait for the shadow at most; then all but the newest are skipped.
+const BACKLOG: usize = 16;
+/// The maximum of waiting bytes for a refinement. A refinement cannot skip an item, and is
+/// restarted instead.
+const BACKLOG_BYTES: usize = 64 << 20;
+/// The shortest time between two polls of the run: see [`gyre_stage::observer`].
+const REST: Duration = Duration::from_millis(10);
+/// The same interval while the shadow starts, because its listeners are not notified.
+const STARTING: Duration = Duration::from_millis(5);
+/// Time before the shadow is started again.
+const BACKOFF: Duration = Duration::from_secs(1);
+/// Ends in a row without a compared item after which it is not started again.
+const MAX_FAILURES: u64 = 3;
+/// Time between two lines about the progress.
+const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
+
+/// A shadow of a stage of a run.
+pub(crate) struct Shadowing<'a> {
+    options: &'a Options,
+    program: &'a ShadowProgram,
+    signals: &'a Signals,
+    topic: &'static str,
+    observation: Observation<'a>,
+    taken: Instant,
+    backlog: VecDeque<Observed>,
+    life: Option<Life<'a>>,
+    renumbering: Renumbering,
+    under_way: Option<UnderWay>,
+    /// The item before the one under way, which need not be answered.
+    unanswerable: Option<u64>,
+    /// When the shadow may be started.
+    due: Instant,
+    /// Ends since the last compared item.
+    failures: u64,
+    record: Record,
+    lines: Vec<String>,
+}
+
+/// The item that the shadow has.
+struct UnderWay {
+    observed: Observed,
+    sent: SentItem,
+    sent_ns: i64,
+    since: Instant,
+    /// True if it had the item before, and so nothing else to do.
+    is_timed: bool,
+}
+
+impl<'a> Shadowing<'a> {
+    pub(crate) fn begin(
+        options: &'a Options,
+        program: &'a ShadowProgram,
+        run: &'a ObservedRun,
+        signals: &'a Signals,
+        record: Record,
+    ) -> Result<Self, ProgramError> {
+        let now = Instant::now();
+        let candidate = &program.candidate;
+        let (topics, out) = (candidate.topics(), &candidate.manifest.out);
+        let command = candidate.command.join(" ");
+        let beside = format!(
+            "`{command}` beside {} of {}",
+            options.stage.name(),
+            out.display()
+        );
+        Ok(Self {
+            options,
+            program,
+            signals,
+            topic: topics.output,
+            observation: Observation::of(run, options.stage, &topics)?,
+            taken: now,
+            backlog: VecDeque::new(),
+            life: None,
+            renumbering: Renumbering::new(options.stage, run.manifest().window.lag),
+            under_way: None,
+            unanswerable: None,
+            due: now,
+            failures: 0,
+            record,
+            lines: vec![beside],
+        })
+    }
+
+    /// Runs until the run has ended, enough is compared, or a signal requests a stop.
+    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, ProgramError> {
+        let (began, mut reported) = (Instant::now(), Instant::now());
+        loop {
+            // Before the poll: the messages before the end are still in the queues.
+            let has_ended = self.observation.has_ended();
+            self.take(has_ended)?;
+            self.attend()?;
+            self.lines.drain(..).for_each(|line| observe(&line));
+            if reported.elapsed() >= PROGRESS_PERIOD {
+                reported = Instant::now();
+                observe(&self.progress());
+            }
+            let is_over = self
+                .options
+                .duration
+                .is_some_and(|it| began.elapsed() >= it);
+            if is_over || self.has_enough() || self.is_done(has_ended) || self.sleep()? {
+                return self.finish();
+            }
+        }
+    }
+
+    fn has_enough(&self) -> bool {
+        let compared = self.record.counts.compared;
+        self.options.scans.is_some_and(|scans| compared >= scans)
+    }
+
+    /// Returns whether nothing more can come: the run has ended and all is answered, or the shadow
+    /// is given up.
+    fn is_done(&self, has_ended: bool) -> bool {
+        let has_answered = self.backlog.is_empty() && self.under_way.is_none();
+        let is_given_up = self.failures >= MAX_FAILURES;
+        let comes_again = self.life.is_some() || self.record.counts.starts == 0;
+        is_given_up || (has_ended && (has_answered || !comes_again))
+    }
+
+    fn progress(&self) -> String {
+        let counts = self.record.counts;
+        let (compared, identical, skipped) = (counts.compared, counts.identical, counts.skipped);
+        format!("{compared} items compared, {identical} identical, {skipped} skipped")
+    }
+
+    fn sleep(&self) -> Result<bool, ProgramError> {
+        let rest = REST.saturating_sub(self.taken.elapsed());
+        let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open());
+        let limit = match (rest.is_zero(), is_starting) {
+            (false, _) => rest,
+            (true, true) => STARTING,
+            (true, false) => MAX_WAIT,
+        };
+        let shadow = self.life.iter().map(|life| life.harness.output.listener());
+        let listeners: Vec<&Listener> = match rest.is_zero() {
+            true => shadow.chain(self.observation.listeners()).collect(),
+            false => shadow.collect(),
+        };
+        Ok(self.signals.sleep_until_any(&listeners, limit)?)
+    }
+
+    /// Takes the messages of the run, if a poll is due.
+    fn take(&mut self, at_once: bool) -> Result<(), ProgramError> {
+        if !at_once && self.taken.elapsed() < REST {
+            return Ok(());
+        }
+        self.taken = Instant::now();
+        for observed in self.observation.take()? {
+            self.record.counts.observed += 1;
+            self.backlog.push_back(observed);
+        }
+        let counts = &mut self.record.counts;
+        (counts.missed, counts.gaps) = (self.observation.missed, self.observation.gaps);
+        self.bound_backlog()
+    }
+
+    /// Leaves out the items for which the shadow is too late.
+    fn bound_backlog(&mut self) -> Result<(), ProgramError> {
+        let is_full = match self.options.stage {
+            StageId::Refinement if self.life.is_some() => {
+                self.backlog.iter().map(Observed::bytes).sum::<usize>() > BACKLOG_BYTES
+            }
+            _ => self.backlog.len() > BACKLOG,
+        };
+        if !is_full {
+            return Ok(());
+        }
+        let is_open = self.life.as_ref().is_some_and(Life::is_open);
+        // One that starts finds the newest ones.
+        let kept = if is_open { 1 } else { BACKLOG };
+        let left_out = self.backlog.len().saturating_sub(kept);
+        self.backlog.drain(..left_out);
+        let counts = &mut self.record.counts;
+        match is_open {
+            true => counts.skipped += left_out as u64,
+            false => counts.while_starting += left_out as u64,
+        }
+        match self.options.stage {
+            StageId::Refinement if self.life.is_some() => self.end_life(Duration::ZERO),
+            _ => Ok(()),
+        }
+    }
+
+    /// Starts the shadow if it is not running, and exchanges messages with it.
+    fn attend(&mut self) -> Result<(), ProgramError> {
+        let Some(life) = &mut self.life else {
+            return self.start();
+        };
+        let is_open = life.attend()?;
+        for sent in life.take()? {
+            self.receive(sent)?;
+        }
+        if let Some(death) = self.life.as_mut().and_then(|life| life.harness.death()) {
+            // Its last messages.
+            let last = self.life.as_ref().map(Life::take).transpose()?;
+            last.into_iter()
+                .flatten()
+                .try_for_each(|it| self.receive(it))?;
+            self.record.counts.deaths += 1;
+            return self.fail(death.to_string());
+        }
+        if let Some(reason) = self.hangs() {
+            self.record.counts.hangs += 1;
+            return self.fail(reason);
+        }
+        match is_open {
+            true => self.send(),
+            false => Ok(()),
+        }
+    }
+
+    fn start(&mut self) -> Result<(), ProgramError> {
+        // A refinement begins with a copy of the state after its first item, which has to be there.
+        let waits = self.options.stage == StageId::Refinement && self.backlog.is_empty();
+        if waits || Instant::now() < self.due {
+            return Ok(());
+        }
+        self.record.counts.starts += 1;
+        self.renumbering = Renumbering::new(
+            self.options.stage,
+            self.program.candidate.manifest.window.lag,
+        );
+        self.life = Some(Life::begin(self.program, self.signals)?);
+        Ok(())
+    }
+
+    /// Returns a sentence if the shadow does not start or does not answer.
+    fn hangs(&self) -> Option<String> {
+        let life = self.life.as_ref()?;
+        let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);
+        if !life.is_open() {
+            let topic = self.topic;
+            return (life.age() > start)
+                .then(|| format!("it has not opened `{topic}` within {start:.0?}"));
+        }
+        let under_way = self.under_way.as_ref()?;
+        let seq = under_way.observed.seq();
+        (under_way.since.elapsed() > item_timeout)
+            .then(|| format!("it has not answered item {seq} within {item_timeout:.0?}"))
+    }
+
+    /// Ends a life that has failed.
+    fn fail(&mut self, sentence: String) -> Result<(), ProgramError> {
+        self.failures += 1;
+        let again = match self.failures >= MAX_FAILURES {
+            true => "it is not started again",
+            false => "it is started again",
+        };
+        self.lines.push(format!("{sentence}; {again}"));
+        self.record.ended(sentence);
+        self.end_life(BACKOFF)
+    }
+
+    fn end_life(&mut self, backoff: Duration) -> Result<(), ProgramError> {
+        self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
+        self.unanswerable = None;
+        self.due = Instant::now() + backoff;
+        match self.life.take() {
+            Some(life) => self.program.keep_output(&life),
+            None => Ok(()),
+        }
+    }
+
+    /// Sends the next items: one that has to be answered, and those before it.
+    fn send(&mut self) -> Result<(), ProgramError> {
+        while self.under_way.is_none()
+            && let Some(observed) = self.backlog.pop_front()
+        {
+            match self.renumbering.entry(&observed) {
+                Entry::Continues | Entry::Opens => {}
+                Entry::IsLeftOut => {
+                    self.record.counts.opening += 1;
+                    continue;
+                }
+                Entry::NeedsNewLife => {
+                    self.backlog.push_front(observed);
+                    return self.end_life(Duration::ZERO);
+                }
+            }
+            let Some(life) = &self.life else {
+                return Ok(());
+            };
+            let (sent_ns, since) = (clock::now_ns(), Instant::now());
+            let sent = self.renumbering.send(&life.harness, &observed)?;
+            if sent.is_answered {
+                let is_timed = self.unanswerable.is_none();
+                self.under_way = Some(UnderWay {
+                    observed,
+                    sent,
+                    sent_ns,
+                    since,
+                    is_timed,
+                });
+            } else {
+                self.unanswerable = Some(sent.item.seq);
+                self.record.counts.opening += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Record, ProgramError> {
+        let counts = &mut self.record.counts;
+        counts.left += self.backlog.len() as u64 + u64::from(self.under_way.is_some());
+        if let Some(mut life) = self.life.take() {
+            life.end()?;
+            self.program.keep_output(&life)?;
+        }
+        Ok(self.record)
+    }
+}

@@ -1,0 +1,92 @@
+//! The messages of the shadow: examined against the contract, and compared with the result of the
+//! run for the same item.
+
+use gyre_messages::{Item, flag};
+use gyre_supervise::rig::Recorded;
+
+use super::{Shadowing, UnderWay};
+use crate::conformance::{
+    ProgramError,
+    harness::Sent,
+    item::{not_copied, wrong_stamps},
+    shadow::record::Pair,
+};
+
+impl Shadowing<'_> {
+    /// Examines a message of the shadow.
+    pub(super) fn receive(&mut self, sent: Sent) -> Result<(), ProgramError> {
+        let output = match sent {
+            Sent::Message(output) => output,
+            Sent::Malformed { sentence, .. } => {
+                self.breach(sentence);
+                self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
+                return Ok(());
+            }
+        };
+        let item = output.item();
+        match self.under_way.take() {
+            Some(it) if it.sent.item.seq == item.seq && !item.is(flag::END) => {
+                self.unanswerable = None;
+                return self.answered(&it, &output);
+            }
+            before => self.under_way = before,
+        }
+        match self.unanswerable.take() {
+            Some(seq) if seq == item.seq && !item.is(flag::END) => {}
+            unasked => {
+                self.unanswerable = unasked;
+                self.breach(unexpected(&item, self.under_way.as_ref()));
+            }
+        }
+        Ok(())
+    }
+
+    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), ProgramError> {
+        let stage = self.options.stage;
+        let (item, sent) = (output.item(), &it.sent.item);
+        for field in not_copied(stage, sent, &item) {
+            let seq = it.observed.seq();
+            self.breach(format!("item {seq}: {field} is not that of its input"));
+        }
+        let wrong = wrong_stamps(stage, &item, Some(it.sent_ns), output.received_ns);
+        let has_stamps = wrong.is_none();
+        wrong.into_iter().for_each(|sentence| self.breach(sentence));
+        if it.sent.opens {
+            self.record.counts.opening += 1;
+            return Ok(());
+        }
+        self.failures = 0;
+        let answered_ns = match has_stamps {
+            true => item.hops[stage as usize].published_ns,
+            false => output.received_ns,
+        };
+        let as_observed = Item {
+            seq: it.observed.seq(),
+            ..item
+        };
+        self.record.compare(&Pair {
+            real: &it.observed.output,
+            shadow: &output.about(&as_observed),
+            answer_ns: it.is_timed.then_some(answered_ns - it.sent_ns),
+        })
+    }
+
+    fn breach(&mut self, sentence: String) {
+        if self.record.counts.breaches == 0 {
+            self.lines
+                .push(format!("it breaks the contract: {sentence}"));
+        }
+        self.record.breach(sentence);
+    }
+}
+
+fn unexpected(item: &Item, under_way: Option<&UnderWay>) -> String {
+    let seq = item.seq;
+    match under_way {
+        Some(it) => format!(
+            "it sent item {seq}, and item {} was to be answered",
+            it.sent.item.seq
+        ),
+        None => format!("it sent item {seq}, and none was to be answered"),
+    }
+}

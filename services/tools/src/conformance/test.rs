@@ -1,0 +1,88 @@
+//! The program that is tested, and its limits.
+
+use std::{io, ops::Range, path::Path, time::Duration};
+
+use gyre_datasets::Dataset;
+use gyre_messages::StageId;
+use gyre_stage::wake::Signals;
+use gyre_supervise::rig::Rig;
+
+use crate::conformance::{Candidate, ProgramError, reference::Reference};
+
+/// Writes files into the root of a run.
+pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
+
+/// A program that is to keep the contract of a stage, and its limits.
+pub struct Test {
+    /// The program. Each of its runs writes to a folder below its manifest's `out`.
+    pub candidate: Candidate,
+    /// The stages of a run with this configuration.
+    pub stages: Vec<StageId>,
+    /// Writes the other files of a run's root, as the list of a recording's files.
+    pub prepare: Prepare,
+    /// The limits.
+    pub demands: Demands,
+}
+
+/// Time limits of a program, and optional demands on it.
+#[derive(Clone, Debug)]
+pub struct Demands {
+    /// Time for its start.
+    pub start_timeout: Duration,
+    /// Time for one item.
+    pub item_timeout: Duration,
+    /// Time for its exit after SIGTERM, and after an input that it has to refuse.
+    pub stop_timeout: Duration,
+    /// The time of watching a program that must send nothing.
+    pub quiet: Duration,
+    /// True if its results must equal the results of Gyre's own stage, to the bit.
+    pub same_as_own: bool,
+    /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
+    /// the maximum.
+    pub budget: Option<Duration>,
+}
+
+impl Default for Demands {
+    fn default() -> Self {
+        Self {
+            start_timeout: Duration::from_secs(30),
+            item_timeout: Duration::from_secs(10),
+            stop_timeout: Duration::from_secs(2),
+            quiet: Duration::from_millis(300),
+            same_as_own: false,
+            budget: None,
+        }
+    }
+}
+
+/// The scans that the inputs are computed from.
+pub struct InputScans {
+    /// An open recording or simulation.
+    pub dataset: Box<dyn Dataset>,
+    /// The scans to play.
+    pub played: Range<usize>,
+}
+
+impl Test {
+    /// Creates a run of this name, with or without its services.
+    pub(crate) fn rig<'a>(
+        &self,
+        name: &str,
+        signals: &'a Signals,
+        has_services: bool,
+    ) -> Result<Rig<'a>, ProgramError> {
+        let out = self.candidate.manifest.out.join(name);
+        let rig = self.candidate.rig(out, signals, has_services)?;
+        let root = &rig.manifest().root;
+        (self.prepare)(root).map_err(ProgramError::file(root))?;
+        Ok(rig)
+    }
+}
+
+/// The test with its inputs, as all checks need it.
+#[derive(Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub test: &'a Test,
+    pub reference: &'a Reference,
+    pub signals: &'a Signals,
+}

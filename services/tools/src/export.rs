@@ -1,0 +1,172 @@
+//! `gyre export`: the results of a run, and its scans, as a bag of ROS 2; or the repaired recording
+//! of a run, in RADIATE's format (`repaired`).
+
+mod arguments;
+mod places;
+mod repaired;
+mod scans;
+mod source;
+
+use std::{path::Path, process::ExitCode};
+
+use gyre_messages::ListedObject;
+use gyre_recording::bags::{BagWriter, Kept, Topic};
+use gyre_ros2_messages::{
+    Mounting,
+    frames::{self, Frames, Interval},
+    nav_msgs::Odometry,
+    objects,
+    tf2_msgs::TFMessage,
+    vision_msgs::Detection3DArray,
+    visualization_msgs::MarkerArray,
+};
+use gyre_terminal::{Failure, print};
+
+pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
+use places::Place;
+use scans::ScanWriter;
+use source::Source;
+
+/// Writes the bag or the dataset.
+pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
+    let mut source = Source::open(&arguments.source)?;
+    match (&arguments.mcap, &arguments.out) {
+        (Some(bag), _) => write_bag(&mut source, bag, arguments)?,
+        (None, Some(out)) => repaired::write(&source, out)?,
+        (None, None) => return Err("name what to write: --mcap BAG".into()),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
+    let mut bag = BagWriter::create(path)?;
+    let frames = arguments.frames.frames.clone();
+    let mounting = arguments.frames.mounting.parse()?;
+    let mut places = source.places()?.peekable();
+    let mut trajectory = match places.peek() {
+        Some(_) => Some(Trajectory::begin(&mut bag, &frames, mounting)?),
+        None => None,
+    };
+    let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
+    let mut last_ns = 0;
+    while let Some(stamp_ns) = scans.write_next(&mut bag)? {
+        while let Some(place) = places.next_if(|place| is_due(place, stamp_ns)) {
+            write_place(&mut bag, trajectory.as_mut(), place?)?;
+        }
+        last_ns = stamp_ns;
+    }
+    for place in places {
+        let place = place?;
+        last_ns = last_ns.max(place.stamp_ns);
+        write_place(&mut bag, trajectory.as_mut(), place)?;
+    }
+    source.write_map(&mut bag, &frames, last_ns, &mounting)?;
+    let counts: Vec<String> = bag
+        .counts()
+        .map(|(topic, count)| format!("{topic} {count}"))
+        .collect();
+    if bag.counts().all(|(_, count)| count == 0) {
+        let source = arguments.source.display();
+        return Err(format!("{source} has nothing to export: neither poses nor scans").into());
+    }
+    bag.finish()?;
+    print::line(format_args!("{}: {}", path.display(), counts.join(", ")))?;
+    scans.describe_losses();
+    Ok(())
+}
+
+/// Returns whether a pose is not later than a scan; what cannot be read is due at once.
+fn is_due(place: &Result<Place, Failure>, stamp_ns: i64) -> bool {
+    place.as_ref().is_ok_and(|place| place.stamp_ns <= stamp_ns) || place.is_err()
+}
+
+/// The topics of a trajectory.
+struct Trajectory {
+    frames: Frames,
+    mounting: Mounting,
+    odometry: Topic<Odometry>,
+    transforms: Topic<TFMessage>,
+    fixed: Topic<TFMessage>,
+    /// Of a run that tracks objects, from the first scan that has them.
+    objects: Option<(Topic<Detection3DArray>, Topic<MarkerArray>)>,
+    /// True if the mounting has been written.
+    is_mounted: bool,
+}
+
+impl Trajectory {
+    fn begin(bag: &mut BagWriter, frames: &Frames, mounting: Mounting) -> Result<Self, Failure> {
+        Ok(Self {
+            frames: frames.clone(),
+            mounting,
+            odometry: bag.topic("/odom", Kept::ForNobody)?,
+            transforms: bag.topic("/tf", Kept::ForNobody)?,
+            fixed: bag.topic("/tf_static", Kept::ForLater)?,
+            objects: None,
+            is_mounted: false,
+        })
+    }
+
+    fn write(&mut self, bag: &mut BagWriter, place: &Place) -> Result<(), Failure> {
+        let (frames, stamp_ns) = (&self.frames, place.stamp_ns);
+        if !self.is_mounted {
+            let radar = self.mounting.radar();
+            let mounted = frames::transform(stamp_ns, &frames.base, &frames.radar, radar);
+            let message = TFMessage {
+                transforms: vec![mounted],
+            };
+            bag.write(&self.fixed, stamp_ns, &message)?;
+            self.is_mounted = true;
+        }
+        let pose = self.mounting.of_vehicle_uncertain(&place.pose);
+        let since = place.since.map(|since| Interval {
+            motion: self.mounting.of_vehicle_uncertain(&since.motion),
+            ..since
+        });
+        let odometry = frames::odometry(stamp_ns, frames, &pose, since.as_ref());
+        let mut transforms = vec![frames::transform(
+            stamp_ns,
+            &frames.odom,
+            &frames.base,
+            &pose.motion,
+        )];
+        transforms.extend(place.map_from_odometry.map(|correction| {
+            let correction = self.mounting.of_vehicle(&correction);
+            frames::transform(stamp_ns, &frames.map, &frames.odom, &correction)
+        }));
+        bag.write(&self.odometry, stamp_ns, &odometry)?;
+        bag.write(&self.transforms, stamp_ns, &TFMessage { transforms })?;
+        match &place.objects {
+            Some(objects) => self.write_objects(bag, stamp_ns, objects),
+            None => Ok(()),
+        }
+    }
+
+    fn write_objects(
+        &mut self,
+        bag: &mut BagWriter,
+        stamp_ns: i64,
+        listed: &[ListedObject],
+    ) -> Result<(), Failure> {
+        let (frames, mounting) = (&self.frames, &self.mounting);
+        let (detections, markers) = match &mut self.objects {
+            Some(topics) => topics,
+            topics => topics.insert((
+                bag.topic("/objects", Kept::ForNobody)?,
+                bag.topic("/object_markers", Kept::ForNobody)?,
+            )),
+        };
+        let detected = objects::detections(stamp_ns, frames, mounting, listed);
+        bag.write(detections, stamp_ns, &detected)?;
+        let drawn = objects::markers(stamp_ns, frames, mounting, listed);
+        bag.write(markers, stamp_ns, &drawn)?;
+        Ok(())
+    }
+}
+
+fn write_place(
+    bag: &mut BagWriter,
+    trajectory: Option<&mut Trajectory>,
+    place: Place,
+) -> Result<(), Failure> {
+    trajectory.map_or(Ok(()), |trajectory| trajectory.write(bag, &place))
+}

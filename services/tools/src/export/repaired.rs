@@ -1,0 +1,221 @@
+//! The recording of a run with its lost azimuths put back, in RADIATE's form: so that others can be
+//! run on the same scans.
+//!
+//! The places of the losses come from the run's journal, which keeps them with each pose.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use gyre_configuration::Configuration;
+use gyre_datasets::{
+    Dataset, DatasetOptions, Format, LostAzimuthOption, ReadError, find_ground_truth,
+    stored_options,
+};
+use gyre_radar::{
+    LostAzimuths, OwnedScan,
+    lost::{repair, stale_rows},
+};
+use gyre_storage::{StorageError, create_folder, write as write_file};
+use gyre_terminal::{Failure, print};
+
+use crate::export::source::{Lost, Source};
+
+/// The folder of the images in RADIATE's form; the list of their times lies beside it.
+const IMAGES: &str = "Navtech_Polar";
+/// The file with the options of a recording.
+const OPTIONS: &str = "dataset.toml";
+/// The ends of the names of lists that lie beside the images.
+const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
+
+/// Writes the scans that a run has played to a new folder.
+pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
+    let Some((_, configuration)) = source.run() else {
+        return Err(
+            "where azimuths were lost is known from a run: name the folder of its results".into(),
+        );
+    };
+    let dataset = recording(configuration)?;
+    let played = configuration.source.played(dataset.scans());
+    let images = dataset
+        .file(played.start)
+        .parent()
+        .unwrap_or(Path::new(""))
+        .to_owned();
+    let mut writer = Writer {
+        scan: OwnedScan::with_limits(dataset.limits()),
+        dataset,
+        found: source.lost()?,
+        out: new_folder(out)?,
+        counts: Counts::default(),
+    };
+    for index in played {
+        writer.write(index)?;
+    }
+    let root = images.parent().unwrap_or(Path::new(""));
+    // Beside an interpolated column one of a standing radar may look stale.
+    let options = DatasetOptions {
+        lost_azimuths: Some(LostAzimuthOption::Ignore),
+        ..stored_options(root)?
+    };
+    write_file(&out.join(OPTIONS), toml::to_string(&options)?)?;
+    copy_lists(&images, root, out)?;
+    writer.counts.describe(out)
+}
+
+/// Opens the recording of a run.
+fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure> {
+    let data = configuration.data();
+    if configuration.streamed().is_some() {
+        return Err(format!("the run was of {data}, which is not on disk: gyre simulate writes it, without lost azimuths if effects.lost_azimuths is false").into());
+    }
+    let dataset = gyre_configuration::open(configuration)?.dataset;
+    let format = dataset.format();
+    if format != Format::Radiate {
+        return Err(format!("the scans of {data} are of the format `{format}`, and --format radiate repairs only those that are of RADIATE's").into());
+    }
+    if configuration.dataset.lost_azimuths == Some(LostAzimuthOption::Ignore) {
+        return Err("the run has not looked for lost azimuths: run it again without dataset.lost_azimuths = \"ignore\"".into());
+    }
+    Ok(dataset)
+}
+
+/// Creates the folder of a dataset and of its images, and returns the folder of the images.
+fn new_folder(out: &Path) -> Result<PathBuf, Failure> {
+    let is_free = !out.exists() || fs::read_dir(out).is_ok_and(|mut files| files.next().is_none());
+    if !is_free {
+        let out = out.display();
+        return Err(format!("{out} exists: name a new folder, or remove it").into());
+    }
+    create_folder(out)?;
+    let images = out.join(IMAGES);
+    create_folder(&images)?;
+    Ok(images)
+}
+
+struct Writer {
+    dataset: Box<dyn Dataset>,
+    scan: OwnedScan,
+    found: Lost,
+    /// The folder of the images that are written.
+    out: PathBuf,
+    counts: Counts,
+}
+
+impl Writer {
+    fn write(&mut self, index: usize) -> Result<(), Failure> {
+        match self.dataset.read(index, self.scan.slot()) {
+            Ok(geometry) => self.scan.geometry = geometry,
+            Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+            Err(error) => {
+                print::note(format_args!("scan {index} is left out: {error}"));
+                return Ok(());
+            }
+        }
+        let from = self.dataset.file(index);
+        let to = self.out.join(from.file_name().unwrap_or_default());
+        let lost = stale_rows(&self.scan.view());
+        self.counts.scans += 1;
+        if lost == 0 {
+            return copy(from, &to);
+        }
+        self.counts.repaired += 1;
+        self.counts.azimuths += lost;
+        let places = self.places(index, lost)?;
+        write_file(&to, self.image(&places)?)?;
+        Ok(())
+    }
+
+    /// Returns where the azimuths of a scan were lost: anywhere, if live mode has dropped it.
+    fn places(&mut self, index: usize, lost: usize) -> Result<LostAzimuths, Failure> {
+        match self.found.get(&(index as u64)) {
+            None => {
+                self.counts.anywhere += 1;
+                let azimuths = self.scan.geometry.azimuths;
+                Ok(LostAzimuths::anywhere(lost, azimuths))
+            }
+            Some(found) if found.count() == lost => Ok(*found),
+            Some(found) => {
+                let (file, found) = (self.dataset.file(index).display(), found.count());
+                Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into())
+            }
+        }
+    }
+
+    /// Returns the repaired scan as a file, laid out as the one that it is from.
+    fn image(&self, places: &LostAzimuths) -> Result<Vec<u8>, Failure> {
+        let scan = self.scan.view();
+        let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
+        let mut powers = vec![0; azimuths * bins];
+        repair(&scan, places, &mut powers);
+        if self.dataset.is_transposed() {
+            let by_range = (0..bins).flat_map(|bin| powers.iter().skip(bin).step_by(bins));
+            powers = by_range.copied().collect();
+        }
+        let size = self.dataset.image_size();
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&powers)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+}
+
+/// Copies the ground truth and the lists beside the images. The times come last: images without
+/// them are no recording, should this not come to its end.
+fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
+    let times = images.with_extension("txt");
+    let failed = StorageError::at("read", root);
+    let mut lists = Vec::new();
+    for entry in fs::read_dir(root).map_err(&failed)? {
+        lists.push(entry.map_err(&failed)?.path());
+    }
+    lists.retain(|path| {
+        let end = path.extension().and_then(|end| end.to_str());
+        let is_written = *path == times || path.ends_with(OPTIONS);
+        path.is_file() && !is_written && end.is_some_and(|end| LISTS.contains(&end))
+    });
+    lists.extend(find_ground_truth(root));
+    for list in lists {
+        let to = out.join(list.strip_prefix(root)?);
+        create_folder(to.parent().unwrap_or(out))?;
+        copy(&list, &to)?;
+    }
+    copy(&times, &out.join(IMAGES).with_extension("txt"))
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
+    let bytes = fs::read(from).map_err(StorageError::at("read", from))?;
+    Ok(write_file(to, bytes)?)
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    scans: usize,
+    repaired: usize,
+    /// Azimuths that were put back.
+    azimuths: usize,
+    /// Scans whose lost azimuths have unknown places.
+    anywhere: usize,
+}
+
+impl Counts {
+    fn describe(&self, out: &Path) -> Result<(), Failure> {
+        if self.anywhere > 0 {
+            let scans = self.anywhere;
+            print::note(format_args!(
+                "{scans} scans have lost azimuths but no pose, so that it is not known where: their azimuths are stretched over the whole turn"
+            ));
+        }
+        let (out, scans) = (out.display(), self.scans);
+        let (repaired, azimuths) = (self.repaired, self.azimuths);
+        print::line(format_args!(
+            "{out}: {scans} scans, {repaired} of them repaired, which had lost {azimuths} azimuths"
+        ))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,389 @@
+//! The scans of a source as messages of Navtech's driver.
+
+use gyre_colossus::Configuration as Radar;
+use gyre_datasets::{ReadError, correct_eccentricity, middle_ns};
+use gyre_radar::{
+    OwnedScan, PlacedRows, PolarScan, Sense, SweepGeometry, lost::stale_rows, scan::flag,
+};
+use gyre_recording::bags::{BagWriter, Kept, Topic};
+use gyre_ros2_messages::{
+    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    radar::{Encoder, ScanMessages},
+};
+use gyre_terminal::{Failure, print};
+
+use crate::export::{
+    arguments::ScanForm,
+    source::{Lost, Scans, Source},
+};
+
+/// The topics of Navtech's driver.
+const CONFIGURATION: &str = "/radar_data/configuration_data";
+const AZIMUTHS: &str = "/radar_data/fft_data";
+const B_SCANS: &str = "/radar_data/b_scan_msg";
+
+/// Writes the scans of a source.
+pub struct ScanWriter {
+    open: Option<Open>,
+    losses: Losses,
+}
+
+struct Open {
+    scans: Scans,
+    scan: OwnedScan,
+    lost: Lost,
+    rows: PlacedRows,
+    messages: ScanMessages,
+    configuration: Topic<RadarConfigurationMsg>,
+    azimuths: Option<Topic<RadarFftDataMsg>>,
+    b_scans: Option<Topic<RadarBScanMsg>>,
+    is_described: bool,
+}
+
+/// The data that is not in the bag as it is in the source.
+#[derive(Debug, Default)]
+struct Losses {
+    unreadable: u64,
+    without_encoder: bool,
+    chirps: bool,
+    /// Rows that were not measured but have powers.
+    interpolated: u64,
+    /// Scans with lost azimuths: with their rows if the run has found them, and scans whose rows
+    /// are unknown.
+    placed: u64,
+    not_placed: u64,
+    /// Scans whose time differs from the middle of their first and last azimuth, and the largest
+    /// difference, ns.
+    retimed: u64,
+    retimed_by_ns: u64,
+    /// The radar's constants in the settings of `[dataset]`.
+    constants: Vec<(&'static str, f32)>,
+}
+
+impl Losses {
+    /// Takes a scan as it is written.
+    fn add(&mut self, scan: &PolarScan<'_>) {
+        let is_measured = |flags: u8| flags & flag::MEASURED != 0;
+        let chirps = flag::CHIRP_KNOWN | flag::CHIRP_UP;
+        self.chirps |= scan.flags.iter().any(|flags| flags & chirps != 0);
+        self.not_placed += u64::from(stale_rows(scan) > 0);
+        let read = 0..scan.geometry.azimuths - stale_rows(scan);
+        let rows = read.filter(|row| !is_measured(scan.flags[*row]));
+        let rows = rows.filter(|row| scan.row(*row).iter().any(|power| *power > 0));
+        self.interpolated += rows.count() as u64;
+        let written = scan.stamp_ns.iter().zip(scan.flags);
+        let written = written.filter(|(_, flags)| is_measured(**flags));
+        let mut written = written.map(|(stamp_ns, _)| *stamp_ns);
+        if let Some(first_ns) = written.next() {
+            let read_ns = middle_ns(first_ns, written.next_back().unwrap_or(first_ns));
+            let by_ns = read_ns.abs_diff(scan.geometry.stamp_ns);
+            self.retimed += u64::from(by_ns > 0);
+            self.retimed_by_ns = self.retimed_by_ns.max(by_ns);
+        }
+    }
+
+    /// Takes the constants that are not zero.
+    fn add_constants(&mut self, scan: &SweepGeometry, eccentricity_rad: f32) {
+        self.constants = vec![
+            ("range_offset_m", scan.range_offset_m),
+            ("doppler_s", scan.doppler_s),
+            ("azimuth_eccentricity_rad", eccentricity_rad),
+        ];
+        self.constants.retain(|(_, value)| *value != 0.0);
+    }
+
+    /// Returns the losses as whole sentences.
+    fn sentences(&self) -> Vec<String> {
+        let mut sentences = Vec::new();
+        if self.unreadable > 0 {
+            let unreadable = self.unreadable;
+            sentences.push(format!(
+                "{unreadable} scans cannot be read, and are not in the bag"
+            ));
+        }
+        if self.without_encoder {
+            sentences.push(
+                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
+                    .to_owned(),
+            );
+        }
+        if self.chirps {
+            sentences.push("Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned());
+        }
+        if self.interpolated > 0 {
+            let rows = self.interpolated;
+            sentences.push(format!(
+                "interpolated rows: {rows}. Navtech's messages cannot carry them; a run on the bag finds them missing"
+            ));
+        }
+        if self.placed > 0 {
+            let scans = self.placed;
+            sentences.push(format!(
+                "{scans} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans"
+            ));
+        }
+        if self.not_placed > 0 {
+            let scans = self.not_placed;
+            sentences.push(format!(
+                "{scans} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
+            ));
+        }
+        if self.retimed > 0 {
+            let (scans, ms) = (self.retimed, self.retimed_by_ns as f64 * 1e-6);
+            sentences.push(format!(
+                "{scans} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
+            ));
+        }
+        if !self.constants.is_empty() {
+            let constants = self.constants.iter();
+            let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
+            sentences.push(format!(
+                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{}",
+                settings.collect::<String>()
+            ));
+        }
+        sentences
+    }
+}
+
+impl ScanWriter {
+    /// Adds the topics of scans, if they are wanted and there are any.
+    pub fn begin(
+        bag: &mut BagWriter,
+        source: &mut Source,
+        forms: &[ScanForm],
+        frame: &str,
+    ) -> Result<Self, Failure> {
+        let mut writer = Self {
+            open: None,
+            losses: Losses::default(),
+        };
+        let is_wanted = |form| forms.contains(&form);
+        if is_wanted(ScanForm::None) {
+            return Ok(writer);
+        }
+        let Some(mut scans) = source.scans()? else {
+            print::note("the run was of a radar, and has no scans: --record keeps them");
+            return Ok(writer);
+        };
+        let Some(scan) = first(&mut scans)? else {
+            return Ok(writer);
+        };
+        let radar = writer.radar(&scans, &scan)?;
+        writer
+            .losses
+            .add_constants(&scan.geometry, scans.eccentricity_rad);
+        writer.open = Some(Open {
+            messages: ScanMessages::new(radar, frame),
+            configuration: bag.topic(CONFIGURATION, Kept::ForLater)?,
+            azimuths: match is_wanted(ScanForm::Fft) {
+                true => Some(bag.topic(AZIMUTHS, Kept::ForNobody)?),
+                false => None,
+            },
+            b_scans: match is_wanted(ScanForm::BScan) {
+                true => Some(bag.topic(B_SCANS, Kept::ForNobody)?),
+                false => None,
+            },
+            lost: source.lost()?,
+            rows: PlacedRows::default(),
+            scan,
+            scans,
+            is_described: false,
+        });
+        Ok(writer)
+    }
+
+    /// Returns the radar's description of itself in these scans.
+    fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
+        let geometry = &scan.geometry;
+        if geometry.sense != Sense::Clockwise {
+            return Err("Navtech's radars turn clockwise, and this one does not: --scans none leaves its scans out".into());
+        }
+        let (azimuths, bins) = (geometry.azimuths, geometry.bins);
+        let small = |number: usize| {
+            u16::try_from(number).map_err(|_| {
+                format!("scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's messages, which count both in 16 bits")
+            })
+        };
+        let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
+        self.losses.without_encoder = !encoder.is_exact;
+        let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
+        Ok(Radar {
+            azimuth_samples: small(azimuths)?,
+            bin_size: 0,
+            range_in_bins: small(bins)?,
+            encoder_size: encoder.counts,
+            rotation_mhz: turns_per_1000_s.round().min(f64::from(u16::MAX)) as u16,
+            packet_rate: 0,
+            range_gain: 1.0,
+            range_offset: 0.0,
+            range_resolution_m: Some(geometry.range_resolution_m),
+        })
+    }
+
+    /// Writes the next scan that can be read, and returns its time; `None` at the end.
+    pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
+        let Some(open) = &mut self.open else {
+            return Ok(None);
+        };
+        while let Some(index) = open.scans.played.next() {
+            match open.scans.read(index, &mut open.scan) {
+                Ok(()) => return open.write(index, bag, &mut self.losses).map(Some),
+                Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+                Err(error) => {
+                    print::note(format_args!("scan {index} is left out: {error}"));
+                    self.losses.unreadable += 1;
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Prints the differences between the bag and its source.
+    pub fn describe_losses(&self) {
+        self.losses.sentences().iter().for_each(print::note);
+    }
+}
+
+impl Open {
+    fn write(
+        &mut self,
+        index: usize,
+        bag: &mut BagWriter,
+        losses: &mut Losses,
+    ) -> Result<i64, Failure> {
+        let mut scan = self.scan.view();
+        if let Some(lost) = self.lost.get(&(index as u64))
+            && lost.count() > 0
+        {
+            scan = self.rows.place(&scan, lost);
+            losses.placed += u64::from(stale_rows(&scan) == 0);
+        }
+        losses.add(&scan);
+        let stamps = &scan.stamp_ns[..scan.geometry.azimuths];
+        let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
+            return Ok(scan.geometry.stamp_ns);
+        };
+        if !self.is_described {
+            let message = self.messages.configuration(*first_ns);
+            bag.write(&self.configuration, *first_ns, &message)?;
+            self.is_described = true;
+        }
+        if let Some(topic) = &self.azimuths {
+            for message in self.messages.azimuths(scan) {
+                bag.write(topic, message.header.stamp.ns(), &message)?;
+            }
+        }
+        if let Some(topic) = &self.b_scans {
+            bag.write(topic, *last_ns, &self.messages.b_scan(scan))?;
+        }
+        Ok(scan.geometry.stamp_ns)
+    }
+}
+
+impl Scans {
+    /// Reads a scan with the angles as the encoder counts them.
+    fn read(&mut self, index: usize, scan: &mut OwnedScan) -> Result<(), ReadError> {
+        scan.geometry = self.dataset.read(index, scan.slot())?;
+        if !self.is_corrected {
+            return Ok(());
+        }
+        let angles = &mut scan.azimuth_rad[..scan.geometry.azimuths];
+        // The correction uses an angle that is itself corrected, with an error of the eccentricity
+        // squared.
+        let mut encoder = angles.to_vec();
+        correct_eccentricity(&mut encoder, -self.eccentricity_rad);
+        for (angle, encoder) in angles.iter_mut().zip(encoder) {
+            *angle -= self.eccentricity_rad * encoder.cos();
+        }
+        Ok(())
+    }
+}
+
+/// Returns the first scan that can be read, if there is one.
+fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
+    let mut scan = OwnedScan::with_limits(scans.dataset.limits());
+    for index in scans.played.clone() {
+        match scans.read(index, &mut scan) {
+            Ok(()) => return Ok(Some(scan)),
+            Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+            Err(_) => {}
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_radar::ScanLimits;
+
+    use super::*;
+
+    /// A scan of ten azimuths, 1 ms apart, all measured.
+    fn scan() -> OwnedScan {
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: 20,
+            azimuths: 10,
+        });
+        (scan.geometry.azimuths, scan.geometry.bins) = (10, 2);
+        scan.geometry.stride = 2;
+        scan.bytes.fill(7);
+        scan.flags.fill(flag::MEASURED);
+        for (stamp_ns, ms) in scan.stamp_ns.iter_mut().zip(0..) {
+            *stamp_ns = ms * 1_000_000;
+        }
+        scan.geometry.stamp_ns = 4_500_000;
+        scan
+    }
+
+    fn sentences(scan: &OwnedScan, eccentricity_rad: f32) -> Vec<String> {
+        let mut losses = Losses::default();
+        losses.add_constants(&scan.geometry, eccentricity_rad);
+        losses.add(&scan.view());
+        losses.sentences()
+    }
+
+    #[test]
+    fn each_loss_has_a_sentence_of_its_own() {
+        let mut whole = scan();
+        assert_eq!(sentences(&whole, 0.0), [""; 0]);
+        whole.flags.fill(flag::MEASURED | flag::ASSUMED);
+        assert_eq!(sentences(&whole, 0.0), [""; 0]);
+        let only = |scan: &OwnedScan, eccentricity_rad, what: &str| {
+            let found = sentences(scan, eccentricity_rad);
+            assert!(found.len() == 1 && found[0].contains(what), "{found:?}");
+        };
+        let mut interpolated = scan();
+        interpolated.flags[4] = 0;
+        only(&interpolated, 0.0, "interpolated rows: 1");
+        let mut lossy = scan();
+        lossy.flags[8..].fill(flag::STALE | flag::ASSUMED);
+        // Without the last rows, the middle of the rows differs, too.
+        let found = sentences(&lossy, 0.0);
+        let places = "1 scans have lost azimuths, and it is not known where";
+        assert!(found.len() == 2 && found[0].contains(places), "{found:?}");
+        assert!(found[1].contains("up to 1.000 ms away"), "{found:?}");
+        // A row without powers has nothing to lose.
+        interpolated.bytes[8..10].fill(0);
+        assert_eq!(sentences(&interpolated, 0.0), [""; 0]);
+        // Row n / 2 - 1, as in Boreas.
+        let mut early = scan();
+        early.geometry.stamp_ns = 4_000_000;
+        only(&early, 0.0, "up to 0.500 ms away");
+        let mut far = scan();
+        (far.geometry.range_offset_m, far.geometry.doppler_s) = (-0.31, 0.04);
+        only(
+            &far,
+            0.0,
+            "with --set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04",
+        );
+        only(
+            &whole,
+            0.0025,
+            "with --set dataset.azimuth_eccentricity_rad=0.0025",
+        );
+        let mut rising = scan();
+        rising.flags[0] |= flag::CHIRP_KNOWN;
+        only(&rising, 0.0, "falling chirps");
+    }
+}

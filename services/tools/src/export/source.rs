@@ -1,0 +1,279 @@
+//! The source of an export: a run, a recording of one, or a dataset.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    iter,
+    path::{Path, PathBuf},
+};
+
+use crate::maps::map;
+use gyre_configuration::Configuration;
+use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
+use gyre_geometry::Pose;
+use gyre_journal::{
+    self as journal,
+    objects::{LoggedObjects, listed},
+};
+use gyre_mapping::grid;
+use gyre_messages::{
+    Correction, CorrectionHeader, Message, Objects, ObjectsHeader, Pose as PoseTopic, PoseHeader,
+    flag,
+};
+use gyre_radar::{LostAzimuths, Trajectory};
+use gyre_recording::Recording;
+use gyre_recording::bags::{BagWriter, Kept};
+use gyre_ros2_messages::{
+    Mounting,
+    frames::{Frames, occupancy_grid},
+};
+use gyre_slam::RecordReader;
+use gyre_terminal::{Failure, print};
+
+use crate::export::places::Place;
+
+/// The source of an export.
+pub struct Source {
+    path: PathBuf,
+    kind: Kind,
+}
+
+enum Kind {
+    /// The folder of a run's results.
+    Run(Box<Configuration>),
+    /// A recording of a run.
+    Recording,
+    Dataset,
+}
+
+/// The poses of a run, in order.
+pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
+
+/// Where azimuths of scans were lost, by the number of the scan in its recording.
+pub type Lost = BTreeMap<u64, LostAzimuths>;
+
+/// The scans of a source.
+pub struct Scans {
+    pub dataset: Box<dyn Dataset>,
+    pub played: std::ops::Range<usize>,
+    /// The eccentricity of the encoder, rad.
+    pub eccentricity_rad: f32,
+    /// True if the angles are corrected by it.
+    pub is_corrected: bool,
+    /// Encoder counts per turn, if they are known.
+    pub encoder_counts: Option<u16>,
+}
+
+impl Source {
+    /// Determines the kind of a path.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        let kind = match path {
+            path if gyre_recording::is_recording(path) => Kind::Recording,
+            path if map::exists(&journal::path(path))? => {
+                let configuration = Configuration::read(&path.join("config.toml"), &[])?;
+                Kind::Run(Box::new(configuration))
+            }
+            _ => Kind::Dataset,
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            kind,
+        })
+    }
+
+    /// Returns the folder of a run's results with its configuration; `None` of another source.
+    pub fn run(&self) -> Option<(&Path, &Configuration)> {
+        match &self.kind {
+            Kind::Run(configuration) => Some((&self.path, configuration)),
+            Kind::Recording | Kind::Dataset => None,
+        }
+    }
+
+    /// Returns the poses of a run; none of a dataset.
+    pub fn places(&self) -> Result<Places, Failure> {
+        match self.kind {
+            Kind::Run(_) => {
+                let corrected = self.path.join("trajectory_slam.tum");
+                let corrected = corrected.is_file().then(|| read_trajectory(&corrected));
+                let corrected = corrected.transpose()?;
+                let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
+                let records = journal::records(&journal::path(&self.path))?;
+                let poses = records.into_iter().flatten();
+                Ok(Box::new(poses.filter_map(move |pose| match pose {
+                    Ok(pose) => {
+                        let place = corrected_by(Place::of(&pose)?, corrected.as_ref());
+                        Some(with_objects(place, &mut tracked))
+                    }
+                    Err(error) => Some(Err(error.into())),
+                })))
+            }
+            Kind::Recording => recorded(gyre_recording::open_recording(&self.path)?),
+            Kind::Dataset => Ok(Box::new(iter::empty())),
+        }
+    }
+
+    /// Returns where azimuths were lost of each scan that has a pose in a run; nothing of another
+    /// source.
+    pub fn lost(&self) -> Result<Lost, Failure> {
+        let mut lost = Lost::new();
+        if let Some((run, _)) = self.run() {
+            for pose in journal::records(&journal::path(run))?.into_iter().flatten() {
+                let item = pose?.item;
+                if !item.is(flag::END) {
+                    lost.insert(item.scan, item.lost_azimuths());
+                }
+            }
+        }
+        Ok(lost)
+    }
+
+    /// Returns the scans; `None` of a run of a radar, which leaves none.
+    pub fn scans(&self) -> Result<Option<Scans>, Failure> {
+        match &self.kind {
+            Kind::Run(configuration) if configuration.is_radar() => Ok(None),
+            Kind::Run(configuration) => {
+                let mut configuration = configuration.clone();
+                // The angles of an encoder are written as it counts them: who reads them corrects
+                // its eccentricity.
+                let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
+                configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
+                let dataset = gyre_configuration::open(&configuration)?.dataset;
+                let played = configuration.source.played(dataset.scans());
+                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
+            }
+            Kind::Recording => {
+                let options = gyre_recording::stored_options(&self.path)?;
+                let dataset = gyre_recording::open(&self.path, &DatasetOptions::default())?;
+                Ok(Some(Scans {
+                    played: dataset.first()..dataset.len(),
+                    dataset,
+                    eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
+                    is_corrected: true,
+                    encoder_counts: options.encoder_counts,
+                }))
+            }
+            Kind::Dataset => {
+                let eccentricity =
+                    gyre_recording::stored_options(&self.path)?.azimuth_eccentricity_rad;
+                let options = DatasetOptions {
+                    azimuth_eccentricity_rad: Some(0.0),
+                    ..DatasetOptions::default()
+                };
+                let dataset = gyre_recording::open(&self.path, &options)?;
+                let played = dataset.first()..dataset.len();
+                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
+            }
+        }
+    }
+
+    /// Writes the map of a run that has keyframes.
+    pub fn write_map(
+        &self,
+        bag: &mut BagWriter,
+        frames: &Frames,
+        stamp_ns: i64,
+        mounting: &Mounting,
+    ) -> Result<(), Failure> {
+        let Kind::Run(configuration) = &self.kind else {
+            return Ok(());
+        };
+        if !configuration.slam.is_on() {
+            return Ok(());
+        }
+        let aside = tempfile::tempdir()?;
+        // Along the axes of the vehicle: Nav2 ignores the rotation of a grid.
+        let mut evidence = match map::evidence(&self.path, aside.path(), mounting.radar()) {
+            Ok(evidence) => evidence,
+            Err(reason) => {
+                print::note(format_args!("the bag has no map: {reason}"));
+                return Ok(());
+            }
+        };
+        let grid = grid(&mut evidence)?;
+        let size = [grid.columns, grid.rows];
+        let grid = occupancy_grid(
+            stamp_ns,
+            &frames.map,
+            grid.cell_m,
+            size,
+            grid.corner_m,
+            grid.values,
+        );
+        let topic = bag.topic("/map", Kept::ForLater)?;
+        bag.write(&topic, stamp_ns, &grid)?;
+        Ok(())
+    }
+}
+
+impl Scans {
+    fn uncorrected(
+        dataset: Box<dyn Dataset>,
+        played: std::ops::Range<usize>,
+        eccentricity_rad: Option<f32>,
+    ) -> Self {
+        Self {
+            encoder_counts: dataset.encoder_counts(),
+            dataset,
+            played,
+            eccentricity_rad: eccentricity_rad.unwrap_or_default(),
+            is_corrected: false,
+        }
+    }
+}
+
+/// Adds the pose of the odometry frame in the map frame, if the corrected trajectory has the pose.
+fn corrected_by(place: Place, corrected: Option<&Trajectory>) -> Place {
+    let near = |poses: &Trajectory| poses.near(place.stamp_ns, Trajectory::ROUNDING_NS);
+    let in_map: Option<Pose> = corrected.and_then(near);
+    Place {
+        map_from_odometry: in_map.map(|pose| pose * place.pose.motion.inverse()),
+        ..place
+    }
+}
+
+/// Adds the objects, if the log has them.
+fn with_objects(place: Place, tracked: &mut RecordReader<LoggedObjects>) -> Result<Place, Failure> {
+    let seq = place.seq as usize;
+    if seq >= tracked.len() {
+        return Ok(place);
+    }
+    let objects = tracked.read(seq)?.objects;
+    Ok(Place {
+        objects: Some(objects.iter().map(listed).collect()),
+        ..place
+    })
+}
+
+/// Returns the poses of a recording, each with its objects, and the correction that was known then.
+fn recorded(mut recording: Recording) -> Result<Places, Failure> {
+    let sequences = |recording: &Recording, topic: &str| -> Vec<u64> {
+        recording.entries(topic).map(|entry| entry.seq).collect()
+    };
+    let mut corrections = Vec::new();
+    for seq in sequences(&recording, Correction::TOPIC) {
+        let header: CorrectionHeader = recording.read_header(Correction::TOPIC, seq)?;
+        corrections.push((header.item.stamp_ns, header.map_from_odometry()));
+    }
+    let tracked: BTreeSet<u64> = sequences(&recording, Objects::TOPIC).into_iter().collect();
+    let poses = sequences(&recording, PoseTopic::TOPIC).into_iter();
+    let mut place = move |seq| -> Result<Option<Place>, Failure> {
+        let header: PoseHeader = recording.read_header(PoseTopic::TOPIC, seq)?;
+        let Some(place) = Place::of(&header) else {
+            return Ok(None);
+        };
+        let objects: Option<ObjectsHeader> = match tracked.contains(&seq) {
+            true => Some(recording.read_header(Objects::TOPIC, seq)?),
+            false => None,
+        };
+        let known = corrections
+            .iter()
+            .take_while(|(ns, _)| *ns <= place.stamp_ns);
+        Ok(Some(Place {
+            map_from_odometry: known.last().map(|(_, correction)| *correction),
+            objects: objects.map(|header| header.list().to_vec()),
+            ..place
+        }))
+    };
+    Ok(Box::new(
+        poses.filter_map(move |seq| place(seq).transpose()),
+    ))
+}

@@ -1,0 +1,13 @@
+//! Tools that are started by hand, a module for each.
+
+pub mod batch;
+pub mod conformance;
+pub mod doctor;
+pub mod export;
+pub mod maps;
+pub mod masks;
+pub mod new;
+pub mod operate;
+pub mod radar_server;
+pub mod report;
+pub mod stress;

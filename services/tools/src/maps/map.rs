@@ -1,0 +1,416 @@
+//! `gyre map`: draws the map of a run.
+
+mod arguments;
+mod extend;
+pub mod keyframes;
+mod loops;
+pub mod placing;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use gyre_configuration::Configuration;
+use gyre_datasets::ground_truth::read_trajectory;
+use gyre_geometry::Pose;
+use gyre_mapping::{
+    Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
+};
+use gyre_radar::Trajectory;
+use gyre_results::{Content, Out, georeference, map_options, require_results};
+use gyre_slam::{Keyframe, RecordReader, records_path};
+use gyre_storage::StorageError;
+use gyre_terminal::{Failure, print};
+
+use crate::maps::folder;
+pub use arguments::{MapArguments, MapFormat};
+
+/// The corrected trajectory, and the trajectory of odometry.
+const CORRECTED: &str = "trajectory_slam.tum";
+const ODOMETRY: &str = "trajectory.tum";
+const LOOPS: &str = "loops.csv";
+
+/// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
+/// asked for.
+pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+    let mut drawing = match &arguments.extend {
+        Some(map) => extend::extend(arguments, map)?,
+        None => draw_run(arguments)?,
+    };
+    print::line(format_args!(
+        "{} keyframes in {} tiles, in {}",
+        drawing.keyframes(),
+        drawing.evidence().tiles().len(),
+        arguments.out.display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Draws a run and writes its map.
+fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
+    let mut keyframes = open(&arguments.run)?;
+    let given = arguments.trajectory.clone();
+    let trajectory = given.unwrap_or_else(|| trajectory_of(&arguments.run));
+    let poses = read_trajectory(&trajectory)?;
+    let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
+    let configuration = configuration(&arguments.run)?;
+    let _locked = Out::lock_for(&arguments.out, Content::MAP)?;
+    let options = MapOptions {
+        cell_m: arguments.cell_m,
+        ..map_options(&configuration)
+    };
+    let mut drawing = Drawing::new(&options, &arguments.out)?;
+    let lines = draw(&mut keyframes, &poses, &loops, &mut drawing)?;
+    let (count, total) = (drawing.keyframes(), keyframes.len());
+    if count < total {
+        print::note(format_args!(
+            "{} of {total} keyframes have no pose in {} and are left out",
+            total - count,
+            trajectory.display()
+        ));
+    }
+    let (out, origin) = (&arguments.out, origin(arguments)?);
+    if arguments.format.contains(&MapFormat::Folder) {
+        let placed = keyframes::placed(&mut keyframes, &poses)?;
+        folder::write(out, &placed, drawing.evidence(), origin)?;
+    }
+    export(arguments, origin, &mut drawing, &lines)?;
+    Ok(drawing)
+}
+
+/// Draws the keyframes of a run along its trajectory, whose frame has the pose `placed` in the
+/// frame of the drawing. What does not fit into memory lies in a file in `folder`, which has no
+/// name.
+pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
+    let mut keyframes = open(run)?;
+    let poses = read_trajectory(&trajectory_of(run))?;
+    let mut evidence = Evidence::new(&map_options(&configuration(run)?), folder)?;
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index)?;
+        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+            evidence.draw(&keyframe, &(placed * pose))?;
+        }
+    }
+    Ok(evidence)
+}
+
+/// Returns the place of the map on the earth: the given place, else the place of the run by GNSS.
+/// Another trajectory has a frame of its own, and so has odometry once fixes have corrected it.
+fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
+    let is_corrected = trajectory_of(&arguments.run).ends_with(CORRECTED);
+    let is_of_run = arguments.trajectory.is_none() && is_corrected;
+    match arguments.origin {
+        None if is_of_run => georeference(&arguments.run),
+        given => Ok(given),
+    }
+}
+
+/// Returns the trajectory of a run: the corrected one, if it has one.
+pub fn trajectory_of(run: &Path) -> PathBuf {
+    let corrected = run.join(CORRECTED);
+    match corrected.is_file() {
+        true => corrected,
+        false => run.join(ODOMETRY),
+    }
+}
+
+/// Returns whether a file exists. Of another user's run that may be unknown.
+pub fn exists(path: &Path) -> Result<bool, StorageError> {
+    path.try_exists().map_err(StorageError::at("read", path))
+}
+
+/// Reads the configuration of a run.
+pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
+    Ok(Configuration::read(&run.join("config.toml"), &[])?)
+}
+
+/// Opens the keyframes of a run.
+pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
+    require_results(run)?;
+    let path = records_path::<Keyframe>(run);
+    match exists(&path)? {
+        true => Ok(RecordReader::open(run)?),
+        false => Err(format!(
+            "{} does not exist: a run keeps keyframes with --set slam.kind=graph",
+            path.display()
+        )
+        .into()),
+    }
+}
+
+/// The lines drawn over the keyframes, in the frame of the trajectory.
+#[derive(Default)]
+struct Lines {
+    trajectory: Vec<Pose>,
+    loops: Vec<[Pose; 2]>,
+}
+
+/// Draws all keyframes that have a pose. `loops` are between scans.
+fn draw(
+    keyframes: &mut RecordReader<Keyframe>,
+    poses: &Trajectory,
+    loops: &[[u64; 2]],
+    drawing: &mut Drawing,
+) -> Result<Lines, Failure> {
+    let (mut by_scan, mut span_ns) = (BTreeMap::new(), None);
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index)?;
+        let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) else {
+            continue;
+        };
+        drawing.draw(&keyframe, &pose)?;
+        by_scan.insert(keyframe.scan, pose);
+        let (first_ns, _) = span_ns.unwrap_or((keyframe.stamp_ns, 0));
+        span_ns = Some((first_ns, keyframe.stamp_ns));
+    }
+    let end = |scan: u64| by_scan.get(&scan).copied();
+    let both = |&[from, to]: &[u64; 2]| Some([end(from)?, end(to)?]);
+    Ok(Lines {
+        trajectory: span_ns.map_or(Vec::new(), |span_ns| part(poses, span_ns)),
+        loops: loops.iter().filter_map(both).collect(),
+    })
+}
+
+/// The poses from the first to the last keyframe: a ground truth may be of a longer drive.
+fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
+    let stamps = poses.stamp_ns.iter().flatten();
+    let within = |stamp_ns: i64| (first_ns..=last_ns).contains(&stamp_ns);
+    let poses = stamps.zip(&poses.poses);
+    let poses = poses.filter(|(stamp_ns, _)| within(**stamp_ns));
+    poses.map(|(_, pose)| *pose).collect()
+}
+
+/// Writes the forms of a map but for its own folder.
+fn export(
+    arguments: &MapArguments,
+    origin: Option<Origin>,
+    drawing: &mut Drawing,
+    lines: &Lines,
+) -> Result<(), Failure> {
+    let out = &arguments.out;
+    for format in &arguments.format {
+        match format {
+            MapFormat::Folder => {}
+            MapFormat::Png => {
+                let png = drawing.png(&lines.trajectory, &lines.loops)?;
+                gyre_storage::write(&out.join("map.png"), png)?;
+            }
+            MapFormat::Geotiff => write_geotiff(&out.join("map.tif"), drawing.evidence(), origin)?,
+            MapFormat::Pgm => write_pgm(out, drawing.evidence())?,
+            MapFormat::Web => write_web_tiles(&out.join("web"), drawing.evidence())?,
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use gyre_datasets::ground_truth::write_tum_pose;
+    use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
+    use gyre_mapping::Map;
+    use gyre_slam::RecordLog;
+
+    use super::*;
+
+    fn keyframe(seq: u64) -> Keyframe {
+        Keyframe {
+            seq,
+            scan: seq,
+            stamp_ns: 1_000_000_000 * (seq as i64 + 1),
+            pose: UncertainMotion {
+                motion: pose(2.0 * seq as f64, 0.0, 0.0),
+                ..UncertainMotion::identity()
+            },
+            motion: UncertainMotion::identity(),
+            noise: nalgebra::Matrix3::zeros(),
+            twist: Twist::default(),
+            path_m: 0.0,
+            points: vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])],
+        }
+    }
+
+    fn arguments(folder: &Path) -> MapArguments {
+        MapArguments {
+            run: folder.join("run"),
+            out: folder.join("map"),
+            format: vec![
+                MapFormat::Folder,
+                MapFormat::Png,
+                MapFormat::Geotiff,
+                MapFormat::Pgm,
+                MapFormat::Web,
+            ],
+            trajectory: None,
+            extend: None,
+            cell_m: 0.5,
+            origin: None,
+        }
+    }
+
+    /// The results of a run of four keyframes, where the trajectory lacks the last keyframe.
+    fn run(folder: &Path) {
+        fs::create_dir_all(folder.join("run/journal")).unwrap();
+        fs::write(
+            folder.join("run/config.toml"),
+            "[points]\nmax_range_m = 60.0\n",
+        )
+        .unwrap();
+        let mut log = RecordLog::open(&folder.join("run")).unwrap();
+        let mut tum = Vec::new();
+        for seq in 0..4 {
+            let keyframe = keyframe(seq);
+            log.append(&keyframe).unwrap();
+            if seq < 3 {
+                let pose = pose(100.0 + 3.0 * seq as f64, 0.0, 0.0);
+                write_tum_pose(keyframe.stamp_ns, &pose, &mut tum).unwrap();
+            }
+        }
+        fs::write(folder.join("run/trajectory.tum"), tum).unwrap();
+    }
+
+    /// Writes a corrected trajectory that has the first keyframe alone.
+    fn correct_first_keyframe(folder: &Path) {
+        let mut tum = Vec::new();
+        write_tum_pose(keyframe(0).stamp_ns, &pose(0.0, 0.0, 0.0), &mut tum).unwrap();
+        fs::write(folder.join("run/trajectory_slam.tum"), tum).unwrap();
+    }
+
+    #[test]
+    fn the_map_of_a_run_is_written_in_all_forms() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        let out = folder.path().join("map");
+        let opened = Map::open(&out).unwrap();
+        assert_eq!(opened.keyframes(), 3);
+        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        assert_eq!(kept.keyframes().len(), 3);
+        assert_eq!(kept.pose(2).translation.x, 6.0);
+        assert_eq!(
+            (opened.options().cell_m, opened.options().reach_m),
+            (0.5, 60.0)
+        );
+        for name in [
+            "map.png",
+            "map.tif",
+            "map.pgm",
+            "map.yaml",
+            "web/tiles.json",
+            "web/0/0/0.png",
+        ] {
+            assert!(out.join(name).is_file(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_map_with_other_files_among_its_tiles_is_refused_and_left_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        let out = folder.path().join("map");
+        fs::write(out.join("tiles/holiday.jpg"), "mine").unwrap();
+        correct_first_keyframe(folder.path());
+        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
+        assert!(refused.contains("holiday.jpg is no tile"), "{refused}");
+        assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
+        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        assert_eq!(kept.keyframes().len(), 3);
+    }
+
+    #[test]
+    fn a_map_that_another_command_is_writing_is_left_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        let out = folder.path().join("map");
+        let other = Out::lock_for(&out, Content::MAP).unwrap();
+        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("another command is writing to")
+                && refused.contains(&format!("process {}", std::process::id())),
+            "{refused}"
+        );
+        assert!(!out.join("map.toml").exists());
+        drop(other);
+        map(&arguments(folder.path())).unwrap();
+        assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
+    }
+
+    #[test]
+    fn a_folder_that_another_command_is_writing_is_known_before_the_search_for_places() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        let vertices = (0..4).map(|k| format!("VERTEX_SE2 {k} {k} 0 0\n"));
+        let edges = (1..4).map(|k| format!("EDGE_SE2 {} {k} 1 0 0 1 0 0 1 0 1\n", k - 1));
+        fs::write(
+            folder.path().join("run/graph.g2o"),
+            vertices.chain(edges).collect::<String>(),
+        )
+        .unwrap();
+        let extended = folder.path().join("extended");
+        let arguments = MapArguments {
+            out: extended.clone(),
+            extend: Some(folder.path().join("map")),
+            ..arguments(folder.path())
+        };
+        let refused = || map(&arguments).unwrap_err().to_string();
+        let other = Out::lock_for(&extended, Content::MAP).unwrap();
+        assert!(refused().starts_with("another command"), "{}", refused());
+        drop(other);
+        assert!(
+            refused().starts_with("no keyframe of"),
+            "the search is next: {}",
+            refused()
+        );
+    }
+
+    #[test]
+    fn the_corrected_trajectory_comes_before_that_of_odometry() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        correct_first_keyframe(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        assert_eq!(
+            Map::open(&folder.path().join("map")).unwrap().keyframes(),
+            1
+        );
+    }
+
+    #[test]
+    fn the_loops_of_the_run_are_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        let picture = || {
+            map(&arguments(folder.path())).unwrap();
+            fs::read(folder.path().join("map/map.png")).unwrap()
+        };
+        let plain = picture();
+        let loops = |verdict: &str| {
+            let rows = format!("scan,found_scan,verdict\n2,0,{verdict}\n3,0,used\n");
+            fs::write(folder.path().join("run/loops.csv"), rows).unwrap();
+        };
+        // The last keyframe is not in the trajectory.
+        loops("ambiguous");
+        assert!(picture() == plain);
+        loops("used");
+        assert!(picture() != plain);
+    }
+
+    #[test]
+    fn a_run_without_keyframes_is_refused_with_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
+        assert!(
+            refused.contains(
+                "keyframes.log does not exist: a run keeps keyframes with --set slam.kind=graph"
+            ),
+            "{refused}"
+        );
+        assert!(!folder.path().join("map").exists());
+    }
+}

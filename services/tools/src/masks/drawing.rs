@@ -1,0 +1,190 @@
+//! A picture of the mask's effect. Side by side: the raster with all its power, the mask (black is
+//! nothing, white is all), the input of the search, and the points, each in the colour of its
+//! factor. Where the mask looks at two scans, the scan before is below. Ahead is up, left is left.
+
+use std::path::Path;
+
+use ndarray::Array2;
+
+use crate::masks::{
+    inspection::{Inspection, MaskedRaster},
+    picture::{PictureError, write_rgb},
+};
+
+type Colour = [u8; 3];
+
+const MARGIN: usize = 6;
+const AROUND: Colour = [60; 3];
+/// Panels are enlarged to about so many pixels a side.
+const SIDE: usize = 256;
+/// Power, in the sensor's counts, with the brightest colour: higher powers are rare.
+const BRIGHT: f32 = 120.0;
+/// The share of cells with the brightest colour in the input of the search, where only proportions
+/// count.
+const BRIGHTEST: f32 = 1e-3;
+/// Maximum brightness of the raster behind the points.
+const FAINT: f32 = 0.4;
+pub struct Canvas {
+    width: usize,
+    /// Row by row.
+    pixels: Vec<Colour>,
+}
+
+impl Canvas {
+    pub fn of(inspection: &Inspection) -> Self {
+        let rows: Vec<[Array2<Colour>; 4]> = inspection.rasters.iter().map(panels).collect();
+        let n = rows.first().map_or(1, |panels| panels[0].nrows());
+        let scale = (SIDE / n).max(1);
+        let step = n * scale + MARGIN;
+        let (width, height) = (4 * step + MARGIN, rows.len() * step + MARGIN);
+        let mut canvas = Self {
+            width,
+            pixels: vec![AROUND; width * height],
+        };
+        for (row, panels) in rows.iter().enumerate() {
+            for (column, panel) in panels.iter().enumerate() {
+                canvas.place(panel, scale, [MARGIN + row * step, MARGIN + column * step]);
+            }
+        }
+        canvas.mark_points(&inspection.points, scale, [MARGIN, MARGIN + 3 * step]);
+        canvas
+    }
+
+    /// Pictures of one width below each other.
+    pub fn stack(pictures: &[Self]) -> Self {
+        let width = pictures.first().map_or(0, |picture| picture.width);
+        Self {
+            width,
+            pixels: pictures
+                .iter()
+                .flat_map(|picture| &picture.pixels)
+                .copied()
+                .collect(),
+        }
+    }
+
+    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+        write_rgb(path, self.width, &self.pixels)
+    }
+
+    /// Draws cells, each as a square of `scale` pixels a side.
+    fn place(&mut self, cells: &Array2<Colour>, scale: usize, corner: [usize; 2]) {
+        for ((row, column), colour) in cells.indexed_iter() {
+            let place = [corner[0] + row * scale, corner[1] + column * scale];
+            self.square(place, scale, *colour);
+        }
+    }
+
+    fn square(&mut self, [row, column]: [usize; 2], side: usize, colour: Colour) {
+        for row in row..row + side {
+            self.pixels[row * self.width + column..][..side].fill(colour);
+        }
+    }
+
+    /// Dots a pixel larger than a cell; those that count most are on top.
+    fn mark_points(&mut self, points: &[([usize; 2], f32)], scale: usize, corner: [usize; 2]) {
+        let mut points = points.to_vec();
+        points.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for ([row, column], factor) in points {
+            let place = [corner[0] + row * scale, corner[1] + column * scale];
+            self.square(place, scale + 1, colour(factor));
+        }
+    }
+}
+
+/// The panels of a raster, without the points.
+fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
+    let brightest = exceeded_by(BRIGHTEST, &raster.masked).max(f32::MIN_POSITIVE);
+    [
+        raster.whole.map(|power| colour(power / BRIGHT)),
+        raster.mask.map(|factor| grey(*factor)),
+        // The root shows faint echoes, too.
+        raster
+            .masked
+            .map(|power| colour((power / brightest).sqrt())),
+        raster.whole.map(|power| grey(FAINT * power / BRIGHT)),
+    ]
+}
+
+/// Returns the value that this share of the cells exceeds.
+fn exceeded_by(share: f32, cells: &Array2<f32>) -> f32 {
+    let mut cells: Vec<f32> = cells.iter().copied().collect();
+    let rank = cells.len() - 1 - (share * cells.len() as f32) as usize;
+    *cells.select_nth_unstable_by(rank, f32::total_cmp).1
+}
+
+fn grey(share: f32) -> Colour {
+    [(255.0 * share.clamp(0.0, 1.0)).round() as u8; 3]
+}
+
+/// From nothing (dark violet) to all (yellow), of evenly growing brightness.
+fn colour(share: f32) -> Colour {
+    let colour = colorous::VIRIDIS.eval_continuous(f64::from(share).clamp(0.0, 1.0));
+    [colour.r, colour.g, colour.b]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_run_from_dark_to_bright() {
+        assert_eq!((colour(-1.0), colour(9.0)), (colour(0.0), colour(1.0)));
+        let brightness = |share: usize| {
+            let colour = colour(share as f32 / 16.0).map(u32::from);
+            colour.iter().sum::<u32>()
+        };
+        assert!((0..16).all(|share| brightness(share) < brightness(share + 1)));
+    }
+
+    #[test]
+    fn the_brightest_colour_goes_to_a_share_of_the_cells() {
+        let cells = Array2::from_shape_fn((40, 50), |(row, column)| {
+            ((row * 50 + column) * 7 % 2000) as f32
+        });
+        assert_eq!(exceeded_by(1e-3, &cells), 1997.0);
+        assert_eq!(exceeded_by(0.0, &cells), 1999.0);
+        assert_eq!(exceeded_by(0.5, &Array2::from_elem((1, 1), 3.0)), 3.0);
+    }
+
+    #[test]
+    fn panels_stand_side_by_side_and_scans_below_each_other() {
+        let raster = |power: f32| MaskedRaster {
+            whole: Array2::from_elem((4, 4), power),
+            mask: Array2::from_elem((4, 4), 0.5),
+            masked: Array2::from_elem((4, 4), 0.5 * power),
+            above_floor: 16.0,
+        };
+        let inspection = |rasters: Vec<MaskedRaster>| Inspection {
+            number: 0,
+            rasters,
+            points: vec![([3, 3], 1.0)],
+            twist: None,
+        };
+        let [one, two] = [vec![raster(30.0)], vec![raster(30.0), raster(120.0)]]
+            .map(|rasters| Canvas::of(&inspection(rasters)));
+        assert_eq!(
+            (one.width, one.pixels.len() / one.width),
+            (4 * 256 + 5 * MARGIN, 256 + 2 * MARGIN)
+        );
+        assert_eq!(
+            (two.width, two.pixels.len() / two.width),
+            (one.width, 2 * 256 + 3 * MARGIN)
+        );
+        let at = |canvas: &Canvas, row: usize, panel: usize| {
+            canvas.pixels[row * canvas.width + MARGIN + panel * (256 + MARGIN)]
+        };
+        assert_eq!(
+            [0, 1, 2, 3].map(|panel| at(&two, MARGIN, panel)),
+            [colour(0.25), grey(0.5), colour(1.0), grey(0.1)]
+        );
+        assert_eq!(at(&two, 256 + 2 * MARGIN, 0), colour(1.0));
+        assert_eq!(at(&one, MARGIN - 1, 0), AROUND);
+        // The last cell's dot.
+        let end = (MARGIN + 255) * one.width + MARGIN + 3 * (256 + MARGIN) + 255;
+        assert_eq!(
+            (one.pixels[end], Canvas::stack(&[one]).pixels.len()),
+            (colour(1.0), 268 * 1054)
+        );
+    }
+}

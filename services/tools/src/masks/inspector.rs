@@ -1,0 +1,203 @@
+//! Masks scans one after the other as a run does, and inspects chosen ones.
+
+use std::error::Error;
+
+use gyre_configuration::{Configuration, Played};
+use gyre_datasets::{Dataset, ScanSamples};
+use gyre_geometry::SparsePoint;
+use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
+use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
+use gyre_scan_matching::{RefinementConfig, RefinementKind};
+use gyre_terminal::{Failure, print};
+use ndarray::{Array2, ArrayView2};
+
+use crate::masks::inspection::{Inspection, MaskedRaster};
+
+/// Scans registered before each inspected one where those are far apart. The first motions are
+/// found without motion compensation, as at a run's start; a few scans later they equal a run's
+/// motions, except for noise.
+const RUN_UP: usize = 8;
+
+/// Masks scans as a run does.
+pub struct MaskInspector {
+    dataset: Box<dyn Dataset>,
+    odometry: Odometry,
+    lag: usize,
+    /// The scan that comes next.
+    next: usize,
+    /// The last two registered scans, newest first.
+    last: [OwnedScan; 2],
+    /// Memory to read the next scan into.
+    spare: OwnedScan,
+    samples: ScanSamples,
+    /// The velocities that the last two scans were compensated with.
+    twists: [Option<gyre_geometry::Twist>; 2],
+    /// Where their azimuths were lost.
+    lost: [LostAzimuths; 2],
+    rows: PlacedRows,
+    floor: u8,
+    /// Maskers without any mask, and with the threshold alone.
+    plain: [Masker; 2],
+    points: Vec<SparsePoint>,
+}
+
+impl MaskInspector {
+    pub fn new(configuration: &Configuration, played: Played) -> Result<Self, Failure> {
+        let (dataset, samples) = (played.dataset, played.samples);
+        let config = OdometryConfig {
+            refinement: RefinementConfig {
+                kind: RefinementKind::None,
+                ..configuration.odometry.refinement.clone()
+            },
+            ..configuration.odometry.clone()
+        };
+        let floor = config.masking.floor();
+        let threshold = if floor == 0 {
+            MaskKind::None
+        } else {
+            MaskKind::Threshold
+        };
+        let plain = |kind| {
+            let masking = MaskingConfig {
+                kind,
+                ..config.masking.clone()
+            };
+            Masker::new(&config.raster, &config.points, &masking)
+        };
+        let scan = OwnedScan::with_limits(dataset.limits());
+        Ok(Self {
+            odometry: Odometry::new(&config)?,
+            lag: config.masking.feedback_lag(),
+            next: configuration.source.played(dataset.scans()).start,
+            last: [scan.clone(), scan.clone()],
+            spare: scan,
+            samples,
+            twists: [None; 2],
+            lost: [LostAzimuths::default(); 2],
+            rows: PlacedRows::default(),
+            floor,
+            plain: [plain(MaskKind::None)?, plain(threshold)?],
+            points: vec![SparsePoint::default(); config.points.capacity],
+            dataset,
+        })
+    }
+
+    /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it
+    /// cannot be read.
+    pub fn inspect(&mut self, number: usize) -> Result<Option<Inspection>, Failure> {
+        let from = number.saturating_sub(self.lag + RUN_UP);
+        if from > self.next {
+            self.next = from;
+            self.odometry.restart();
+        }
+        for index in self.next..number {
+            self.register(index)?;
+        }
+        self.next = number + 1;
+        match self.register(number)? {
+            true => self.inspection(number).map(Some),
+            false => Ok(None),
+        }
+    }
+
+    /// Registers a scan; false if it cannot be read and is left out, as in a run.
+    fn register(&mut self, number: usize) -> Result<bool, Failure> {
+        match self.dataset.read(number, self.spare.slot()) {
+            Ok(geometry) => self.spare.geometry = geometry,
+            Err(error) => {
+                print::note(format_args!("left out: {error}"));
+                return Ok(false);
+            }
+        }
+        let scan = self.spare.view();
+        let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
+        let registered = self.odometry.register(&scan, &samples);
+        let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
+        self.last.swap(0, 1);
+        std::mem::swap(&mut self.last[0], &mut self.spare);
+        self.twists = [self.odometry.twist(), self.twists[0]];
+        self.lost = [self.odometry.lost_azimuths(), self.lost[0]];
+        if registered.seq == 0 {
+            // Where the chain starts a scan is its own scan before.
+            self.last[1] = self.last[0].clone();
+            self.twists[1] = self.twists[0];
+            self.lost[1] = self.lost[0];
+        }
+        Ok(true)
+    }
+
+    fn inspection(&mut self, number: usize) -> Result<Inspection, Failure> {
+        let masked = [
+            Some(self.odometry.raster()),
+            self.odometry.previous_raster(),
+        ];
+        let masked = masked.map(|raster| raster.map(|raster| raster.to_owned()));
+        let mut rasters = Vec::new();
+        for (scan, masked) in masked.into_iter().enumerate() {
+            if let Some(masked) = masked {
+                rasters.push(self.masked_raster(scan, masked)?);
+            }
+        }
+        Ok(Inspection {
+            number,
+            rasters,
+            points: self.point_factors()?,
+            twist: self.odometry.twist(),
+        })
+    }
+
+    /// The raster of the last scan (0) or the one before (1), without and with its mask.
+    fn masked_raster(
+        &mut self,
+        scan: usize,
+        masked: Array2<f32>,
+    ) -> Result<MaskedRaster, Box<dyn Error + Send + Sync>> {
+        let sweep = Sweep {
+            number: 0,
+            scan: self.rows.place(&self.last[scan].view(), &self.lost[scan]),
+            twist: self.twists[scan],
+        };
+        let mut plain = [masked.clone(), masked.clone()];
+        for (masker, raster) in self.plain.iter_mut().zip(&mut plain) {
+            masker.mask(&sweep, None, raster.view_mut(), None)?;
+        }
+        let [whole, above_floor] = plain;
+        let factors = self.odometry.factors(scan);
+        let mask = mask_above(self.floor, &above_floor, factors);
+        Ok(MaskedRaster {
+            whole,
+            mask,
+            masked,
+            above_floor: above_floor.iter().copied().map(f64::from).sum(),
+        })
+    }
+
+    /// The cell of each point of the last scan, and the factor of the mask on its weight.
+    fn point_factors(&mut self) -> Result<Vec<([usize; 2], f32)>, Failure> {
+        let twist = self.odometry.twist();
+        let (masker, plain) = (&mut self.plain[1], &mut self.points);
+        let scan = self.rows.place(&self.last[0].view(), &self.lost[0]);
+        let count = masker.points(&scan, twist, plain)?;
+        let points = plain[..count].iter().zip(self.odometry.points());
+        let factor = |(plain, weighed): (&SparsePoint, &SparsePoint)| {
+            Some((masker.cell_of(plain, twist)?, weighed.weight / plain.weight))
+        };
+        Ok(points.filter_map(factor).collect())
+    }
+}
+
+/// The weight of each cell: nothing where no power is above the threshold, else the network's
+/// factor, if there is a network.
+fn mask_above(
+    floor: u8,
+    above_floor: &Array2<f32>,
+    factors: Option<ArrayView2<'_, f32>>,
+) -> Array2<f32> {
+    Array2::from_shape_fn(above_floor.dim(), |cell| {
+        match floor == 0 || above_floor[cell] > 0.0 {
+            true => factors.map_or(1.0, |factors| factors[cell]),
+            false => 0.0,
+        }
+    })
+}

@@ -1,0 +1,112 @@
+//! The arguments of the commands that operate running runs.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use gyre_terminal::print;
+
+/// The run that a command is about.
+#[derive(Debug, Args)]
+pub struct RunChoice {
+    /// The run: the folder of its results. Default: the only run there is; a command that changes a
+    /// run asks first if that was not started from the current folder.
+    #[arg(value_name = "RUN")]
+    pub run: Option<PathBuf>,
+    /// The old way to name it.
+    #[arg(long, hide = true, value_name = "RUN", conflicts_with = "run")]
+    pub out: Option<PathBuf>,
+}
+
+impl RunChoice {
+    /// Returns the choice of this run; without one, of the only run there is.
+    pub fn named_by(run: Option<PathBuf>) -> Self {
+        Self { run, out: None }
+    }
+
+    /// Returns the folder that is named. An old way to name it gets a hint.
+    pub fn named(&self) -> Option<&Path> {
+        if let Some(out) = &self.out {
+            print::note(format_args!(
+                "gyre: a run is now named without --out, as its last argument: {}",
+                out.display()
+            ));
+        }
+        self.run.as_deref().or(self.out.as_deref())
+    }
+}
+
+/// The arguments of `gyre ps`.
+#[derive(Debug, Args)]
+pub struct PsArguments {
+    /// The run to list. Default: all runs of this user.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Fail unless a run is running, and all processes of each run work as they should: for health
+    /// checks.
+    #[arg(long)]
+    pub check: bool,
+}
+
+/// The arguments of `gyre logs`.
+#[derive(Debug, Args)]
+pub struct LogsArguments {
+    /// The process, as masking. Default: all.
+    pub process: Option<String>,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Continue with new lines, until the run ends.
+    #[arg(short, long)]
+    pub follow: bool,
+    /// Number of lines to begin with, of each log.
+    #[arg(short = 'n', long, default_value_t = 50)]
+    pub lines: usize,
+}
+
+/// The arguments of `gyre restart`.
+#[derive(Debug, Args)]
+pub struct RestartArguments {
+    /// The process, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+}
+
+/// The arguments of `gyre swap`.
+#[derive(Debug, Args)]
+pub struct SwapArguments {
+    /// The process whose place is taken, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The program that takes over and its arguments, as in 'python3 stage.py --fast'; no shell is
+    /// involved. Default: the one that the run was begun with.
+    #[arg(long, value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
+    /// End the program before first. For a program that cannot stand by; scans wait for it
+    /// meanwhile, or are dropped in live mode.
+    #[arg(long)]
+    pub cold: bool,
+}
+
+/// The arguments of `gyre top`.
+#[derive(Debug, Args)]
+pub struct TopArguments {
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Time between two looks, s.
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    pub every: f64,
+    /// Print one look as text and end.
+    #[arg(long)]
+    pub once: bool,
+}

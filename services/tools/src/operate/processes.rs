@@ -1,0 +1,164 @@
+//! `gyre ps`: the running runs and their processes.
+
+use std::{fmt, process::ExitCode};
+
+use gyre_stage::{
+    StageError,
+    control::{Activity, Control, Phase, ProcessStatus, Status},
+    source::Received,
+};
+use gyre_supervise::UsedRun;
+use gyre_terminal::{Failure, print};
+
+use crate::operate::arguments::PsArguments;
+
+const NO_RUN: &str = "no run is running";
+
+/// Lists the runs of this user.
+pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
+    let (mut rows, mut faults) = (Vec::new(), Vec::new());
+    let runs = match arguments.run.named() {
+        Some(out) => vec![Control::of(out)?],
+        None => Control::of_all(),
+    };
+    for run in runs {
+        match run.status() {
+            Ok(status) => rows.push(UsedRun::of(status)),
+            // It has ended meanwhile.
+            Err(StageError::NotRunning { .. }) => {}
+            Err(error) => faults.push(error.to_string()),
+        }
+    }
+    let is_none = rows.is_empty() && faults.is_empty();
+    match arguments {
+        PsArguments { check: true, .. } if is_none => return Err(NO_RUN.into()),
+        PsArguments { check: true, .. } => {
+            faults.extend(rows.iter().flat_map(|row| ills(&row.status)));
+        }
+        PsArguments { json: true, .. } => print::line(serde_json::to_string_pretty(&rows)?)?,
+        _ if is_none => print::line(NO_RUN)?,
+        _ => rows.iter().map(Listed).try_for_each(print::line)?,
+    }
+    match faults.is_empty() {
+        true => Ok(ExitCode::SUCCESS),
+        false => Err(faults.join("; ").into()),
+    }
+}
+
+/// A run as a table.
+struct Listed<'a>(&'a UsedRun);
+
+impl fmt::Display for Listed<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let UsedRun { status, usage } = self.0;
+        writeln!(f, "{}", status.out.display())?;
+        writeln!(f, "{}", summary(status))?;
+        writeln!(
+            f,
+            "  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}",
+            "process", "pid", "state", "for", "cpu", "memory", "restarts"
+        )?;
+        for (process, usage) in status.processes.iter().zip(usage) {
+            let usage = usage.unwrap_or_default();
+            writeln!(
+                f,
+                "  {:20} {:>8} {:9} {:>8} {:>7.1} s {:>5.0} MB {:>9}{}",
+                process.name,
+                process.pid,
+                process.activity.name(),
+                process.activity_s.map_or_else(String::new, duration),
+                usage.cpu_s,
+                usage.own_bytes as f64 * 1e-6,
+                process.restarts,
+                remarks(process),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the faults of a run, a sentence each.
+fn ills(status: &Status) -> Vec<String> {
+    let out = status.out.display();
+    let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
+    // Followers end one after the other when the stream has.
+    let ends = status.phase == Phase::Following;
+    let ill = status.processes.iter().filter(|it| is_ill(it.activity));
+    let ill = ill.filter(|it| !(ends && it.activity == Activity::Ended));
+    let ill = ill.map(|it| format!("{out}: {} is {}", it.name, it.activity.name()));
+    let received = status.processes.iter().filter_map(|it| it.received);
+    let deaf = received.filter(|it| !it.is_receiving && status.phase == Phase::Running);
+    let deaf = deaf.map(|it| {
+        let again = it.reconnections();
+        format!("{out}: no azimuths arrive from the radar, {again} reconnections so far")
+    });
+    let starting = (status.phase == Phase::Starting).then(|| format!("{out} is starting"));
+    let notice = status.notice.iter().map(|it| format!("{out}: {it}"));
+    let all = starting.into_iter().chain(notice);
+    all.chain(ill).chain(deaf).collect()
+}
+
+/// Returns the state of a run in a line.
+pub fn summary(status: &Status) -> String {
+    let mode = if status.live { "live" } else { "lossless" };
+    let notice = status.notice.iter().map(|it| format!("; {it}"));
+    let pose = status.last_pose_s.map_or_else(String::new, |age| {
+        format!(", the last {} ago", duration(age))
+    });
+    format!(
+        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped{}",
+        status.phase.name(),
+        duration(status.uptime_s),
+        status.pid,
+        status.poses,
+        status.dropped,
+        notice.collect::<String>()
+    )
+}
+
+/// Returns the unusual facts about a process.
+fn remarks(process: &ProcessStatus) -> String {
+    let mut remarks = String::new();
+    if let Some(death) = &process.last_death {
+        remarks += &format!("  died by {death}");
+    }
+    if let Some(missed) = process.missed.filter(|missed| *missed > 0) {
+        remarks += &format!("  missed {missed} messages");
+    }
+    if let Some(received) = &process.received {
+        remarks += &lacks(received);
+    }
+    if process.is_swapped {
+        remarks += &format!("  is `{}`", process.command.join(" "));
+    }
+    remarks
+}
+
+/// Returns the missing deliveries of a radar.
+pub fn lacks(received: &Received) -> String {
+    let counts = [
+        (received.scans_left_out, "scans left out"),
+        (received.missing_azimuths, "azimuths missing"),
+        (received.damaged_messages, "messages damaged"),
+        (received.foreign_messages, "messages of others"),
+        (received.reconnections(), "reconnections"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let counts: String = counts
+        .map(|(count, of)| format!("  {count} {of}"))
+        .collect();
+    match received.is_receiving {
+        true => counts,
+        false => format!("  no azimuths{counts}"),
+    }
+}
+
+/// Returns a time in two or three digits.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
+        s if s < 99.5 => format!("{s:.1} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}

@@ -1,0 +1,144 @@
+//! `gyre top`: rates, latencies and processes of a running run in the terminal.
+
+mod screen;
+mod snapshot;
+
+use std::{
+    io::{self, IsTerminal},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use gyre_stage::{
+    observer::{ObservedRun, Observer},
+    wake::Signals,
+};
+use gyre_terminal::{Failure, WIDTH, print};
+use ratatui::{
+    DefaultTerminal,
+    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
+};
+
+use crate::operate::{arguments::TopArguments, choice::chosen};
+use snapshot::{Snapshot, Snapshots};
+
+/// Time between two snapshots at the queue of poses, which has room for nine.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// Shows a run until it ends, or until `q` is pressed.
+pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
+    let every = Duration::try_from_secs_f64(arguments.every)
+        .ok()
+        .filter(|every| *every >= PERIOD)
+        .ok_or("--every must be 0.05 s or more")?;
+    let control = chosen(&arguments.run)?;
+    let run = ObservedRun::writing_to(control.out())?;
+    let poses = run.observe()?;
+    // Without a place for it the rates are missing, and nothing else.
+    let has_samples = run.manifest().limits.samples > 0;
+    let scans = has_samples.then(|| run.observe().ok()).flatten();
+    let mut snapshots = Snapshots::of(control, poses, scans);
+    if arguments.once {
+        // Shares and rates are over the time between two snapshots.
+        let signals = Signals::install()?;
+        snapshots.take()?;
+        wait(&mut snapshots, every, || Ok(signals.sleep(PERIOD)?))?;
+        print::line(screen::text(&snapshots.take()?, width()))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut terminal = ratatui::try_init()
+        .map_err(|error| format!("the terminal cannot be used: {error}; --once prints text"))?;
+    let shown = show(&mut terminal, &mut snapshots, every);
+    ratatui::restore();
+    let last = shown?;
+    if let Some(last) = last {
+        print::line(screen::text(&last, width()))?;
+        print::line("the run has ended")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the columns of the terminal; an arbitrary number if the output is not a terminal.
+fn width() -> u16 {
+    match io::stdout().is_terminal() {
+        true => ratatui::crossterm::terminal::size().map_or(WIDTH as u16, |(columns, _)| columns),
+        false => u16::MAX,
+    }
+}
+
+/// Returns the last snapshot at a run that has ended; `None` if the person ended it.
+fn show(
+    terminal: &mut DefaultTerminal,
+    snapshots: &mut Snapshots<'_>,
+    every: Duration,
+) -> Result<Option<Snapshot>, Failure> {
+    loop {
+        let snapshot = match snapshots.take() {
+            Ok(snapshot) => snapshot,
+            Err(_) if snapshots.has_ended() => return Ok(snapshots.last()),
+            Err(error) => return Err(error),
+        };
+        terminal.draw(|frame| screen::draw(frame, &snapshot))?;
+        let mut resized = false;
+        let quit = || match next_key()? {
+            Key::Quit => Ok(true),
+            Key::Resized => {
+                resized = true;
+                Ok(false)
+            }
+            Key::None => Ok(false),
+        };
+        if wait(snapshots, every, quit)? {
+            return Ok(None);
+        }
+        if resized {
+            terminal.autoresize()?;
+        }
+    }
+}
+
+/// Takes the poses that come within `time`; true if `quit` returns true.
+fn wait(
+    snapshots: &mut Snapshots<'_>,
+    time: Duration,
+    mut quit: impl FnMut() -> Result<bool, Failure>,
+) -> Result<bool, Failure> {
+    let since = Instant::now();
+    while since.elapsed() < time {
+        if quit()? {
+            return Ok(true);
+        }
+        snapshots.take_poses()?;
+    }
+    Ok(false)
+}
+
+enum Key {
+    Quit,
+    Resized,
+    None,
+}
+
+/// Waits a moment for a key.
+fn next_key() -> Result<Key, Failure> {
+    if !event::poll(PERIOD)? {
+        return Ok(Key::None);
+    }
+    Ok(match event::read()? {
+        Event::Key(key) if key.kind == KeyEventKind::Press => {
+            let is_interrupt =
+                key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+            match key.code {
+                KeyCode::Char('q') | KeyCode::Esc => Key::Quit,
+                _ if is_interrupt => Key::Quit,
+                _ => Key::None,
+            }
+        }
+        Event::Resize(..) => Key::Resized,
+        _ => Key::None,
+    })
+}
+
+/// The poses of a run, for [`Snapshots`].
+type Poses<'run> = Observer<'run, gyre_messages::Pose>;
+type Scans<'run> = Observer<'run, gyre_messages::Scan>;

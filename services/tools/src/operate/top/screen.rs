@@ -1,0 +1,224 @@
+//! A snapshot at a run as a screen, or as text.
+
+use gyre_run::latency::{HopLatency, Percentiles};
+use gyre_stage::control::{Activity, ProcessStatus, Status};
+use gyre_terminal::wrap;
+use ratatui::{
+    Frame,
+    layout::{Constraint, Layout, Rect},
+    style::{Color, Modifier, Style, Stylize},
+    text::Line,
+    widgets::{Block, Cell, Row, Sparkline, Table},
+};
+
+use super::snapshot::{Snapshot, Use};
+use crate::operate::processes::{duration, lacks, summary};
+
+/// The columns of the table: title and width.
+const COLUMNS: [(&str, u16); 12] = [
+    ("process", 19),
+    ("pid", 8),
+    ("state", 8),
+    ("for", 7),
+    ("cpu", 6),
+    ("work p50", 9),
+    ("p99", 9),
+    ("hop p50", 8),
+    ("p99", 8),
+    ("memory", 7),
+    ("wakes/s", 8),
+    ("restarts", 8),
+];
+
+/// The columns that are left out where the screen is too narrow for all, the first one first.
+const LEFT_OUT: [usize; 5] = [10, 8, 1, 9, 3];
+
+/// Returns the places of the columns that fit into this width, each whole.
+fn columns(width: u16) -> Vec<usize> {
+    let mut shown: Vec<usize> = (0..COLUMNS.len()).collect();
+    let needed = |shown: &[usize]| shown.iter().map(|it| COLUMNS[*it].1 + 1).sum::<u16>() - 1;
+    for column in LEFT_OUT {
+        if needed(&shown) > width {
+            shown.retain(|it| *it != column);
+        }
+    }
+    shown
+}
+
+pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
+    let rows = snapshot.status.processes.len() as u16;
+    let lines = head_lines(snapshot, frame.area().width);
+    let [head, latency, table, foot] = Layout::vertical([
+        Constraint::Length(lines.len() as u16),
+        Constraint::Max(12),
+        Constraint::Length(rows + 3),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
+    let mut title: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
+    title[0] = title[0].clone().bold();
+    frame.render_widget(ratatui::text::Text::from(title), head);
+    draw_latency(frame, snapshot, latency);
+    draw_processes(frame, snapshot, table);
+    frame.render_widget(Line::from(" q quit").dim(), foot);
+}
+
+fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
+    let longest = snapshot.history.iter().max().copied().unwrap_or_default();
+    let title = format!(
+        " sensor to pose: the longest of each snapshot, up to {} ",
+        duration(longest as f64 * 1e-6)
+    );
+    let block = Block::bordered().title(title);
+    let width = usize::from(block.inner(area).width);
+    let first = snapshot.history.len().saturating_sub(width);
+    let sparkline = Sparkline::default()
+        .block(block)
+        .data(&snapshot.history[first..])
+        .style(Style::new().fg(Color::Cyan));
+    frame.render_widget(sparkline, area);
+}
+
+fn draw_processes(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
+    let style = |process: &ProcessStatus| match process.activity {
+        Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
+        Activity::Starting => Style::new().fg(Color::Yellow),
+        _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
+        _ => Style::new(),
+    };
+    let shown = columns(area.width.saturating_sub(2));
+    let rows = snapshot.status.processes.iter().zip(&snapshot.processes);
+    let rows = rows.map(|(process, used)| {
+        let cells = cells(snapshot, process, used);
+        Row::new(shown.iter().map(|it| Cell::from(cells[*it].clone()))).style(style(process))
+    });
+    let header = Row::new(shown.iter().map(|it| COLUMNS[*it].0));
+    let widths = shown.iter().map(|it| Constraint::Length(COLUMNS[*it].1));
+    let table = Table::new(rows, widths)
+        .header(header.style(Style::new().add_modifier(Modifier::BOLD)))
+        .block(Block::bordered().title(" processes "));
+    frame.render_widget(table, area);
+}
+
+/// Returns a snapshot as text of this width at most, as far as its columns can be left out.
+pub fn text(snapshot: &Snapshot, width: u16) -> String {
+    let mut lines = head_lines(snapshot, width);
+    let shown = columns(width);
+    let line = |cells: [String; COLUMNS.len()]| {
+        let cells = shown.iter().map(|it| (&cells[*it], COLUMNS[*it]));
+        let cells = cells.map(|(cell, (_, width))| format!("{cell:width$}", width = width.into()));
+        cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
+    };
+    lines.push(line(COLUMNS.map(|(title, _)| title.to_owned())));
+    for (process, used) in snapshot.status.processes.iter().zip(&snapshot.processes) {
+        lines.push(line(cells(snapshot, process, used)));
+    }
+    lines.join("\n")
+}
+
+/// Returns the lines above the table, wrapped to this width.
+fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
+    let status = &snapshot.status;
+    let in_flight = snapshot
+        .in_flight
+        .map_or_else(|| "unknown".to_owned(), |count| count.to_string());
+    let Percentiles {
+        p50_us,
+        p99_us,
+        max_us,
+        ..
+    } = snapshot.latency.sensor_to_pose;
+    let lines = [
+        status.out.display().to_string(),
+        summary(status),
+        format!(
+            "{:.1} scans/s, {in_flight} in flight{}{}",
+            snapshot.rate,
+            missed_by_recorder(status),
+            status
+                .processes
+                .iter()
+                .filter_map(|it| it.received.as_ref())
+                .map(lacks)
+                .collect::<String>()
+        ),
+        format!(
+            "sensor to pose p50 {}, p99 {}, max {} of {} poses in 10 s",
+            us(p50_us),
+            us(p99_us),
+            us(max_us),
+            snapshot.latency.scans
+        ),
+        witnesses(snapshot),
+    ];
+    wrap(&lines.join("\n"), width.into())
+}
+
+/// Returns the basis of the newest motion, how often gyro, wheels and Doppler were used, and the
+/// rates of their samples.
+fn witnesses(snapshot: &Snapshot) -> String {
+    let basis = snapshot.basis.unwrap_or("no motion");
+    let motions = snapshot.witnesses.motions();
+    let used = snapshot.witnesses.in_words();
+    let used = used.map(|used| format!("{used} of {motions} motions in 10 s"));
+    let words: Vec<String> = used.into_iter().chain(snapshot.samples.clone()).collect();
+    match words.as_slice() {
+        [] => basis.to_owned(),
+        words => format!("{basis}: {}", words.join("; ")),
+    }
+}
+
+/// Returns the losses of a recorder, if there are any.
+fn missed_by_recorder(status: &Status) -> String {
+    let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
+    match missed {
+        0 => String::new(),
+        missed => format!(", {missed} messages missed by the recorder"),
+    }
+}
+
+fn cells(snapshot: &Snapshot, process: &ProcessStatus, used: &Use) -> [String; COLUMNS.len()] {
+    let latency = snapshot.latency.stages.get(process.name.as_str());
+    let of = |value: fn(&HopLatency) -> Option<f64>| latency.and_then(value).map(us);
+    [
+        process.name.clone(),
+        process.pid.to_string(),
+        process.activity.name().to_owned(),
+        process.activity_s.map(duration).unwrap_or_default(),
+        format!("{:.1} %", 100.0 * used.cpu),
+        of(|it| Some(it.work.p50_us)).unwrap_or_default(),
+        of(|it| Some(it.work.p99_us)).unwrap_or_default(),
+        of(|it| Some(it.transport?.p50_us)).unwrap_or_default(),
+        of(|it| Some(it.transport?.p99_us)).unwrap_or_default(),
+        format!("{:.0} MB", used.own_bytes as f64 * 1e-6),
+        format!("{:.0}", used.wake_ups),
+        process.restarts.to_string(),
+    ]
+}
+
+/// Returns microseconds in three digits or so.
+fn us(us: f64) -> String {
+    match us {
+        us if us < 999.5 => format!("{us:.0} us"),
+        us if us < 9_995.0 => format!("{:.2} ms", us * 1e-3),
+        us if us < 99_950.0 => format!("{:.1} ms", us * 1e-3),
+        us => duration(us * 1e-6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_whole_on_a_small_screen_and_all_there_on_a_wide_one() {
+        let titles =
+            |width: u16| -> Vec<&str> { columns(width).iter().map(|it| COLUMNS[*it].0).collect() };
+        let expected = [
+            "process", "state", "cpu", "work p50", "p99", "hop p50", "restarts",
+        ];
+        assert_eq!(titles(78), expected);
+        assert_eq!(titles(116).len(), COLUMNS.len());
+        assert_eq!(titles(115).len(), COLUMNS.len() - 1);
+    }
+}

@@ -1,0 +1,207 @@
+//! The state of a run at a moment, from its status, its newest poses and the kernel's counts.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{PoseHeader, SampleRates, StageId, WitnessCounts, flag};
+use gyre_run::latency::{Latency, LatencyMeter};
+use gyre_stage::{
+    clock,
+    control::{Control, Status},
+    observer::Next,
+};
+use gyre_supervise::Usage;
+use gyre_terminal::Failure;
+
+use super::{Poses, Scans};
+
+/// The time over which latencies are measured.
+const SPAN: Duration = Duration::from_secs(10);
+/// Number of snapshots whose latency is drawn.
+const HISTORY: usize = 300;
+
+/// A run at a moment.
+#[derive(Clone)]
+pub struct Snapshot {
+    pub status: Status,
+    /// Scans with a pose, 1/s.
+    pub rate: f64,
+    /// Scans that were published and have no pose; `None` if the source does not report them.
+    pub in_flight: Option<u64>,
+    /// Of the poses of the last 10 s that were seen.
+    pub latency: Latency,
+    /// The basis of those motions, and the basis of the newest motion in words.
+    pub witnesses: WitnessCounts,
+    /// Rates of the samples of gyro and wheels, in words.
+    pub samples: Option<String>,
+    pub basis: Option<&'static str>,
+    /// The usage of each process, in the order of the status.
+    pub processes: Vec<Use>,
+    /// The longest sensor-to-pose time between two snapshots, us, oldest first.
+    pub history: Vec<u64>,
+}
+
+/// The usage of a process.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Use {
+    /// Share of one processor since the last snapshot.
+    pub cpu: f64,
+    /// Memory of its own, bytes.
+    pub own_bytes: u64,
+    /// Wake-ups since the last snapshot, 1/s.
+    pub wake_ups: f64,
+}
+
+/// Takes snapshots of a run.
+pub struct Snapshots<'run> {
+    control: Control,
+    poses: Poses<'run>,
+    /// The scans of a run with samples.
+    scans: Option<Scans<'run>>,
+    rates: SampleRates,
+    recent: VecDeque<PoseHeader>,
+    longest_us: u64,
+    /// Since when scans wait for their poses and none comes.
+    owed_since: Option<Instant>,
+    has_new: bool,
+    history: VecDeque<u64>,
+    earlier: Option<Earlier>,
+    last: Option<Snapshot>,
+}
+
+/// The counts at the snapshot before.
+struct Earlier {
+    at: Instant,
+    poses: u64,
+    usage: BTreeMap<u32, Usage>,
+}
+
+impl<'run> Snapshots<'run> {
+    pub fn of(control: Control, poses: Poses<'run>, scans: Option<Scans<'run>>) -> Self {
+        Self {
+            control,
+            poses,
+            scans,
+            rates: SampleRates::default(),
+            recent: VecDeque::new(),
+            longest_us: 0,
+            owed_since: None,
+            has_new: false,
+            history: VecDeque::new(),
+            earlier: None,
+            last: None,
+        }
+    }
+
+    /// Returns whether the run has ended.
+    pub fn has_ended(&self) -> bool {
+        !self.control.is_there() || self.control.status().is_err()
+    }
+
+    /// Returns the newest snapshot.
+    pub fn last(&mut self) -> Option<Snapshot> {
+        self.last.take()
+    }
+
+    /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest
+    /// is a sample.
+    pub fn take_poses(&mut self) -> Result<(), Failure> {
+        while let Next::Message(pose, _) = self.poses.next(Duration::ZERO)? {
+            let pose = *pose.header();
+            let done_ns = pose.item.hops.iter().map(|hop| hop.finished_ns).max();
+            let latency_ns = done_ns.unwrap_or_default() - pose.item.due_ns;
+            self.longest_us = self.longest_us.max(latency_ns.max(0) as u64 / 1000);
+            self.recent.push_back(pose);
+            self.has_new = true;
+        }
+        if let Some(scans) = &mut self.scans {
+            while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
+                self.rates.add(scan.header(), scan.values());
+            }
+        }
+        Ok(())
+    }
+
+    pub fn take(&mut self) -> Result<Snapshot, Failure> {
+        let status = self.control.status()?;
+        let now = Instant::now();
+        self.take_poses()?;
+        // By their own time: an observer that has just come receives older ones first.
+        let oldest_ns = clock::now_ns() - SPAN.as_nanos() as i64;
+        let published_ns =
+            |pose: &PoseHeader| pose.item.hops[StageId::PoseIntegration as usize].published_ns;
+        self.recent.retain(|pose| published_ns(pose) >= oldest_ns);
+        let mut meter = LatencyMeter::default();
+        self.recent.iter().for_each(|pose| meter.add(pose));
+        let motions = || {
+            let motions = self.recent.iter().filter(|pose| !pose.item.is(flag::BREAK));
+            motions.map(|pose| &pose.motion.refinement)
+        };
+        let witnesses = WitnessCounts::of(motions());
+        let basis = motions().next_back().map(|motion| motion.basis().name());
+        let in_flight = status
+            .published
+            .map(|published| published.saturating_sub(status.poses + status.dropped));
+        self.draw(now, in_flight);
+        let pids = status.processes.iter().map(|process| process.pid);
+        let usage: BTreeMap<u32, Usage> = pids
+            .filter_map(|pid| Some((pid, Usage::of(pid)?)))
+            .collect();
+        let earlier = self.earlier.replace(Earlier {
+            at: now,
+            poses: status.poses,
+            usage: usage.clone(),
+        });
+        let elapsed = earlier.as_ref().map_or(Duration::ZERO, |it| now - it.at);
+        let rate = earlier.as_ref().map_or(0.0, |earlier| {
+            status.poses.saturating_sub(earlier.poses) as f64 / elapsed.as_secs_f64().max(1e-9)
+        });
+        let used = |pid: u32| {
+            let now = usage.get(&pid).copied().unwrap_or_default();
+            let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
+            Use::between(before.unwrap_or(now), now, elapsed)
+        };
+        let snapshot = Snapshot {
+            rate,
+            in_flight,
+            latency: meter.latency(),
+            witnesses,
+            samples: self.rates.health().in_words(),
+            basis,
+            processes: status.processes.iter().map(|it| used(it.pid)).collect(),
+            history: self.history.iter().copied().collect(),
+            status,
+        };
+        self.last = Some(snapshot.clone());
+        Ok(snapshot)
+    }
+
+    /// Adds the longest time since the last snapshot to the drawing: while poses are due and none
+    /// arrives, the duration of the wait.
+    fn draw(&mut self, now: Instant, in_flight: Option<u64>) {
+        let is_owed =
+            !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);
+        self.owed_since = is_owed.then(|| self.owed_since.unwrap_or(now));
+        let owed_us = self
+            .owed_since
+            .map_or(0, |since| (now - since).as_micros() as u64);
+        self.history
+            .push_back(std::mem::take(&mut self.longest_us).max(owed_us));
+        if self.history.len() > HISTORY {
+            self.history.pop_front();
+        }
+    }
+}
+
+impl Use {
+    fn between(before: Usage, now: Usage, elapsed: Duration) -> Self {
+        let wake_ups = now.wake_ups.saturating_sub(before.wake_ups) as f64;
+        Self {
+            cpu: now.processor_share(&before, elapsed),
+            own_bytes: now.own_bytes,
+            wake_ups: wake_ups / elapsed.as_secs_f64().max(1e-9),
+        }
+    }
+}

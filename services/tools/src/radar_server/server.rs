@@ -1,0 +1,262 @@
+//! Plays a recording as a radar on the network, with injected faults where asked for.
+
+mod clients;
+mod faults;
+mod group;
+mod output;
+
+use std::{
+    f64::consts::TAU,
+    io,
+    ops::Range,
+    time::{Duration, Instant},
+};
+
+use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
+use gyre_datasets::{Dataset, ReadError};
+use gyre_radar::{OwnedScan, PolarScan, scan::flag};
+use thiserror::Error;
+
+pub(crate) use clients::Clients;
+pub use faults::Faults;
+pub(crate) use group::Group;
+pub use gyre_colossus::{ByteOrder, ClockFormat};
+pub use output::Audience;
+pub(crate) use output::{Output, sleep_until};
+
+/// Encoder counts in a turn, unless a recording contains them.
+const ENCODER_COUNTS: u16 = 5600;
+/// The longest wait within a recording: longer gaps are shortened to it.
+const MAX_WAIT: Duration = Duration::from_secs(2);
+/// The bytes of a garbled message.
+const GARBAGE: &[u8] = b"not a message of a radar";
+
+/// The options of a playback.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Playback {
+    /// Factor of the recorded pace; `None`: as fast as the clients read.
+    pub rate: Option<f64>,
+    /// Scans to play, by their index in the recording.
+    pub scans: Range<usize>,
+    /// Play the recording again and again, its times going on.
+    pub repeats: bool,
+    pub faults: Faults,
+    /// The format of the times.
+    pub clock: ClockFormat,
+}
+
+/// A failure to play a recording as a radar.
+#[derive(Debug, Error)]
+pub enum ServeError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error("cannot serve as a radar: {0}")]
+    Network(#[from] io::Error),
+    #[error(
+        "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
+    )]
+    TooLarge {
+        azimuths: usize,
+        /// Range bins of an azimuth.
+        bins: usize,
+    },
+}
+
+/// The counts of a playback.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Played {
+    pub scans: u64,
+    /// Azimuths that were left out.
+    pub lost_azimuths: u64,
+    /// Datagrams that were left out.
+    pub lost_datagrams: u64,
+    pub resets: u64,
+    pub stalls: u64,
+}
+
+/// Plays a recording until it has ended or `stop` returns true.
+pub fn serve(
+    audience: Audience,
+    dataset: &mut dyn Dataset,
+    playback: &Playback,
+    stop: &dyn Fn() -> bool,
+) -> Result<Played, ServeError> {
+    let first = playback.scans.start;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    scan.geometry = dataset.read(first, scan.slot())?;
+    let radar = configuration(dataset, scan.view())?;
+    let output = Output::open(audience, &radar, playback.faults)?;
+    let mut player = Player {
+        output,
+        radar,
+        playback,
+        stop,
+        message: Vec::new(),
+        started: None,
+        shift_ns: 0,
+        sweep_counter: 0,
+        played: Played::default(),
+    };
+    if !player.output.describe(&player.radar, stop) {
+        return Ok(player.ended());
+    }
+    loop {
+        let mut last_ns = 0;
+        for index in playback.scans.clone() {
+            scan.geometry = dataset.read(index, scan.slot())?;
+            if !player.play(scan.view()) {
+                return Ok(player.ended());
+            }
+            last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
+        }
+        if !playback.repeats {
+            player.output.close();
+            return Ok(player.ended());
+        }
+        scan.geometry = dataset.read(first, scan.slot())?;
+        let first_ns = scan.stamp_ns.first().copied().unwrap_or_default();
+        player.shift_ns +=
+            last_ns - first_ns + dataset.period_ns() / scan.geometry.azimuths.max(1) as i64;
+    }
+}
+
+/// Returns the radar's description of itself.
+fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, ServeError> {
+    let geometry = scan.geometry;
+    let (azimuths, bins) = (geometry.azimuths, geometry.bins);
+    let small =
+        |number: usize| u16::try_from(number).map_err(|_| ServeError::TooLarge { azimuths, bins });
+    let resolution_m = f64::from(geometry.range_resolution_m);
+    Ok(Configuration {
+        azimuth_samples: small(azimuths)?,
+        bin_size: (resolution_m * 1e4).round().min(f64::from(u16::MAX)) as u16,
+        range_in_bins: small(bins)?,
+        encoder_size: dataset.encoder_counts().unwrap_or(ENCODER_COUNTS),
+        rotation_mhz: (1e12 / dataset.period_ns().max(1) as f64)
+            .round()
+            .min(f64::from(u16::MAX)) as u16,
+        packet_rate: (azimuths as f64 * 1e9 / dataset.period_ns().max(1) as f64)
+            .round()
+            .min(f64::from(u16::MAX)) as u16,
+        range_gain: 1.0,
+        range_offset: 0.0,
+        range_resolution_m: Some(geometry.range_resolution_m),
+    })
+}
+
+struct Player<'a> {
+    output: Output,
+    radar: Configuration,
+    playback: &'a Playback,
+    stop: &'a dyn Fn() -> bool,
+    message: Vec<u8>,
+    /// When the first azimuth was due, and its time in the recording, ns.
+    started: Option<(Instant, i64)>,
+    /// Added to the times of the recording, which is played again.
+    shift_ns: i64,
+    sweep_counter: u16,
+    played: Played,
+}
+
+impl Player<'_> {
+    /// Sends a scan azimuth by azimuth; false on a request to stop.
+    fn play(&mut self, scan: PolarScan<'_>) -> bool {
+        if !self.has_client() {
+            return false;
+        }
+        let faults = self.playback.faults;
+        if faults.stalls(self.played.scans) {
+            self.played.stalls += 1;
+            self.started = None;
+            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s);
+            if !sleep_until(due, self.stop) {
+                return false;
+            }
+        }
+        for row in 0..scan.geometry.azimuths {
+            if !self.wait_until_due(scan.stamp_ns[row]) {
+                return false;
+            }
+            self.sweep_counter = self.sweep_counter.wrapping_add(1);
+            // A row that was not measured was not sent by the radar either.
+            let is_measured = scan.flags[row] & flag::MEASURED != 0;
+            let is_lost =
+                matches!(self.output, Output::Clients(_)) && faults.loses(self.played.scans, row);
+            if !is_measured || is_lost {
+                self.played.lost_azimuths += 1;
+                continue;
+            }
+            self.send(&scan, row);
+            if let Output::Clients(clients) = &self.output
+                && row == scan.geometry.azimuths / 2
+                && faults.resets(self.played.scans)
+            {
+                self.played.resets += 1;
+                clients.reset();
+            }
+        }
+        self.played.scans += 1;
+        !(self.stop)()
+    }
+
+    fn ended(self) -> Played {
+        let lost_datagrams = match &self.output {
+            Output::Clients(_) => 0,
+            Output::Group { group, .. } => group.lost,
+        };
+        Played {
+            lost_datagrams,
+            ..self.played
+        }
+    }
+
+    /// Waits for a first client; at the pace of the clients for one after each loss, too.
+    fn has_client(&self) -> bool {
+        let waits = self.started.is_none() || self.playback.rate.is_none();
+        !waits || self.output.await_client(self.stop)
+    }
+
+    /// Waits until an azimuth is due; false on a request to stop.
+    fn wait_until_due(&mut self, stamp_ns: i64) -> bool {
+        let Some(rate) = self.playback.rate else {
+            self.started.get_or_insert((Instant::now(), stamp_ns));
+            return true;
+        };
+        let stamp_ns = stamp_ns + self.shift_ns;
+        let (start, first_ns) = *self.started.get_or_insert((Instant::now(), stamp_ns));
+        let due_s = (stamp_ns - first_ns).max(0) as f64 * 1e-9 / rate;
+        let due = start + Duration::try_from_secs_f64(due_s).unwrap_or(MAX_WAIT);
+        let wait = due.saturating_duration_since(Instant::now());
+        if wait > MAX_WAIT {
+            self.started = Some((Instant::now() + MAX_WAIT, stamp_ns));
+        }
+        sleep_until(Instant::now() + wait.min(MAX_WAIT), self.stop)
+    }
+
+    fn send(&mut self, scan: &PolarScan<'_>, row: usize) {
+        let faults = self.playback.faults;
+        let encoder_size = self.radar.encoder_size;
+        let turns = f64::from(scan.azimuth_rad[row]) / TAU;
+        let encoder = (turns * f64::from(encoder_size)).round() as u16 % encoder_size;
+        let stamp_ns = scan.stamp_ns[row] + self.shift_ns;
+        let (seconds, split_seconds) = self.playback.clock.fields(stamp_ns);
+        let azimuth = Azimuth {
+            sweep_counter: self.sweep_counter,
+            encoder,
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(scan.row(row)),
+        };
+        if faults.garbles(self.played.scans, row) {
+            self.output.send(GARBAGE);
+        }
+        match &mut self.output {
+            Output::Clients(clients) => {
+                self.message.clear();
+                write_azimuth(&mut self.message, &azimuth);
+                clients.send(&self.message);
+            }
+            Output::Group { group, .. } => group.send(&self.radar, &azimuth),
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The clients of a radar that is played.
+
+use std::{
+    io::{self, Read, Write},
+    net::{Shutdown, TcpListener, TcpStream},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_colossus::{Configuration, Event, Message, Parser, Request, write_configuration};
+
+/// The most clients of a radar.
+const MAX_CLIENTS: usize = 3;
+/// Time without a read after which a client is given up.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time until the next connection is accepted after one that failed.
+const PAUSE: Duration = Duration::from_millis(50);
+/// Time for the clients to read the last bytes.
+const LINGER: Duration = Duration::from_secs(5);
+
+/// The clients that are connected.
+pub struct Clients {
+    all: Arc<Mutex<Vec<Client>>>,
+}
+
+struct Client {
+    stream: TcpStream,
+    /// True once it has asked for azimuths.
+    started: bool,
+    number: u64,
+}
+
+impl Clients {
+    /// Accepts clients from now on, each in a thread of its own, which ends with its connection.
+    pub fn accept(listener: TcpListener, radar: &Configuration) -> io::Result<Self> {
+        let all = Arc::default();
+        let clients = Arc::clone(&all);
+        let mut configuration = Vec::new();
+        write_configuration(&mut configuration, radar);
+        thread::Builder::new()
+            .name("accept".to_owned())
+            .spawn(move || {
+                for (number, stream) in listener.incoming().enumerate() {
+                    // A client that leaves at once or too many open files are no reason to stop.
+                    let Ok(stream) = stream else {
+                        thread::sleep(PAUSE);
+                        continue;
+                    };
+                    let _ = admit(stream, number as u64, &configuration, &clients);
+                }
+            })?;
+        Ok(Self { all })
+    }
+
+    /// Returns whether a client has asked for azimuths.
+    pub fn any_started(&self) -> bool {
+        lock(&self.all).iter().any(|client| client.started)
+    }
+
+    /// Sends bytes to the clients that have asked for azimuths, and drops those that fail.
+    pub fn send(&self, bytes: &[u8]) {
+        lock(&self.all).retain_mut(|client| {
+            let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
+            if !takes {
+                let _ = client.stream.shutdown(Shutdown::Both);
+            }
+            takes
+        });
+    }
+
+    pub fn reset(&self) {
+        for client in lock(&self.all).drain(..) {
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
+    }
+
+    /// Ends all connections when the clients have read all sent bytes.
+    pub fn close(&self) {
+        let clients: Vec<_> = lock(&self.all).drain(..).collect();
+        for mut client in clients {
+            let _ = client.stream.shutdown(Shutdown::Write);
+            let _ = client.stream.set_read_timeout(Some(LINGER));
+            let mut rest = [0; 256];
+            let began = Instant::now();
+            while began.elapsed() < LINGER && matches!(client.stream.read(&mut rest), Ok(1..)) {}
+        }
+    }
+}
+
+/// Writes a message, however slowly it is taken, within [`WRITE_TIMEOUT`].
+fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
+    let began = Instant::now();
+    while !bytes.is_empty() {
+        let written = stream.write(bytes)?;
+        if written == 0 || began.elapsed() > WRITE_TIMEOUT {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        bytes = &bytes[written..];
+    }
+    Ok(())
+}
+
+/// Sends the configuration to a client, and reads its requests in a thread.
+fn admit(
+    mut stream: TcpStream,
+    number: u64,
+    configuration: &[u8],
+    clients: &Arc<Mutex<Vec<Client>>>,
+) -> io::Result<()> {
+    if lock(clients).len() >= MAX_CLIENTS {
+        return stream.shutdown(Shutdown::Both);
+    }
+    stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    stream.write_all(configuration)?;
+    let reader = stream.try_clone()?;
+    lock(clients).push(Client {
+        stream,
+        started: false,
+        number,
+    });
+    let clients = Arc::clone(clients);
+    thread::Builder::new()
+        .name("client".to_owned())
+        .spawn(move || {
+            requests(reader, number, &clients);
+            lock(&clients).retain(|client| client.number != number);
+        })?;
+    Ok(())
+}
+
+/// Follows the requests of a client until it leaves.
+fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
+    let mut parser = Parser::default();
+    while let Ok(count @ 1..) = stream.read(parser.space(256)) {
+        parser.filled(count);
+        while let Some(event) = parser.next() {
+            let Event::Message(Message::Request(request)) = event else {
+                continue;
+            };
+            let started = match request {
+                Request::StartFft | Request::StartNonContourFft => true,
+                Request::StopFft => false,
+                // A recording has no health.
+                Request::RequestConfiguration | Request::StartHealth | Request::StopHealth => {
+                    continue;
+                }
+            };
+            let mut clients = lock(clients);
+            clients
+                .iter_mut()
+                .filter(|client| client.number == number)
+                .for_each(|client| client.started = started);
+        }
+    }
+}
+
+fn lock(clients: &Mutex<Vec<Client>>) -> MutexGuard<'_, Vec<Client>> {
+    clients.lock().unwrap_or_else(PoisonError::into_inner)
+}

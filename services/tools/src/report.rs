@@ -1,0 +1,110 @@
+//! `gyre report`: one page about a run, or about several runs and the trajectories of other
+//! programs beside each other. The page has all its pictures in it and needs no network.
+//!
+//! - `subject`: a run or a trajectory that the page is about;
+//! - `figures`: its figures, as rows of a table;
+//! - `page`: the document; `html`: its parts.
+
+mod figures;
+mod html;
+mod page;
+mod subject;
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, ExitCode, Stdio},
+};
+
+use clap::Args;
+use gyre_datasets::read_trajectory;
+use gyre_results::{evaluate::truth_of_run, write_page};
+use gyre_terminal::{Failure, print};
+
+use page::page;
+use subject::Subject;
+
+/// The arguments of `gyre report`.
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// Runs, by the folders of their results, and trajectories of other programs (TUM, KITTI or a
+    /// dataset's own format). Of several the page compares them.
+    #[arg(required = true, value_name = "RUN|FILE")]
+    pub subjects: Vec<PathBuf>,
+    /// The ground truth of all. Default: that of the first run that has one.
+    #[arg(long, value_name = "FILE")]
+    pub ground_truth: Option<PathBuf>,
+    /// The page to write: a new file, a page of gyre report, a FIFO or a device. Default:
+    /// report.html in the folder of a run, of several comparison.html in that of the first.
+    #[arg(long, value_name = "FILE")]
+    pub to: Option<PathBuf>,
+    /// Open the page in the browser.
+    #[arg(long)]
+    pub open: bool,
+}
+
+/// Writes the page and prints its path.
+pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
+    let truth = match &arguments.ground_truth {
+        Some(truth) => Some(truth.clone()),
+        None => truth_of(&arguments.subjects),
+    };
+    let truth = truth.as_deref().map(read_trajectory).transpose()?;
+    let read = |path: &PathBuf| Subject::read(path, truth.as_ref());
+    let subjects = with_corrected(&arguments.subjects);
+    let subjects: Result<Vec<Subject>, Failure> = subjects.iter().map(read).collect();
+    let to = arguments
+        .to
+        .clone()
+        .unwrap_or_else(|| default_page(&arguments.subjects));
+    write_page(&to, &page(&subjects?)?, "<p>by gyre report, ")?;
+    print::line(to.display())?;
+    if arguments.open {
+        open(&to)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the runs and trajectories, each run with the trajectory that its loops have corrected.
+fn with_corrected(subjects: &[PathBuf]) -> Vec<PathBuf> {
+    let both = |path: &PathBuf| {
+        let corrected = path.join("trajectory_slam.tum");
+        [Some(path.clone()), corrected.is_file().then_some(corrected)]
+    };
+    subjects.iter().flat_map(both).flatten().collect()
+}
+
+/// Returns the ground truth of the first run that has one.
+fn truth_of(subjects: &[PathBuf]) -> Option<PathBuf> {
+    let runs = subjects.iter().filter(|path| path.is_dir());
+    let mut truths = runs.filter_map(|run| truth_of_run(run).ok());
+    truths.find(|truth| truth.is_file())
+}
+
+fn default_page(subjects: &[PathBuf]) -> PathBuf {
+    let name = match subjects {
+        [_] => "report.html",
+        _ => "comparison.html",
+    };
+    let first = subjects.first().filter(|path| path.is_dir());
+    first.map_or_else(|| name.into(), |run| run.join(name))
+}
+
+/// Opens a file with the program that the desktop has for it.
+fn open(page: &Path) -> Result<(), Failure> {
+    let mut command = Command::new("xdg-open");
+    command
+        .arg(page)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let failed = |reason: String| {
+        format!(
+            "cannot open a browser by xdg-open ({reason}): open {} yourself",
+            page.display()
+        )
+    };
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(failed(status.to_string()).into()),
+        Err(error) => Err(failed(error.to_string()).into()),
+    }
+}

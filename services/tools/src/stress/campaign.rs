@@ -1,0 +1,361 @@
+//! One scenario after the other.
+
+use std::{sync::Arc, thread, time::Duration};
+
+use gyre_messages::StageId;
+use gyre_run::{Limits, PlayedFault, RADAR_HZ, Scenario};
+use gyre_stage::run::{free_shared_memory, sweep};
+
+use crate::stress::{
+    Report, StressError, TestedPipeline,
+    check::Check,
+    fault::{self, FaultKind},
+    helper::Work,
+    pipeline::{Measured, Setup, measure},
+    report::{Figures, ScenarioOutcome, Step, Verdict},
+    search::{Found, Steps, largest, step_duration},
+    witness_fault::{self, WitnessFault},
+};
+
+/// Scans of a burst.
+const BURST: u64 = 3;
+/// Share of the available memory that is taken.
+const MEMORY_SHARE: f64 = 0.9;
+/// Programs that read all topics.
+const OBSERVERS: usize = 8;
+/// A stage is made slower than the radar by this factor.
+const SLOWER: f64 = 1.2;
+/// The limit of p99 where the budget names none: the period of a 4 Hz radar, ms.
+const PERIOD_MS: f64 = 250.0;
+/// Levels of the ramp in a doubling of the rate.
+const LEVELS: u32 = 16;
+/// The highest level of the ramp: 2^8 times the radar's rate.
+const MOST_LEVELS: u32 = 8 * LEVELS;
+/// The largest fleet that is tried.
+const MOST_RADARS: u32 = 64;
+/// The rate of the source has a limit: 1000 times the sensor's own.
+const MOST_HZ: f64 = 1000.0;
+
+/// The scenarios to carry out, and their options.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The scenarios, in this order.
+    pub scenarios: Vec<Scenario>,
+    /// Time for which each is measured.
+    pub duration: Duration,
+    /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
+    pub stages: Vec<StageId>,
+    /// For the choice of stages.
+    pub seed: u64,
+}
+
+/// Carries out all scenarios. `note` receives lines about the progress, `judged` each verdict.
+///
+/// A scenario that could not be carried out has that as its verdict, and the next ones follow.
+pub fn stress(
+    tested: &TestedPipeline,
+    options: &Options,
+    note: &mut dyn FnMut(&str),
+    judged: &mut dyn FnMut(&str),
+) -> Report {
+    let mut outcomes = Vec::new();
+    for scenario in &options.scenarios {
+        note(&format!("{scenario}: {}", scenario.line()));
+        let campaign = Campaign {
+            tested,
+            options,
+            scenario: *scenario,
+            limits: tested.budget.of(*scenario),
+        };
+        let outcome = campaign.outcome(note);
+        let outcome = outcome.unwrap_or_else(|error| ScenarioOutcome {
+            verdict: Verdict::NotCarriedOut,
+            problem: Some(error.to_string()),
+            ..campaign.empty()
+        });
+        judged(&outcome.sentence());
+        outcomes.push(outcome);
+    }
+    // Helpers that were killed have left files in shared memory.
+    sweep();
+    Report::of(outcomes)
+}
+
+struct Campaign<'a> {
+    tested: &'a TestedPipeline,
+    options: &'a Options,
+    scenario: Scenario,
+    limits: Limits,
+}
+
+impl Campaign<'_> {
+    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+        match self.scenario {
+            Scenario::Ramp => self.ramp(note),
+            Scenario::Fleet => self.fleet(note),
+            _ => self.single(),
+        }
+    }
+
+    fn empty(&self) -> ScenarioOutcome {
+        ScenarioOutcome::new(self.scenario, self.options.duration)
+    }
+
+    /// One run.
+    fn single(&self) -> Result<ScenarioOutcome, StressError> {
+        if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
+            return Err(StressError::Usage(lacking));
+        }
+        let setup = self.setup();
+        if setup.faults.is_some() && setup.duration < fault::LEAST {
+            return Err(StressError::TooShort {
+                scenario: self.scenario.name(),
+                least_s: fault::LEAST.as_secs(),
+            });
+        }
+        let mut measured = measure(self.tested, &setup, Arc::new(()))?;
+        let (problem, omitted) = (problem(&measured), measured.omitted.take());
+        let figures = measured.figures;
+        Ok(ScenarioOutcome {
+            checks: checks(&self.limits, &figures),
+            problem,
+            figures: Some(figures),
+            duration_s: setup.duration.as_secs_f64(),
+            ..self.empty()
+        }
+        .judged()
+        .unless(omitted))
+    }
+
+    fn setup(&self) -> Setup {
+        let duration = self.options.duration;
+        let mut setup = Setup::undisturbed(self.scenario, self.scenario.rate_hz(), duration);
+        setup.seed = self.options.seed;
+        match self.scenario {
+            Scenario::Bursts => {
+                setup.burst = BURST;
+                setup.set.push(format!("source.burst={BURST}"));
+            }
+            Scenario::Hogs => {
+                let processors = thread::available_parallelism().map_or(1, usize::from);
+                setup.loads = vec![Work::Spin; processors];
+            }
+            Scenario::Memory => {
+                setup.memory_share = Some(MEMORY_SHARE);
+            }
+            Scenario::Observers => {
+                setup.observers = OBSERVERS;
+                // One place more for this process.
+                setup.set.push(format!("run.observers={}", OBSERVERS + 1));
+            }
+            Scenario::SlowStage => setup.set.extend(self.slow_stages()),
+            Scenario::Stopped => setup.faults = Some((FaultKind::Stop, self.stages())),
+            Scenario::Kills => setup.faults = Some((FaultKind::Kill, self.stages())),
+            _ => self.play_faults(&mut setup),
+        }
+        setup
+    }
+
+    /// Adds the faults that the source plays, and the time that they take.
+    fn play_faults(&self, setup: &mut Setup) {
+        setup.played = witness_fault::faults(self.scenario);
+        if setup.played.is_empty() {
+            return;
+        }
+        let needed_s = witness_fault::needed_s(&setup.played);
+        let needed_s = needed_s / self.tested.relative_rate(setup.rate_hz);
+        setup.duration = setup.duration.max(Duration::from_secs_f64(needed_s));
+        let fault = |fault: &PlayedFault| {
+            let PlayedFault { from_s, for_s, .. } = fault;
+            let kind = fault.kind.name();
+            format!("{{kind='{kind}',from_s={from_s:?},for_s={for_s:?}}}")
+        };
+        let faults: Vec<String> = setup.played.iter().map(fault).collect();
+        setup
+            .set
+            .push(format!("source.faults=[{}]", faults.join(",")));
+    }
+
+    fn stages(&self) -> Vec<StageId> {
+        match self.options.stages.is_empty() {
+            true => self.tested.stages.clone(),
+            false => self.options.stages.clone(),
+        }
+    }
+
+    fn slow_stages(&self) -> Vec<String> {
+        let stages = match self.options.stages.as_slice() {
+            [] => &[StageId::Masking],
+            stages => stages,
+        };
+        let delay_ms = 1e3 / self.scenario.rate_hz() * SLOWER;
+        let slowed = stages.iter();
+        slowed
+            .map(|stage| format!("stages.{}.delay_ms={delay_ms:.0}", stage.name()))
+            .collect()
+    }
+
+    /// The limits of each step: the limits of the budget, else no drop and a p99 of a period.
+    fn step_limits(&self) -> Limits {
+        let limits = Limits {
+            rate_hz: None,
+            radars: None,
+            ..self.limits.clone()
+        };
+        limits.or(&Limits {
+            p99_ms: Some(PERIOD_MS),
+            drops_percent: Some(0.0),
+            ..Limits::default()
+        })
+    }
+
+    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+        let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
+        let most = (MOST_HZ.min(MOST_HZ / self.tested.period.as_secs_f64()) / RADAR_HZ).log2();
+        let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
+        let mut steps = Steps::new("scans/s", note);
+        let passes = |level| steps.passes(|| self.step(rate_hz(level), rate_hz(level), 1));
+        let found = largest(0, most, |level| level + LEVELS, passes)?;
+        Ok(self.found(&found, rate_hz, steps, ("rate_hz", self.limits.rate_hz)))
+    }
+
+    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+        let mut steps = Steps::new("radars", note);
+        let passes = |radars| {
+            steps.passes(|| match self.lacks_memory(radars) {
+                Some(reason) => Ok(Step::not_started(f64::from(radars), reason)),
+                None => self.step(f64::from(radars), RADAR_HZ, radars),
+            })
+        };
+        let found = largest(1, MOST_RADARS, |radars| radars * 2, passes)?;
+        Ok(self.found(&found, f64::from, steps, ("radars", self.limits.radars)))
+    }
+
+    /// Returns the outcome of a search, whose levels stand for these loads.
+    fn found(
+        &self,
+        found: &Found,
+        load: impl Fn(u32) -> f64,
+        steps: Steps<'_>,
+        (key, limit): (&'static str, Option<f64>),
+    ) -> ScenarioOutcome {
+        let best = found.best.map(&load);
+        let check = limit.map(|limit| Check::at_least(key, Some(best.unwrap_or(0.0)), limit));
+        ScenarioOutcome {
+            checks: check.into_iter().collect(),
+            best,
+            failed: found.failed.map(load),
+            steps: steps.all,
+            ..self.empty()
+        }
+        .judged()
+    }
+
+    /// Returns the reason why so many runs do not fit into shared memory.
+    fn lacks_memory(&self, runs: u32) -> Option<String> {
+        let needed = self.tested.shared_bytes * u64::from(runs);
+        let free = free_shared_memory().ok().flatten()?;
+        (needed > free).then(|| {
+            let (needed, free) = (needed as f64 * 1e-6, free as f64 * 1e-6);
+            format!("{needed:.0} MB of shared memory are needed and {free:.0} MB are free")
+        })
+    }
+
+    /// Measures so many pipelines at once at a rate: a step of this level.
+    fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, StressError> {
+        let duration = step_duration(self.options.duration, rate_hz);
+        let setups: Vec<_> = (0..pipelines)
+            .map(|number| Setup {
+                name: format!("{}-{number}", self.scenario),
+                ..Setup::undisturbed(self.scenario, rate_hz, duration)
+            })
+            .collect();
+        let measured: Vec<_> = thread::scope(|scope| {
+            let ticket = Arc::new(());
+            let start = |setup| {
+                let ticket = Arc::clone(&ticket);
+                scope.spawn(move || measure(self.tested, setup, ticket))
+            };
+            let running: Vec<_> = setups.iter().map(start).collect();
+            drop(ticket);
+            running.into_iter().map(|it| it.join()).collect()
+        });
+        let mut all = Vec::new();
+        for measured in measured {
+            let measured = measured.map_err(|_| StressError::Usage("a thread panicked".to_owned()));
+            match measured? {
+                Ok(measured) => all.push(measured),
+                // A machine that cannot even start so many does not carry them.
+                Err(error) if pipelines > 1 || rate_hz > RADAR_HZ => {
+                    return Ok(Step::not_started(level, error.to_string()));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let limits = self.step_limits();
+        let judged = all.into_iter().map(|measured| {
+            let problem = problem(&measured);
+            let figures = measured.figures;
+            (checks(&limits, &figures), problem, figures)
+        });
+        Ok(Step::of(level, judged.collect()))
+    }
+}
+
+/// Returns the reason why a run has failed, whatever its latency.
+fn problem(measured: &Measured) -> Option<String> {
+    if let Some(said) = &measured.died {
+        return Some(format!("the run has ended: {said}"));
+    }
+    if let Some(unseen) = measured.figures.latency.counts.omitted() {
+        return Some(unseen);
+    }
+    let mut faults = measured.figures.faults.iter();
+    let lost = faults.find(|fault| fault.recovery_ms.is_none());
+    let lost = lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage));
+    // A fault that could not be observed is no result about the pipeline.
+    let mut told = measured.figures.witness_faults.iter();
+    lost.or_else(|| match measured.omitted {
+        None => told.find_map(WitnessFault::problem),
+        Some(_) => None,
+    })
+}
+
+/// Compares the figures of a run with limits.
+fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
+    let latency = &figures.latency.sensor_to_pose;
+    let percentile = |percentile| latency.judged(percentile);
+    let degraded = figures.motions.degraded_percent();
+    let at_most = [
+        ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
+        ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
+        ("max_ms", latency.max_ms, limits.max_ms),
+        (
+            "drops_percent",
+            figures.drops_percent(),
+            limits.drops_percent,
+        ),
+        (
+            "cpu_percent",
+            Some(figures.cpu_percent()),
+            limits.cpu_percent,
+        ),
+        ("memory_mb", Some(figures.memory_mb()), limits.memory_mb),
+        (
+            "degraded_percent",
+            degraded,
+            limits.degraded_percent.filter(|_| degraded.is_some()),
+        ),
+    ];
+    // Without scans only the cost of the processes can be judged.
+    let has_scans = figures.latency.counts.due > 0;
+    let recovery = limits.recovery_ms.filter(|_| figures.had_faults());
+    let recovery =
+        recovery.map(|limit| Check::at_most("recovery_ms", figures.longest_recovery_ms(), limit));
+    at_most
+        .into_iter()
+        .filter(|(key, ..)| has_scans || ["cpu_percent", "memory_mb"].contains(key))
+        .filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
+        .chain(recovery)
+        .collect()
+}

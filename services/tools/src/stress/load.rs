@@ -1,0 +1,186 @@
+//! The loads of a machine, each in a helper of its own.
+
+use std::{
+    fs,
+    hint::black_box,
+    path::Path,
+    sync::mpsc::{self, Sender},
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan};
+use gyre_stage::{
+    StageError,
+    observer::{Next, ObservedRun},
+};
+use gyre_supervise::memory::Room;
+use serde::{Deserialize, Serialize};
+
+use crate::stress::{
+    StressError,
+    helper::{say_ready, say_result},
+};
+
+/// Memory that is always left, whatever the share: room for other programs that start meanwhile.
+const LEFT: u64 = 1 << 30;
+/// Bytes that are taken at once.
+const PIECE: usize = 32 << 20;
+const PAGE: usize = 4096;
+/// The time for allocating memory before the measurement. On a large machine all of it would take
+/// minutes.
+const TAKING: Duration = Duration::from_secs(20);
+/// Time between two polls for memory when there is no more to take.
+const PAUSE: Duration = Duration::from_millis(20);
+const CACHE_LINE: usize = 64;
+
+/// Memory that the helper `memory` has taken when the measurement begins.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Taken {
+    /// Memory that it has taken, MB.
+    pub taken_mb: f64,
+    /// Memory that was available before, MB.
+    pub available_mb: f64,
+}
+
+impl Taken {
+    /// Returns the reason why it is no load.
+    pub(crate) fn omitted(&self) -> Option<String> {
+        (self.taken_mb == 0.0).then(|| {
+            format!(
+                "no memory was taken: {:.0} MB are available, and {:.0} MB are always left",
+                self.available_mb,
+                LEFT as f64 * 1e-6
+            )
+        })
+    }
+}
+
+/// Computes without end.
+pub(super) fn spin() -> ! {
+    say_ready();
+    let mut number = 1_u64;
+    loop {
+        number = black_box(
+            number
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1),
+        );
+    }
+}
+
+/// Allocates memory up to this share of the available memory, then frees and allocates pieces of it
+/// without end.
+pub(super) fn churn(share: f64) -> Result<(), StressError> {
+    // If memory runs out all the same, this process is the one to end.
+    let _ = fs::write("/proc/self/oom_score_adj", "1000");
+    let least = || Room::now().least();
+    let available = least().ok_or_else(|| {
+        StressError::Usage("the memory that is available is not known".to_owned())
+    })?;
+    let most = (available as f64 * share.clamp(0.0, 0.95)) as u64;
+    let mut pieces: Vec<Vec<u8>> = Vec::new();
+    let has_room = || least().is_some_and(|left| left > LEFT + PIECE as u64);
+    let began = Instant::now();
+    while ((pieces.len() * PIECE) as u64) < most && has_room() && began.elapsed() < TAKING {
+        pieces.push(piece());
+    }
+    say_ready();
+    say_result(&Taken {
+        taken_mb: (pieces.len() * PIECE) as f64 * 1e-6,
+        available_mb: available as f64 * 1e-6,
+    })?;
+    loop {
+        for taken in &mut pieces {
+            *taken = Vec::new();
+            if has_room() {
+                *taken = piece();
+            }
+        }
+        if !has_room() {
+            // Others need it.
+            pieces.pop();
+            thread::sleep(PAUSE);
+        }
+        pieces.retain(|piece| !piece.is_empty());
+        if pieces.is_empty() {
+            thread::sleep(PAUSE);
+        }
+    }
+}
+
+/// A piece of memory, each page of it written.
+fn piece() -> Vec<u8> {
+    let mut piece = vec![0; PIECE];
+    piece.iter_mut().step_by(PAGE).for_each(|byte| *byte = 1);
+    black_box(piece)
+}
+
+/// Reads all topics of a run until it ends, a byte of each cache line.
+pub(super) fn observe(out: &Path) -> Result<(), StressError> {
+    let root = gyre_stage::run::root_of(&out.canonicalize().map_err(StressError::file(out))?);
+    let followers = [
+        follow::<Scan>,
+        follow::<Masked>,
+        follow::<Rotation>,
+        follow::<Motion>,
+        follow::<Refined>,
+        follow::<Pose>,
+    ];
+    let (attached, attachments) = mpsc::channel();
+    let threads = followers.map(|follow| {
+        let (root, attached) = (root.clone(), attached.clone());
+        thread::spawn(move || follow(&root, attached))
+    });
+    drop(attached);
+    // A thread that cannot attach reports this when it is joined.
+    if attachments.iter().count() == threads.len() {
+        say_ready();
+    }
+    for thread in threads {
+        match thread.join() {
+            Ok(ended) => ended?,
+            Err(_) => return Err(StressError::Usage("an observer panicked".to_owned())),
+        }
+    }
+    Ok(())
+}
+
+fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageError> {
+    let run = ObservedRun::at(root)?;
+    let mut observer = run.observe::<M>()?;
+    let _ = attached.send(());
+    drop(attached);
+    loop {
+        match observer.next(Duration::MAX)? {
+            Next::Message(message, _) => drop(black_box(touched(message.values()))),
+            Next::Idle => {}
+            Next::Ended => return Ok(()),
+        }
+    }
+}
+
+/// Reads a byte of each cache line.
+fn touched(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .step_by(CACHE_LINE)
+        .map(|byte| u64::from(*byte))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_load_that_has_taken_nothing_is_none() {
+        let taken = |taken_mb| Taken {
+            taken_mb,
+            available_mb: 900.0,
+        };
+        assert_eq!(taken(32.0).omitted(), None);
+        let reason = taken(0.0).omitted().unwrap_or_default();
+        assert!(reason.contains("900 MB are available"), "{reason}");
+    }
+}

@@ -1,0 +1,278 @@
+//! A run as a child process, from its start to its results.
+
+use std::{
+    fs::{self, File},
+    os::unix::process::ExitStatusExt,
+    path::{Path, PathBuf},
+    process::{Child, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{Pose, PoseHeader};
+use gyre_run::Scenario;
+use gyre_stage::{
+    StageError,
+    control::Control,
+    observer::{ObservedRun, Observer},
+    run::sweep,
+};
+use gyre_storage::create_folder;
+use gyre_supervise::last_line;
+use rustix::process::{Pid, Signal, kill_process};
+
+use super::{Setup, Summary, TICK, drain};
+use crate::stress::{
+    StressError,
+    helper::{self, Helper, Work},
+    load::Taken,
+    tested::TestedPipeline,
+};
+
+/// Poses before the measurement: buffers grow, and memory is touched for the first time.
+const WARM_UP: u64 = 8;
+/// Time for a run to make its first poses. It may load a model.
+const START_LIMIT: Duration = Duration::from_secs(300);
+/// Time for a run to write its results.
+const END_LIMIT: Duration = Duration::from_secs(120);
+/// Time between two polls of a run that starts or ends.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
+
+/// A run as a child process. It is ended when this is dropped.
+pub(super) struct Running<'a> {
+    setup: &'a Setup,
+    process: Child,
+    out: PathBuf,
+    log: PathBuf,
+    /// The latest time of its first poses.
+    deadline: Instant,
+}
+
+impl<'a> Running<'a> {
+    pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, StressError> {
+        let runs = tested.out.join("runs");
+        create_folder(&runs).map_err(|error| StressError::file(&runs)(error.source))?;
+        let (out, log) = (
+            runs.join(&setup.name),
+            runs.join(format!("{}.txt", setup.name)),
+        );
+        let output = File::create(&log).map_err(StressError::file(&log))?;
+        let errors = output.try_clone().map_err(StressError::file(&log))?;
+        // Removes the leftovers of an earlier killed run.
+        sweep();
+        let work = Work::Run(words(tested, setup, &out));
+        let mut command = helper::command(&tested.program, &work)?;
+        command.stdin(Stdio::null()).stdout(output).stderr(errors);
+        let process = command.spawn().map_err(|source| StressError::Start {
+            program: tested.program.display().to_string(),
+            source,
+        })?;
+        Ok(Self {
+            setup,
+            process,
+            out,
+            log,
+            deadline: Instant::now() + START_LIMIT,
+        })
+    }
+
+    /// Returns the process of its supervisor.
+    pub fn pid(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// Returns the folder of its results.
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
+    pub fn has_ended(&mut self) -> bool {
+        !matches!(self.process.try_wait(), Ok(None))
+    }
+
+    /// Returns the reason why it has ended, in its own words, which are complete when its process
+    /// has ended too.
+    pub fn last_words(&mut self) -> String {
+        self.await_end(Instant::now() + END_LIMIT);
+        match self.process.try_wait() {
+            Ok(None) => return "its stream has ended, and its process goes on".to_owned(),
+            Ok(Some(status)) if let Some(signal) = status.signal() => {
+                return format!("its supervisor was killed by signal {signal}");
+            }
+            _ => {}
+        }
+        let said = fs::read_to_string(&self.log).unwrap_or_default();
+        last_line(&said).unwrap_or("it said nothing").to_owned()
+    }
+
+    fn await_end(&mut self, deadline: Instant) {
+        while !self.has_ended() && Instant::now() < deadline {
+            thread::sleep(POLL_PERIOD);
+        }
+    }
+
+    /// Waits until the run can be observed.
+    pub fn attach(&mut self) -> Result<ObservedRun, StressError> {
+        // A supervisor of the same results may still be there, if an earlier run was killed.
+        while !self.is_supervised_by_its_process() {
+            self.require_life()?;
+            thread::sleep(POLL_PERIOD);
+        }
+        loop {
+            if let Ok(run) = ObservedRun::writing_to(&self.out) {
+                match run.observe::<Pose>().map(drop) {
+                    Ok(()) => return Ok(run),
+                    Err(StageError::NoPlace { observers: 0, .. }) => {
+                        return Err(StressError::NoPlace);
+                    }
+                    Err(error @ StageError::NoPlace { .. }) => return Err(error.into()),
+                    // Its topics are not there yet.
+                    Err(_) => {}
+                }
+            }
+            self.require_life()?;
+            thread::sleep(POLL_PERIOD);
+        }
+    }
+
+    fn is_supervised_by_its_process(&self) -> bool {
+        let status = Control::of(&self.out).and_then(|run| run.status());
+        status.is_ok_and(|status| status.pid == self.pid())
+    }
+
+    fn require_life(&mut self) -> Result<(), StressError> {
+        if self.has_ended() {
+            return Err(StressError::EndedEarly {
+                scenario: self.setup.name.clone(),
+                said: self.last_words(),
+            });
+        }
+        match Instant::now() < self.deadline {
+            true => Ok(()),
+            false => Err(StressError::NoPose {
+                scenario: self.setup.name.clone(),
+                limit_s: START_LIMIT.as_secs(),
+                log: self.log.clone(),
+            }),
+        }
+    }
+
+    /// Waits for the first poses, and returns the newest of them; where hardly a scan comes, for
+    /// one.
+    pub fn warm_up(&mut self, poses: &mut Observer<'_, Pose>) -> Result<PoseHeader, StressError> {
+        let enough = match self.setup.scenario {
+            Scenario::Idle => 1,
+            _ => WARM_UP,
+        };
+        let (mut count, mut newest) = (0, PoseHeader::default());
+        while count < enough {
+            let has_ended = drain(poses, TICK, &mut |pose| {
+                count += 1;
+                newest = *pose;
+            })?;
+            if has_ended {
+                // Its output is complete when its process has ended too.
+                self.await_end(self.deadline);
+            }
+            self.require_life()?;
+        }
+        Ok(newest)
+    }
+
+    /// Starts the helpers that load the machine; returns them with the memory that they have taken.
+    pub fn load(
+        &self,
+        tested: &TestedPipeline,
+    ) -> Result<(Vec<Helper>, Option<Taken>), StressError> {
+        let observers = (0..self.setup.observers).map(|_| Work::Observe(self.out.clone()));
+        let loads = self.setup.loads.iter().cloned().chain(observers);
+        let start = |work| Helper::start(&tested.program, work);
+        let mut helpers: Vec<_> = loads.map(start).collect::<Result<_, _>>()?;
+        let Some(share) = self.setup.memory_share else {
+            return Ok((helpers, None));
+        };
+        let mut memory = start(Work::Memory(share))?;
+        let taken = memory.read_result()?;
+        helpers.push(memory);
+        Ok((helpers, Some(taken)))
+    }
+
+    /// Ends the run and reads its summary.
+    pub fn end(mut self) -> Summary {
+        self.stop();
+        let summary = fs::read_to_string(self.out.join("summary.json"));
+        let summary = summary
+            .ok()
+            .and_then(|text| serde_json::from_str(&text).ok());
+        summary.unwrap_or_default()
+    }
+
+    fn stop(&mut self) {
+        if let Some(pid) = Pid::from_raw(self.process.id() as i32)
+            && !self.has_ended()
+        {
+            let _ = kill_process(pid, Signal::TERM);
+        }
+        self.await_end(Instant::now() + END_LIMIT);
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Running<'_> {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Returns the arguments of `gyre` for the run.
+fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
+    // Relative to the sensor's own pace.
+    let rate = tested.relative_rate(setup.rate_hz);
+    let configuration = tested.configuration.display().to_string();
+    let out = out.display().to_string();
+    let rate = rate.to_string();
+    let fixed = [
+        "run",
+        &configuration,
+        "--fresh",
+        "--out",
+        &out,
+        "--rate",
+        &rate,
+        "--set",
+        "run.mode=live",
+        "--set",
+        "source.repeat=true",
+    ];
+    let set = setup.set.iter().flat_map(|sentence| ["--set", sentence]);
+    fixed.into_iter().chain(set).map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::process::Command;
+
+    use super::*;
+
+    #[test]
+    fn the_last_words_of_a_run_that_is_ending_are_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("steady.txt");
+        let setup = Setup::undisturbed(Scenario::Steady, 4.0, Duration::from_secs(1));
+        let process = Command::new("sh")
+            .args(["-c", "echo not yet; sleep 0.3; echo the end"])
+            .stdout(File::create(&log).unwrap())
+            .spawn();
+        let mut run = Running {
+            setup: &setup,
+            process: process.unwrap(),
+            out: folder.path().to_owned(),
+            log,
+            deadline: Instant::now() + START_LIMIT,
+        };
+        assert_eq!(run.last_words(), "the end");
+        assert!(run.has_ended());
+    }
+}

@@ -1,0 +1,343 @@
+//! Poses in, distributions out.
+//!
+//! Every scan that was due is a sample. One that was dropped counts until the pose of the next one
+//! that was not: the vehicle had no newer pose before that. So neither a drop nor a source that
+//! stands still makes the distribution look better (coordinated omission).
+
+mod distribution;
+
+use std::ops::Range;
+
+use gyre_messages::{Item, PoseHeader, StageId};
+use gyre_run::latency::{Durations, LatencyMeter};
+use serde::Serialize;
+
+pub use distribution::Distribution;
+
+/// The largest number of dropped scans between two poses that are recorded one by one.
+const MAX_GAP: u64 = 1 << 20;
+
+/// Counts of scans within the time that is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Scans that were due.
+    pub due: u64,
+    /// Scans with a pose.
+    pub posed: u64,
+    /// Scans without a pose, including `never`.
+    pub dropped: u64,
+    /// Scans that no later pose has replaced when the measurement ended. They count as long as that
+    /// took.
+    pub never: u64,
+    /// Poses that this observer has missed: they are neither posed nor dropped.
+    pub unseen: u64,
+}
+
+impl Counts {
+    /// Returns the reason why the distributions are incomplete: poses were not seen.
+    pub fn omitted(&self) -> Option<String> {
+        (self.unseen > 0).then(|| {
+            format!(
+                "{} poses were not seen by the process that measures: the machine was too busy for it",
+                self.unseen
+            )
+        })
+    }
+}
+
+/// A scan on the timeline.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Sample {
+    /// The time when the scan was due, s since the measurement began.
+    pub due_s: f64,
+    /// Time from then to its pose, or to the pose that replaced it, ms.
+    pub latency_ms: f64,
+    /// True without a pose of its own.
+    pub dropped: bool,
+}
+
+/// The hop of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Hop {
+    pub stage: &'static str,
+    /// From the publication by the stage before to the reception; `None` of the first stage.
+    pub transport: Option<Distribution>,
+    /// From the reception to the start of the work.
+    pub wait: Distribution,
+    /// Duration of the work.
+    pub work: Distribution,
+}
+
+/// The latency of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunLatency {
+    /// Counts of scans.
+    pub counts: Counts,
+    /// From the time when a scan was due to its pose; a dropped scan counts until the pose that
+    /// replaced it.
+    pub sensor_to_pose: Distribution,
+    /// The same of the scans that have a pose alone.
+    pub posed: Distribution,
+    /// The figure of a closed loop: from the publication of a scan to its pose.
+    pub closed_loop: Distribution,
+    /// Stage by stage.
+    pub hops: Vec<Hop>,
+    /// The scans in the order of their due times; written as CSV.
+    #[serde(skip)]
+    pub timeline: Vec<Sample>,
+}
+
+/// Records poses whose scans were due within a time.
+#[derive(Debug)]
+pub struct Recorder {
+    /// `CLOCK_MONOTONIC`, ns.
+    window: Range<i64>,
+    /// Scans that become due at once.
+    burst: u64,
+    before: Option<Item>,
+    counts: Counts,
+    meter: LatencyMeter,
+    all: Durations,
+    posed: Durations,
+    closed_loop: Durations,
+    timeline: Vec<Sample>,
+}
+
+impl Recorder {
+    /// Records the scans that are due within `window`, `CLOCK_MONOTONIC`, ns. `burst` scans become
+    /// due at once.
+    pub fn new(window: Range<i64>, burst: u64) -> Self {
+        Self {
+            window,
+            burst: burst.max(1),
+            before: None,
+            counts: Counts::default(),
+            meter: LatencyMeter::default(),
+            all: Durations::default(),
+            posed: Durations::default(),
+            closed_loop: Durations::default(),
+            timeline: Vec::new(),
+        }
+    }
+
+    /// Adds the next pose; one that was added before is left out.
+    pub fn add(&mut self, pose: &PoseHeader) {
+        let item = &pose.item;
+        let posed_ns = item.hops[StageId::PoseIntegration as usize].published_ns;
+        if let Some(before) = self.before {
+            if item.seq <= before.seq {
+                return;
+            }
+            self.add_between(&before, item, posed_ns);
+        }
+        self.before = Some(*item);
+        if !self.window.contains(&item.due_ns) {
+            return;
+        }
+        self.counts.posed += 1;
+        self.sample(item.due_ns, posed_ns, false);
+        self.meter.add(pose);
+        self.posed.add(posed_ns - item.due_ns);
+        let published_ns = item.hops[StageId::RadarReplay as usize].published_ns;
+        self.closed_loop.add(posed_ns - published_ns);
+    }
+
+    /// Adds the scans between two poses: a pose was missed for each number that `seq` lacks, and
+    /// the rest was dropped.
+    fn add_between(&mut self, before: &Item, item: &Item, posed_ns: i64) {
+        let unseen = item.seq - before.seq - 1;
+        let between = item.published.saturating_sub(before.published + 1);
+        if self.window.contains(&item.due_ns) {
+            self.counts.unseen += unseen;
+        }
+        // Where poses were missed it is not known which of them were dropped.
+        let dropped = between.saturating_sub(unseen).min(MAX_GAP);
+        for number in (item.published - dropped)..item.published {
+            let due_ns = self.due_between(before, item, number);
+            if self.window.contains(&due_ns) {
+                self.counts.dropped += 1;
+                self.sample(due_ns, posed_ns, true);
+            }
+        }
+    }
+
+    /// Returns when a scan between two others was due: bursts are evenly spaced.
+    fn due_between(&self, before: &Item, item: &Item, number: u64) -> i64 {
+        let burst = |number: u64| (number / self.burst) as f64;
+        let (first, last) = (burst(before.published), burst(item.published));
+        let share = (burst(number) - first) / (last - first).max(1.0);
+        before.due_ns + ((item.due_ns - before.due_ns) as f64 * share) as i64
+    }
+
+    fn sample(&mut self, due_ns: i64, until_ns: i64, dropped: bool) {
+        self.counts.due += 1;
+        self.all.add(until_ns - due_ns);
+        self.timeline.push(Sample {
+            due_s: (due_ns - self.window.start) as f64 * 1e-9,
+            latency_ms: (until_ns - due_ns) as f64 * 1e-6,
+            dropped,
+        });
+    }
+
+    /// Returns whether a scan that was due in the time, one each `period_ns`, may still get its
+    /// pose.
+    pub fn owes(&self, period_ns: i64) -> bool {
+        let newest = self.before.map(|item| item.due_ns);
+        newest.is_some_and(|due_ns| due_ns.saturating_add(period_ns) < self.window.end)
+    }
+
+    /// Ends the recording at `now_ns`. Scans that were due, one each `period_ns`, and that no pose
+    /// has replaced count until now.
+    pub fn finish(mut self, period_ns: i64, now_ns: i64) -> RunLatency {
+        let period_ns = period_ns.max(1);
+        let after = self
+            .before
+            .map_or(self.window.start - period_ns, |item| item.due_ns);
+        let mut due_ns = after.saturating_add(period_ns);
+        while due_ns < self.window.end.min(now_ns) {
+            if due_ns >= self.window.start {
+                self.counts.dropped += 1;
+                self.counts.never += 1;
+                self.sample(due_ns, now_ns, true);
+            }
+            due_ns += period_ns;
+        }
+        let hop = |(stage, meter): (StageId, &gyre_run::latency::HopMeter)| Hop {
+            stage: stage.name(),
+            transport: (meter.transport.count() > 0).then(|| Distribution::of(&meter.transport)),
+            wait: Distribution::of(&meter.wait),
+            work: Distribution::of(&meter.work),
+        };
+        RunLatency {
+            counts: self.counts,
+            sensor_to_pose: Distribution::of(&self.all),
+            posed: Distribution::of(&self.posed),
+            closed_loop: Distribution::of(&self.closed_loop),
+            hops: self.meter.stages().map(hop).collect(),
+            timeline: self.timeline,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose
+    /// 10 ms later.
+    fn pose(seq: u64, published: u64, due_ms: i64, late_ms: i64) -> PoseHeader {
+        let item = Item {
+            seq,
+            published,
+            due_ns: due_ms * MS,
+            ..Item::default()
+        };
+        let mut pose = PoseHeader {
+            item,
+            ..PoseHeader::default()
+        };
+        let published_ns = (due_ms + late_ms) * MS;
+        pose.item.hop_mut(StageId::RadarReplay).published_ns = published_ns;
+        let sink = pose.item.hop_mut(StageId::PoseIntegration);
+        sink.started_ns = published_ns;
+        sink.finished_ns = published_ns + 9 * MS;
+        sink.published_ns = published_ns + 10 * MS;
+        pose
+    }
+
+    fn recorded(poses: &[PoseHeader], burst: u64, end_ms: i64) -> RunLatency {
+        let mut recorder = Recorder::new(0..end_ms * MS, burst);
+        poses.iter().for_each(|pose| recorder.add(pose));
+        recorder.finish(250 * MS, end_ms * MS)
+    }
+
+    fn near(a: Option<f64>, b: f64) -> bool {
+        a.is_some_and(|a| (a - b).abs() <= 2e-3 * b)
+    }
+
+    #[test]
+    fn a_source_that_stood_still_shows_although_its_service_time_does_not() {
+        // The source stops for a second: scan 2 is published late, scans 3 to 5 are dropped.
+        let poses = [
+            pose(0, 0, 0, 0),
+            pose(1, 1, 250, 0),
+            pose(2, 2, 500, 1000),
+            pose(3, 6, 1500, 10),
+        ];
+        let recorded = recorded(&poses, 1, 1600);
+        assert!(near(recorded.sensor_to_pose.max_ms, 1010.0), "{recorded:?}");
+        assert!(near(recorded.closed_loop.max_ms, 10.0));
+        assert_eq!((recorded.counts.due, recorded.counts.dropped), (7, 3));
+    }
+
+    #[test]
+    fn a_dropped_scan_counts_until_the_pose_that_replaces_it() {
+        let poses = [pose(0, 0, 0, 0), pose(1, 4, 1000, 0)];
+        let recorded = recorded(&poses, 1, 1100);
+        let of: Vec<_> = recorded
+            .timeline
+            .iter()
+            .map(|it| (it.due_s, it.latency_ms))
+            .collect();
+        assert_eq!(
+            of,
+            [
+                (0.0, 10.0),
+                (0.25, 760.0),
+                (0.5, 510.0),
+                (0.75, 260.0),
+                (1.0, 10.0)
+            ]
+        );
+        assert!(near(recorded.sensor_to_pose.max_ms, 760.0));
+        assert!(near(recorded.posed.max_ms, 10.0));
+        assert_eq!(recorded.posed.samples, 2);
+    }
+
+    #[test]
+    fn scans_of_a_burst_are_due_at_once() {
+        // Two bursts of three; of the second one the last alone has a pose.
+        let poses = [pose(0, 2, 0, 0), pose(1, 5, 750, 0)];
+        let recorded = recorded(&poses, 3, 800);
+        assert_eq!(recorded.counts.dropped, 2);
+        assert!(
+            recorded.timeline[1..]
+                .iter()
+                .all(|it| it.latency_ms == 10.0)
+        );
+    }
+
+    #[test]
+    fn scans_without_any_later_pose_count_until_the_end() {
+        let recorded = recorded(&[pose(0, 0, 0, 0)], 1, 1000);
+        assert_eq!((recorded.counts.due, recorded.counts.never), (4, 3));
+        assert!(near(recorded.sensor_to_pose.max_ms, 750.0));
+    }
+
+    #[test]
+    fn poses_outside_the_time_or_sent_again_do_not_count() {
+        let poses = [
+            pose(0, 0, -250, 0),
+            pose(1, 1, 0, 0),
+            pose(1, 1, 0, 0),
+            pose(2, 2, 250, 0),
+        ];
+        let recorded = recorded(&poses, 1, 200);
+        assert_eq!((recorded.counts.due, recorded.counts.posed), (1, 1));
+    }
+
+    #[test]
+    fn a_pose_that_was_missed_is_no_dropped_scan() {
+        let recorded = recorded(&[pose(0, 0, 0, 0), pose(3, 4, 1000, 0)], 1, 1100);
+        let Counts {
+            due,
+            posed,
+            dropped,
+            unseen,
+            ..
+        } = recorded.counts;
+        assert_eq!((due, posed, dropped, unseen), (3, 2, 1, 2));
+    }
+}

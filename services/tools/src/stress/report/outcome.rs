@@ -1,0 +1,208 @@
+//! The outcome of a scenario: figures and the verdict.
+
+use std::{fmt::Write, time::Duration};
+
+use gyre_run::{Judged, Scenario};
+use serde::Serialize;
+
+use super::{Figures, Step};
+use crate::stress::check::Check;
+
+/// The verdict on a scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// All limits are kept, and the run has recovered from all faults.
+    Passed,
+    /// A limit is not kept, or the run has ended, or not recovered.
+    Failed,
+    /// There is no limit for it.
+    NotJudged,
+    /// It could not be carried out, which is no verdict on the pipeline.
+    NotCarriedOut,
+}
+
+impl Verdict {
+    /// Returns it in a word or two.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "FAILED",
+            Self::NotJudged => "not judged",
+            Self::NotCarriedOut => "NOT CARRIED OUT",
+        }
+    }
+}
+
+/// The outcome of a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScenarioOutcome {
+    pub scenario: Scenario,
+    /// A line that describes it.
+    pub line: &'static str,
+    pub verdict: Verdict,
+    /// The figures that have limits.
+    pub checks: Vec<Check>,
+    /// A failure that does not depend on the latency.
+    pub problem: Option<String>,
+    /// Scans a second.
+    pub rate_hz: f64,
+    /// Time that was measured, s.
+    pub duration_s: f64,
+    /// The figures of its run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub figures: Option<Figures>,
+    /// The largest load that passed: scans a second, or radars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best: Option<f64>,
+    /// The smallest load above it that failed, twice; `None`: none was tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed: Option<f64>,
+    /// The steps of a search.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<Step>,
+}
+
+impl ScenarioOutcome {
+    /// An outcome without any figure.
+    pub fn new(scenario: Scenario, duration: Duration) -> Self {
+        Self {
+            scenario,
+            line: scenario.line(),
+            verdict: Verdict::NotJudged,
+            checks: Vec::new(),
+            problem: None,
+            rate_hz: scenario.rate_hz(),
+            duration_s: duration.as_secs_f64(),
+            figures: None,
+            best: None,
+            failed: None,
+            steps: Vec::new(),
+        }
+    }
+
+    /// The same with its verdict.
+    #[must_use]
+    pub fn judged(mut self) -> Self {
+        let had_faults = self.figures.as_ref().is_some_and(Figures::had_faults);
+        let by_recovery = [Judged::ByRecovery, Judged::ButDegraded];
+        let has_recovered = by_recovery.contains(&self.scenario.judged()) && had_faults;
+        self.verdict = match (&self.problem, self.checks.as_slice()) {
+            (Some(_), _) => Verdict::Failed,
+            (None, checks) if checks.iter().any(|check| !check.passed) => Verdict::Failed,
+            (None, []) if !has_recovered => Verdict::NotJudged,
+            (None, _) => Verdict::Passed,
+        };
+        self
+    }
+
+    /// The same, not carried out, if a load or a fault was omitted. A failure stands all the same.
+    #[must_use]
+    pub fn unless(mut self, omitted: Option<String>) -> Self {
+        if self.verdict != Verdict::Failed && omitted.is_some() {
+            self.verdict = Verdict::NotCarriedOut;
+            self.problem = omitted;
+        }
+        self
+    }
+
+    /// Returns the verdict with its reasons.
+    pub fn sentence(&self) -> String {
+        let mut sentence = format!("{}: {}", self.scenario, self.verdict.name());
+        let failed = self.checks.iter().filter(|check| !check.passed);
+        let reasons = self
+            .problem
+            .iter()
+            .cloned()
+            .chain(failed.map(Check::sentence));
+        for reason in reasons {
+            let _ = write!(sentence, "; {reason}");
+        }
+        if let Some(figures) = &self.figures {
+            let _ = write!(sentence, " ({})", figures.sentence());
+        }
+        match (self.best, self.failed) {
+            (Some(best), Some(failed)) => {
+                let _ = write!(sentence, " ({best:.1}; {failed:.1} failed twice)");
+            }
+            (Some(best), None) => {
+                let _ = write!(sentence, " ({best:.1})");
+            }
+            (None, _) => {}
+        }
+        sentence
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stress::{
+        fault::{Fault, FaultKind},
+        report::Report,
+    };
+
+    fn outcome(scenario: Scenario) -> ScenarioOutcome {
+        ScenarioOutcome::new(scenario, Duration::from_secs(1))
+    }
+
+    fn check(passed: bool) -> Check {
+        Check {
+            key: "p99_ms",
+            measured: Some(300.0),
+            limit: 250.0,
+            passed,
+        }
+    }
+
+    #[test]
+    fn a_scenario_fails_by_one_limit_or_by_a_problem() {
+        let mut steady = outcome(Scenario::Steady);
+        assert_eq!(steady.clone().judged().verdict, Verdict::NotJudged);
+        steady.checks = vec![check(true)];
+        assert_eq!(steady.clone().judged().verdict, Verdict::Passed);
+        steady.checks.push(check(false));
+        let failed = steady.judged();
+        assert_eq!(failed.verdict, Verdict::Failed);
+        assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
+        assert!(Report::of(vec![failed]).has(Verdict::Failed));
+    }
+
+    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> ScenarioOutcome {
+        let fault = |recovery_ms: &Option<f64>| Fault {
+            kind: FaultKind::Kill,
+            stage: "masking",
+            at_s: 1.5,
+            recovery_ms: *recovery_ms,
+        };
+        ScenarioOutcome {
+            figures: Some(Figures {
+                faults: faults.iter().map(fault).collect(),
+                ..Figures::default()
+            }),
+            ..outcome(scenario)
+        }
+    }
+
+    #[test]
+    fn a_fault_without_limits_passes_by_recovery_alone() {
+        let mut kills = with_faults(Scenario::Kills, &[Some(40.0)]);
+        assert_eq!(kills.clone().judged().verdict, Verdict::Passed);
+        kills.problem = Some("no pose has followed the fault of masking".to_owned());
+        assert_eq!(kills.judged().verdict, Verdict::Failed);
+    }
+
+    #[test]
+    fn without_any_fault_there_is_no_recovery_to_pass_by() {
+        let slow = with_faults(Scenario::SlowStage, &[]);
+        assert_eq!(slow.judged().verdict, Verdict::NotJudged);
+        let omitted = Some("nothing was done".to_owned());
+        let mut kills = with_faults(Scenario::Kills, &[]);
+        kills.checks = vec![check(true)];
+        let not_done = kills.clone().judged().unless(omitted.clone());
+        assert_eq!(not_done.verdict, Verdict::NotCarriedOut);
+        assert!(not_done.sentence().contains("nothing was done"));
+        kills.problem = Some("the run has ended".to_owned());
+        assert_eq!(kills.judged().unless(omitted).verdict, Verdict::Failed);
+    }
+}

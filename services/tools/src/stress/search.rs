@@ -1,0 +1,171 @@
+//! The largest load that passes: doubled until one fails, then bisected.
+
+use std::time::Duration;
+
+use crate::stress::{StressError, report::Step};
+
+/// Share of a scenario's time that a step of a search takes.
+const STEP: u32 = 6;
+const SHORTEST_STEP: Duration = Duration::from_secs(5);
+/// Scans of a step, whatever its rate: enough for a p99 in each, so that slow and fast steps are
+/// judged by the same figure.
+const STEP_SCANS: f64 = 110.0;
+/// Times that a level of a search may be tried. One hiccup of the machine does not decide.
+const TRIES: usize = 2;
+
+/// The result of a search.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// The largest level that passed; `None` if the first one failed.
+    pub best: Option<u32>,
+    /// The smallest level above it that failed; `None` if the last one that may be tried passed.
+    pub failed: Option<u32>,
+}
+
+/// Returns the largest level from `first` on that passes, up to `most`. `grow` returns the level to
+/// try after a level that has passed.
+pub fn largest<E>(
+    first: u32,
+    most: u32,
+    grow: impl Fn(u32) -> u32,
+    mut passes: impl FnMut(u32) -> Result<bool, E>,
+) -> Result<Found, E> {
+    let (mut low, mut high) = (None, first);
+    while passes(high)? {
+        low = Some(high);
+        let next = grow(high).min(most);
+        if next <= high {
+            return Ok(Found {
+                best: low,
+                failed: None,
+            });
+        }
+        high = next;
+    }
+    while let Some(best) = low.filter(|low| high - low > 1) {
+        let middle = best + (high - best) / 2;
+        match passes(middle)? {
+            true => low = Some(middle),
+            false => high = middle,
+        }
+    }
+    Ok(Found {
+        best: low,
+        failed: Some(high),
+    })
+}
+
+/// The steps of a search.
+pub struct Steps<'a> {
+    unit: &'static str,
+    note: &'a mut dyn FnMut(&str),
+    /// All that were tried.
+    pub all: Vec<Step>,
+}
+
+impl<'a> Steps<'a> {
+    /// Returns no steps; `note` receives each, whose level is a number of these units.
+    pub fn new(unit: &'static str, note: &'a mut dyn FnMut(&str)) -> Self {
+        Self {
+            unit,
+            note,
+            all: Vec::new(),
+        }
+    }
+
+    /// Returns whether a level passes, at the second try at the latest.
+    pub fn passes(
+        &mut self,
+        mut step: impl FnMut() -> Result<Step, StressError>,
+    ) -> Result<bool, StressError> {
+        for _ in 0..TRIES {
+            let step = step()?;
+            (self.note)(&step.sentence(self.unit));
+            let passed = step.passed;
+            self.all.push(step);
+            if passed {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Returns the time for which a step of a search is measured, in a scenario of this duration.
+pub fn step_duration(scenario: Duration, rate_hz: f64) -> Duration {
+    let share = (scenario / STEP).max(SHORTEST_STEP).min(scenario);
+    share.max(Duration::from_secs_f64(STEP_SCANS / rate_hz))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The result for a limit, and the levels that were tried.
+    fn found(limit: u32, most: u32) -> (Found, Vec<u32>) {
+        let mut tried = Vec::new();
+        let passes = |level| {
+            tried.push(level);
+            Ok::<_, ()>(level <= limit)
+        };
+        let found = largest(1, most, |level| level * 2, passes);
+        (found.unwrap_or_default(), tried)
+    }
+
+    fn between(best: Option<u32>, failed: Option<u32>) -> Found {
+        Found { best, failed }
+    }
+
+    #[test]
+    fn the_largest_level_that_passes_is_found_and_the_next_one_has_failed() {
+        for limit in 1..40 {
+            let expected = between(Some(limit), Some(limit + 1));
+            assert_eq!(found(limit, 1000).0, expected);
+        }
+        assert_eq!(found(5, 1000).1, [1, 2, 4, 8, 6, 5]);
+    }
+
+    #[test]
+    fn nothing_is_tried_above_the_most_and_a_first_one_that_fails_is_the_last() {
+        assert_eq!(found(100, 6), (between(Some(6), None), vec![1, 2, 4, 6]));
+        assert_eq!(found(0, 6), (between(None, Some(1)), vec![1]));
+    }
+
+    fn step(level: f64, passed: bool) -> Step {
+        Step {
+            passed,
+            ..Step::not_started(level, "p99_ms 300.0, limit 250".to_owned())
+        }
+    }
+
+    #[test]
+    fn each_step_has_enough_scans_for_a_p99_whatever_its_rate() {
+        for rate_hz in [4.0, 5.7, 10.0, 40.0, 1000.0] {
+            for scenario_s in [2, 10, 60, 600] {
+                let scenario = Duration::from_secs(scenario_s);
+                let step_s = step_duration(scenario, rate_hz).as_secs_f64();
+                assert!(step_s * rate_hz > 100.0, "{step_s} s at {rate_hz} Hz");
+            }
+        }
+        let long = Duration::from_secs(600);
+        assert_eq!(step_duration(long, 100.0), Duration::from_secs(100));
+    }
+
+    #[test]
+    fn a_level_that_fails_once_is_tried_again_and_one_that_fails_twice_has_failed() {
+        let mut noted = Vec::new();
+        let mut note = |line: &str| noted.push(line.to_owned());
+        let mut steps = Steps::new("scans/s", &mut note);
+        let mut hiccups = [false, true].into_iter();
+        let passes = steps.passes(|| Ok(step(4.0, hiccups.next().unwrap_or_default())));
+        assert!(passes.is_ok_and(|passes| passes));
+        let passes = steps.passes(|| Ok(step(8.0, false)));
+        assert!(passes.is_ok_and(|passes| !passes));
+        let tried: Vec<_> = steps.all.iter().map(|it| (it.level, it.passed)).collect();
+        assert_eq!(
+            tried,
+            [(4.0, false), (4.0, true), (8.0, false), (8.0, false)]
+        );
+        assert_eq!(noted.len(), 4);
+    }
+}

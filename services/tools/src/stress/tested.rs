@@ -1,0 +1,51 @@
+//! The pipeline that is tested.
+
+use std::{ops::Range, path::PathBuf, time::Duration};
+
+use gyre_messages::StageId;
+use gyre_run::Budget;
+
+/// The pipeline that is tested.
+#[derive(Clone, Debug)]
+pub struct TestedPipeline {
+    /// The program `gyre`.
+    pub program: PathBuf,
+    /// The resolved configuration, whose source is a recording.
+    pub configuration: PathBuf,
+    /// The folder of the report.
+    pub out: PathBuf,
+    /// Time between two scans of the recording.
+    pub period: Duration,
+    /// The scans of a turn of the recording, by their index in it.
+    pub turn: Range<usize>,
+    /// The stamp of the first of them, ns since 1970, if it is known before they are read.
+    pub first_ns: Option<i64>,
+    /// Gyro and wheels.
+    pub others: Others,
+    /// The stages of the run.
+    pub stages: Vec<StageId>,
+    pub budget: Budget,
+    /// Shared memory of a run, bytes.
+    pub shared_bytes: u64,
+}
+
+impl TestedPipeline {
+    /// Returns the duration of a turn of the recording, s.
+    pub fn turn_s(&self) -> f64 {
+        self.turn.len() as f64 * self.period.as_secs_f64()
+    }
+
+    /// Returns the seconds of the recording that are played in a second at this rate.
+    pub fn relative_rate(&self, rate_hz: f64) -> f64 {
+        (rate_hz * self.period.as_secs_f64()).clamp(0.001, 1000.0)
+    }
+}
+
+/// The sensors beside the radar that the run uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Others {
+    pub gyro: bool,
+    pub wheels: bool,
+    /// True if they are weighed against the radar: there is a refinement.
+    pub are_weighed: bool,
+}

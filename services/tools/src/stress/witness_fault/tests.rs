@@ -1,0 +1,163 @@
+#![allow(clippy::unwrap_used)]
+
+use std::time::Duration;
+
+use gyre_messages::{gyro, outcome};
+use gyre_run::Budget;
+
+use super::*;
+
+const PERIOD_NS: i64 = 250_000_000;
+const BEGAN_NS: i64 = 7_000_000_000;
+
+fn others() -> Others {
+    Others {
+        gyro: true,
+        wheels: true,
+        are_weighed: true,
+    }
+}
+
+/// The pose of a scan, 20 ms after it was due, with this outcome of its motion.
+fn pose(scan: u64, outcome: u32, [gyro, wheels]: [u64; 2]) -> PoseHeader {
+    let mut pose = PoseHeader::default();
+    (pose.item.seq, pose.item.scan) = (scan, scan);
+    pose.item.stamp_ns = scan as i64 * PERIOD_NS;
+    pose.item.due_ns = BEGAN_NS + scan as i64 * PERIOD_NS + PERIOD_NS / 2;
+    let hop = pose.item.hop_mut(StageId::PoseIntegration);
+    hop.published_ns = BEGAN_NS + scan as i64 * PERIOD_NS + PERIOD_NS / 2 + 20_000_000;
+    pose.motion.x_m = 2.5;
+    let record = &mut pose.motion.refinement;
+    (record.outcome, record.gyro, record.wheels) = (outcome, gyro, wheels);
+    pose
+}
+
+const NORMAL: (u32, [u64; 2]) = (outcome::REFINED, [gyro::USED, wheels::USED]);
+
+/// The faults of a scenario after a drive. The scans from one number up to another (excluded)
+/// report `meanwhile`.
+fn told(
+    scenario: Scenario,
+    spans: &[(u64, u64)],
+    meanwhile: (u32, [u64; 2]),
+) -> (Option<String>, Vec<WitnessFault>) {
+    let clock = PlayedClock {
+        first_ns: 0,
+        period_ns: PERIOD_NS,
+        rate: 1.0,
+        end: 200,
+    };
+    let mut told = WitnessFaults::new(faults(scenario), others(), clock, BEGAN_NS);
+    for scan in 8..200 {
+        let is_spoilt = spans
+            .iter()
+            .any(|(from, end)| (*from..*end).contains(&scan));
+        let (outcome, by) = if is_spoilt { meanwhile } else { NORMAL };
+        told.pose(&pose(scan, outcome, by));
+    }
+    // The vehicle jumps where the recording starts again: nothing there counts.
+    told.pose(&pose(200, outcome::PREDICTED, [0, 0]));
+    (told.omitted(), told.finish())
+}
+
+#[test]
+fn a_gyro_that_is_out_is_noticed_and_the_recovery_counts_from_its_end() {
+    // Absent from 4 s to 7 s: scans 16 to 28, the last half covered, and one more.
+    let meanwhile = (outcome::REFINED, [gyro::NONE, wheels::USED]);
+    let (omitted, faults) = told(Scenario::GyroOut, &[(16, 30)], meanwhile);
+    assert_eq!((omitted, faults.len()), (None, 1));
+    let fault = &faults[0];
+    assert_eq!((fault.motions, fault.noticed), (13, 13));
+    // 4 s after the stamp of scan 0, in the middle of its sweep.
+    assert!((fault.at_s - 4.0).abs() < 1e-6, "{fault:?}");
+    // Scan 30 is stamped 0.5 s after the end, is due half a period later, and its pose 20 ms.
+    assert!((fault.recovery_ms.unwrap() - 645.0).abs() < 1e-6);
+    assert_eq!(fault.problem(), None);
+}
+
+#[test]
+fn a_fault_that_nothing_notices_or_that_does_not_end_is_a_problem() {
+    for scenario in [
+        Scenario::GyroOut,
+        Scenario::WheelsSlip,
+        Scenario::ClockJump,
+        Scenario::RadarBlind,
+    ] {
+        let (_, unseen) = told(scenario, &[], NORMAL);
+        let said = unseen[0].problem().unwrap();
+        assert!(said.starts_with("nothing has noticed the fault"), "{said}");
+        let lost = (outcome::PREDICTED, [gyro::NONE, wheels::SLIP]);
+        let (_, endless) = told(scenario, &[(16, 200)], lost);
+        let said = endless[0].problem().unwrap();
+        assert!(said.ends_with("was as before it"), "{said}");
+    }
+    // One of both is not enough where both clocks jump.
+    let by_wheels = (outcome::REFINED, [gyro::NONE, wheels::USED]);
+    let (_, half) = told(Scenario::ClockJump, &[(16, 33)], by_wheels);
+    assert!(half[0].problem().unwrap().starts_with("nothing"));
+}
+
+#[test]
+fn a_radar_that_is_blind_three_times_recovers_before_the_next_time() {
+    let faults = faults(Scenario::RadarBlind);
+    let times: Vec<_> = faults.iter().map(|it| [it.from_s, it.ends_s()]).collect();
+    assert_eq!(times, [[4.0, 6.0], [10.0, 15.0], [19.0, 29.0]]);
+    assert_eq!(needed_s(&faults), 33.0);
+    let blind = (outcome::PREDICTED, [gyro::USED, wheels::USED]);
+    // The second time lasts until the third begins.
+    let spans = [(16, 25), (40, 76), (76, 117)];
+    let (_, told) = told(Scenario::RadarBlind, &spans, blind);
+    let problems: Vec<_> = told.iter().map(|it| it.problem().is_some()).collect();
+    assert_eq!(problems, [false, true, false]);
+    let dead = told[0].counts.by_basis[Basis::DeadReckoning as usize];
+    assert_eq!((told[0].motions, dead), (9, 9));
+}
+
+#[test]
+fn without_a_normal_motion_before_a_fault_it_says_nothing() {
+    let refused = (outcome::REFINED, [gyro::REFUSED, wheels::USED]);
+    let (omitted, _) = told(Scenario::GyroOut, &[(0, 16)], refused);
+    assert!(omitted.unwrap().contains("no motion before the fault"));
+    let clock = PlayedClock {
+        first_ns: 0,
+        period_ns: PERIOD_NS,
+        rate: 1.0,
+        end: 200,
+    };
+    let late = WitnessFaults::new(faults(Scenario::GyroOut), others(), clock, BEGAN_NS);
+    assert!(late.omitted().unwrap().contains("stop other programs"));
+}
+
+#[test]
+fn what_a_scenario_lacks_is_named_with_its_remedy() {
+    let mut tested = TestedPipeline {
+        program: "gyre".into(),
+        configuration: "config.toml".into(),
+        out: "out".into(),
+        period: Duration::from_millis(250),
+        turn: 0..240,
+        first_ns: Some(0),
+        others: others(),
+        stages: Vec::new(),
+        budget: Budget::default(),
+        shared_bytes: 0,
+    };
+    let lacks_in = |tested: &TestedPipeline, scenario| lacks(tested, scenario).unwrap_or_default();
+    for scenario in Scenario::ALL {
+        assert_eq!(lacks_in(&tested, scenario), "");
+    }
+    tested.turn = 0..60;
+    assert_eq!(lacks_in(&tested, Scenario::GyroOut), "");
+    let short = lacks_in(&tested, Scenario::RadarBlind);
+    assert!(
+        short.contains("33 s") && short.contains("lasts 15 s"),
+        "{short}"
+    );
+    tested.others.wheels = false;
+    let lacking = lacks_in(&tested, Scenario::WheelsSlip);
+    assert!(lacking.contains("wheels.kind=auto"), "{lacking}");
+    tested.others.gyro = false;
+    let lacking = lacks_in(&tested, Scenario::ClockJump);
+    assert!(lacking.contains("simulation.gyro.profile"), "{lacking}");
+    assert_eq!(lacks_in(&tested, Scenario::Kills), "");
+}

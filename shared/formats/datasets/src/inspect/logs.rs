@@ -1,0 +1,349 @@
+//! The logs of gyro, wheels and GNSS: their content, rates, spans and faults.
+
+use std::path::Path;
+
+use gyre_radar::median;
+use gyre_samples::{Sample, SampleKind};
+use serde_json::{Value, json};
+
+use super::{InspectedLogs, Report, timing::Timing};
+use crate::{Dataset, GnssLog, GyroLog, LogError, WheelLog};
+
+/// The duration of the quietest time of the gyro, s.
+const QUIET_S: f64 = 5.0;
+/// Share of the samples that such a time has at least.
+const QUIET_SHARE: f64 = 0.9;
+
+/// Examines the logs beside the scans, and in a bag the fixes of GNSS.
+pub(super) fn examine(
+    report: &mut Report,
+    dataset: &mut dyn Dataset,
+    logs: &InspectedLogs,
+    timing: Option<&Timing>,
+) {
+    for section in ["gyro", "wheels", "gnss"] {
+        report.figure(section, Value::Null);
+    }
+    gyro(report, timing);
+    wheels(report, logs.m_per_tick, timing);
+    gnss(report, dataset, logs.gnss_topic.as_deref(), timing);
+}
+
+fn gyro(report: &mut Report, timing: Option<&Timing>) {
+    let (file, log) = match GyroLog::find(&report.root) {
+        Ok(file) => {
+            let log = GyroLog::read(&file).map_err(|error| error.to_string());
+            (file, log)
+        }
+        Err(LogError::InTruth { path }) => {
+            let why =
+                "the ground truth was computed of it: name it in gyro.file to use it all the same";
+            (path, Err(why.to_owned()))
+        }
+        Err(_) => return,
+    };
+    let name = report.name_of(&file);
+    let log = match log {
+        Ok(log) => log,
+        Err(error) => return unusable(report, ["gyro", "a gyro", &name], &file, error),
+    };
+    let times = Times::of(&stamps(&log.samples), timing);
+    let quiet = quiet(&log.samples, times.period_s);
+    times.lines(report, "gyro", &format!("{name}: "), "samples");
+    if let Some(quiet) = &quiet {
+        let [mean, sigma] = [quiet.mean_degps, quiet.sigma_degps]
+            .map(|[x, y, z]| format!("{x:.3}, {y:.3}, {z:.3}"));
+        let after_s = quiet.after_s;
+        report.line(
+            "gyro quietest",
+            format!(
+                "{mean} deg/s about x, y, z, deviation {sigma}, in the 5 s from {after_s:.1} s on: bias and noise, if it stood"
+            ),
+        );
+    }
+    for sentence in log.faults.sentences(SampleKind::Gyro) {
+        report.find(format!("Gyro: {sentence}"));
+    }
+    let up = log.up_by_gravity();
+    if let Some(up) = up {
+        let axis = up.name();
+        report.find(format!("Gyro: by gravity its axis {axis} points up."));
+    }
+    let lies = times.lies(&file);
+    report.find(format!(
+        "The log of a gyro, {lies} beside the scans: `gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\" uses it."
+    ));
+    let quiet = quiet.map(|quiet| {
+        json!({
+            "after_s": quiet.after_s,
+            "mean_degps": quiet.mean_degps,
+            "sigma_degps": quiet.sigma_degps,
+        })
+    });
+    let more = json!({"quiet": quiet, "up_by_gravity": up, "faults": log.faults});
+    report.figure("gyro", times.figures(&file, more));
+}
+
+fn wheels(report: &mut Report, m_per_tick: Option<f64>, timing: Option<&Timing>) {
+    let Ok(file) = WheelLog::find(&report.root) else {
+        return;
+    };
+    let name = report.name_of(&file);
+    let log = match WheelLog::read(&file, m_per_tick) {
+        Ok(log) => log,
+        Err(error) => {
+            let words = ["wheels", "the wheels", &name];
+            return unusable(report, words, &file, error.to_string());
+        }
+    };
+    let times = Times::of(&stamps(&log.samples), timing);
+    let speeds = log.samples.iter().map(|sample| sample.values[0].abs());
+    let fastest_mps = speeds.fold(0.0, f64::max);
+    let steps = log.samples.windows(2).map(|pair| {
+        0.5 * (pair[0].values[0] + pair[1].values[0]) * apart_s(pair[1].stamp_ns, pair[0].stamp_ns)
+    });
+    let path_m: f64 = steps.map(f64::abs).sum();
+    let what = format!("{name}: {path_m:.0} m at up to {fastest_mps:.1} m/s, ");
+    times.lines(report, "wheels", &what, "samples");
+    for sentence in log.faults.sentences(SampleKind::Wheels) {
+        report.find(format!("Wheels: {sentence}"));
+    }
+    let lies = times.lies(&file);
+    report.find(format!(
+        "The log of the wheels, {lies} beside the scans: `gyre calibrate` finds how late its clock is, and wheels.kind = \"auto\" uses it."
+    ));
+    let more = json!({"fastest_mps": fastest_mps, "path_m": path_m, "faults": log.faults});
+    report.figure("wheels", times.figures(&file, more));
+}
+
+fn gnss(
+    report: &mut Report,
+    dataset: &mut dyn Dataset,
+    topic: Option<&str>,
+    timing: Option<&Timing>,
+) {
+    let root = report.root.clone();
+    let (file, log) = match dataset.fixes(topic) {
+        Ok(None) => match GnssLog::find(&root) {
+            Ok(file) => {
+                let log = GnssLog::read(&file).map_err(|error| error.to_string());
+                (file, log)
+            }
+            Err(_) => return,
+        },
+        Ok(Some(fixes)) => {
+            let log = GnssLog::of(fixes, &root).map_err(|error| error.to_string());
+            (root, log)
+        }
+        Err(error) => (root, Err(error.to_string())),
+    };
+    let log = match log {
+        Ok(log) => log,
+        Err(error) => {
+            let name = report.name_of(&file);
+            return unusable(report, ["gnss", "a GNSS receiver", &name], &file, error);
+        }
+    };
+    let stamps: Vec<i64> = log.fixes.iter().map(|fix| fix.stamp_ns).collect();
+    let times = Times::of(&stamps, timing);
+    let first = log.fixes.first().map_or([0.0; 2], |fix| fix.east_north_m);
+    let from_first = log.fixes.iter().map(|fix| {
+        let [east, north] = [0, 1].map(|axis| fix.east_north_m[axis] - first[axis]);
+        east.hypot(north)
+    });
+    let reach_m = from_first.fold(0.0, f64::max);
+    let sigma_m = median(log.fixes.iter().filter_map(|fix| fix.sigma_m));
+    let sigma = sigma_m.map_or("no accuracy stated".to_owned(), |m| {
+        format!("standard deviation {m:.2} m as stated")
+    });
+    let name = log.topic.clone().unwrap_or_else(|| report.name_of(&file));
+    let what = format!("{name}: up to {reach_m:.0} m from the first, {sigma}, ");
+    times.lines(report, "gnss", &what, "fixes");
+    let faults = log.faults.named().into_iter();
+    let faults: Vec<String> = faults
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    if !faults.is_empty() {
+        report.find(format!(
+            "GNSS: entries of its log that are left out, or sorted: {}.",
+            faults.join(", ")
+        ));
+    }
+    let lies = match &log.topic {
+        Some(topic) => format!("{topic}{}, is in the bag", times.of_clocks()),
+        None => format!("{} beside the scans", times.lies(&file)),
+    };
+    let place = match log.plane.is_some() {
+        true => "",
+        false => " Its plane is its own: the map has no place on the earth by it.",
+    };
+    report.find(format!(
+        "The log of a GNSS receiver, {lies}: with slam.kind = \"graph\", gnss.kind = \"auto\" uses it.{place}"
+    ));
+    let mut more = json!({
+        "on_the_earth": log.plane.is_some(),
+        "reach_m": reach_m,
+        "sigma_m": sigma_m,
+        "faults": log.faults,
+    });
+    if let Some(topic) = &log.topic {
+        more["topic"] = json!(topic);
+    }
+    report.figure("gnss", times.figures(&file, more));
+}
+
+/// Adds a log that cannot be used: its section, its sensor in words and its name.
+fn unusable(report: &mut Report, words: [&str; 3], file: &Path, error: String) {
+    let [section, of, name] = words;
+    report.line(section, format!("{name}: cannot be used"));
+    let name = file.file_name().unwrap_or_default().display();
+    report.find(format!("The log of {of}, {name}, cannot be used: {error}."));
+    report.figure(section, json!({"file": file, "error": error}));
+}
+
+fn stamps(samples: &[Sample]) -> Vec<i64> {
+    samples.iter().map(|sample| sample.stamp_ns).collect()
+}
+
+/// The stamps of a log.
+struct Times {
+    samples: usize,
+    /// Median time between samples, s.
+    period_s: f64,
+    /// RMS deviation of the time between samples from its median, s, without gaps.
+    jitter_s: f64,
+    /// First and last stamp, ns, on the log's own clock.
+    span_ns: Option<[i64; 2]>,
+    /// Samples that are missing between them, share of all.
+    missing: f64,
+    /// First and last stamp relative to the first and last scan, s.
+    after_scans_s: Option<[f64; 2]>,
+}
+
+impl Times {
+    /// Examines stamps, ns, in their order.
+    fn of(stamps: &[i64], timing: Option<&Timing>) -> Self {
+        let steps = stamps.windows(2).map(|pair| apart_s(pair[1], pair[0]));
+        let steps_s: Vec<f64> = steps.collect();
+        let period_s = median(steps_s.iter().copied()).unwrap_or_default();
+        let regular = steps_s.iter().map(|step_s| step_s - period_s);
+        let regular: Vec<f64> = regular.filter(|apart_s| *apart_s < period_s).collect();
+        let squares: f64 = regular.iter().map(|apart_s| apart_s * apart_s).sum();
+        let span = stamps.first().copied().zip(stamps.last().copied());
+        let slots = span.map_or(0.0, |(first, last)| {
+            apart_s(last, first) / period_s.max(1e-9) + 1.0
+        });
+        Self {
+            samples: stamps.len(),
+            period_s,
+            jitter_s: (squares / regular.len().max(1) as f64).sqrt(),
+            span_ns: span.map(Into::into),
+            missing: (1.0 - stamps.len() as f64 / slots.max(1.0)).max(0.0),
+            after_scans_s: span.zip(timing).map(|((first, last), timing)| {
+                [
+                    apart_s(first, timing.first_ns),
+                    apart_s(last, timing.last_ns),
+                ]
+            }),
+        }
+    }
+
+    fn rate_hz(&self) -> f64 {
+        match self.period_s > 0.0 {
+            true => 1.0 / self.period_s,
+            false => 0.0,
+        }
+    }
+
+    /// Adds the lines about the content, the rate and the span of a log.
+    fn lines(&self, report: &mut Report, section: &str, what: &str, samples: &str) {
+        let (count, rate_hz, missing) = (self.samples, self.rate_hz(), self.missing * 100.0);
+        report.line(
+            section,
+            format!("{what}{count} {samples} of {rate_hz:.1} Hz, {missing:.1} % missing"),
+        );
+        if let (Some([first, last]), Some([before, after])) = (self.span_ns, self.after_scans_s) {
+            let (seconds, jitter_ms) = ((last - first) as f64 * 1e-9, self.jitter_s * 1e3);
+            report.line(
+                format!("{section} stamps"),
+                format!(
+                    "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
+                ),
+            );
+        }
+    }
+
+    /// Returns the name of a log, with a note if its stamps do not cover the scans.
+    fn lies(&self, file: &Path) -> String {
+        let name = file.file_name().unwrap_or_default().display();
+        format!("{name}{}, lies", self.of_clocks())
+    }
+
+    fn of_clocks(&self) -> &'static str {
+        let after = self.after_scans_s;
+        match after.is_none_or(|[first_s, last_s]| first_s <= 0.0 && last_s >= 0.0) {
+            true => "",
+            false => ", whose stamps do not cover those of the scans",
+        }
+    }
+
+    /// Returns the figures of a log.
+    fn figures(&self, file: &Path, mut more: Value) -> Value {
+        for (name, value) in [
+            ("file", json!(file)),
+            ("error", Value::Null),
+            ("samples", json!(self.samples)),
+            ("rate_hz", json!(self.rate_hz())),
+            ("jitter_s", json!(self.jitter_s)),
+            ("span_ns", json!(self.span_ns)),
+            ("missing", json!(self.missing)),
+            ("after_scans_s", json!(self.after_scans_s)),
+        ] {
+            more[name] = value;
+        }
+        more
+    }
+}
+
+fn apart_s(stamp_ns: i64, from_ns: i64) -> f64 {
+    (i128::from(stamp_ns) - i128::from(from_ns)) as f64 * 1e-9
+}
+
+/// The rates of a quiet time: its start, s since the first sample, means and standard deviations.
+struct Quiet {
+    after_s: f64,
+    mean_degps: [f64; 3],
+    sigma_degps: [f64; 3],
+}
+
+/// Returns the time of [`QUIET_S`] with the smallest variance of the rates: the bias and the noise,
+/// if the vehicle stood.
+fn quiet(samples: &[Sample], period_s: f64) -> Option<Quiet> {
+    let least = (QUIET_SHARE * QUIET_S / period_s.max(1e-9)) as usize;
+    let windows = (0..samples.len()).step_by((least / 5).max(1)).map(|from| {
+        let rest = &samples[from..];
+        let since_s = |it: &Sample| apart_s(it.stamp_ns, samples[from].stamp_ns);
+        let count = rest.partition_point(|it| since_s(it) < QUIET_S);
+        &rest[..count]
+    });
+    let full = windows.filter(|window| window.len() >= least.max(2));
+    let variance = |window: &[Sample]| moments(window).1.iter().sum::<f64>();
+    let quietest = full.min_by(|a, b| variance(a).total_cmp(&variance(b)))?;
+    let (mean, squares) = moments(quietest);
+    Some(Quiet {
+        after_s: apart_s(quietest.first()?.stamp_ns, samples.first()?.stamp_ns),
+        mean_degps: mean.map(f64::to_degrees),
+        sigma_degps: squares.map(|square| square.sqrt().to_degrees()),
+    })
+}
+
+/// The means and the variances of the rates.
+fn moments(samples: &[Sample]) -> ([f64; 3], [f64; 3]) {
+    let count = samples.len() as f64;
+    let mean = [0, 1, 2].map(|k| samples.iter().map(|it| it.values[k]).sum::<f64>() / count);
+    let variance = [0, 1, 2].map(|k| {
+        let squares = samples.iter().map(|it| (it.values[k] - mean[k]).powi(2));
+        squares.sum::<f64>() / count
+    });
+    (mean, variance)
+}

@@ -1,0 +1,30 @@
+//! Bags of ROS 2: a radar's scans in them as a [`Dataset`](gyre_datasets::Dataset), and bags that
+//! `ros2 bag play` takes.
+//!
+//! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
+//! Reading order: `files` (the files of a bag), `spans` (the places of messages), `topics` (the
+//! topics of a radar), `azimuths` (messages as azimuths), `bag` (all files as one), `scans`
+//! (azimuths as scans), `sensors` (other sensors), `samples` (of gyro and wheels), [`fixes()`] (of
+//! GNSS), [`BagWriter`].
+
+mod azimuths;
+mod bag;
+mod files;
+mod fixes;
+mod radar;
+mod samples;
+mod scans;
+mod sensors;
+mod spans;
+mod topics;
+mod writer;
+
+use crate::{
+    RecordingError,
+    file::{Channel, McapFile, Message},
+};
+
+pub use files::is_bag;
+pub use fixes::fixes;
+pub use scans::{open, reopen};
+pub use writer::{BagWriter, Kept, Topic};

@@ -1,0 +1,76 @@
+//! The samples of other sensors in a bag: of a gyro messages of the type `sensor_msgs/msg/Imu`, of
+//! the wheels `nav_msgs/msg/Odometry` or `geometry_msgs/msg/TwistStamped`.
+
+use std::path::Path;
+
+use gyre_ros2_messages::{
+    decode, geometry_msgs::TwistStamped, nav_msgs::Odometry, sensor_msgs::Imu,
+};
+use gyre_samples::{Sample, SampleKind};
+
+use crate::bags::{Message, RecordingError, bag::Bag, sensors::Sensor};
+
+const GYRO: Sensor<Sample> = Sensor {
+    section: SampleKind::Gyro.section(),
+    measurements: "samples of the gyro",
+    types: &[("sensor_msgs/msg/Imu", gyro)],
+};
+
+const WHEELS: Sensor<Sample> = Sensor {
+    section: SampleKind::Wheels.section(),
+    measurements: "samples of the wheels",
+    types: &[
+        ("nav_msgs/msg/Odometry", odometry),
+        ("geometry_msgs/msg/TwistStamped", twist),
+    ],
+};
+
+/// Reads all samples of a sensor on the topic of this name, else on the only topic of its types; in
+/// the sensor's own axes and on the clock of its driver, in the order of the bag. `None` without
+/// such a topic.
+///
+/// The topic of the wheels must be named: odometry may be of anything, as the radar's own in a bag
+/// that Gyre has exported.
+pub(crate) fn read(
+    bag: &mut Bag,
+    path: &Path,
+    of: SampleKind,
+    wished: Option<&str>,
+) -> Result<Option<Vec<Sample>>, RecordingError> {
+    let found = match of {
+        SampleKind::Gyro => GYRO.read(bag, path, wished)?,
+        SampleKind::Wheels => {
+            if wished.is_none() {
+                require_no_speeds(bag, path)?;
+            }
+            WHEELS.read(bag, path, wished)?
+        }
+    };
+    Ok(found.map(|found| found.measurements))
+}
+
+fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), RecordingError> {
+    let listed = WHEELS.listed(bag);
+    if listed.is_empty() {
+        return Ok(());
+    }
+    let reason = format!(
+        "has speeds on {listed}: name the topic that is of wheels with wheels.topic, since odometry may be of anything, as the radar's own in a bag that Gyre has exported"
+    );
+    Err(RecordingError::unreadable(path, reason))
+}
+
+fn gyro(message: &Message) -> Result<Sample, String> {
+    let imu: Imu = decode(&message.data).map_err(|error| error.to_string())?;
+    Ok(imu.sample(message.log_ns))
+}
+
+fn odometry(message: &Message) -> Result<Sample, String> {
+    let odometry: Odometry = decode(&message.data).map_err(|error| error.to_string())?;
+    Ok(odometry.sample(message.log_ns))
+}
+
+fn twist(message: &Message) -> Result<Sample, String> {
+    let twist: TwistStamped = decode(&message.data).map_err(|error| error.to_string())?;
+    Ok(twist.sample(message.log_ns))
+}

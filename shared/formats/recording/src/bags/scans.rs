@@ -1,0 +1,296 @@
+//! The scans of a bag as a dataset.
+
+mod index;
+mod notes;
+
+use std::{
+    collections::BTreeMap,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+use gyre_colossus::{Constants, SweepAssembler};
+use gyre_datasets::{
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
+    OpenError, ReadError, check_capacity, turn_ns,
+};
+use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_samples::{BagFixes, Sample, SampleKind};
+
+use crate::bags::{
+    Message, RecordingError,
+    azimuths::{Described, azimuths},
+    bag::{Bag, Key},
+    files::{Files, files},
+    fixes, samples,
+    topics::Topics,
+};
+use index::{Entry, Index};
+use notes::notes;
+
+/// Opens the scans in a bag.
+pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_files(path, &files(path)?, options)
+}
+
+/// Opens the scans in a bag again, with the files that it had.
+pub fn reopen(
+    path: &Path,
+    options: &DatasetOptions,
+    files: &FileList,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    let paths = (0..files.len()).filter_map(|index| files.get(index));
+    let files = Files {
+        paths: paths.map(Path::to_owned).collect(),
+        are_in_order: true,
+    };
+    open_files(path, &files, options)
+}
+
+fn open_files(
+    path: &Path,
+    files: &Files,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    if options.azimuth_source == Some(AzimuthSource::Uniform) {
+        return Err(OpenError::BadOption {
+            key: "azimuth_source",
+            value: "uniform".to_owned(),
+            format: Some(Format::Ros2Bag),
+            reason: "its azimuths are those of the encoder; leave the key out",
+        });
+    }
+    Ok(Box::new(Scans::open(path, files, options)?))
+}
+
+/// The scans of a bag.
+struct Scans {
+    path: PathBuf,
+    bag: Bag,
+    topics: Topics,
+    described: Described,
+    constants: Constants,
+    index: Index,
+    files: FileList,
+    period_ns: i64,
+    notes: Vec<String>,
+    damage: Option<String>,
+    /// The spans that were read last, and their messages of scans.
+    kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
+}
+
+impl Scans {
+    fn open(path: &Path, files: &Files, options: &DatasetOptions) -> Result<Self, RecordingError> {
+        let mut bag = Bag::open(path, files)?;
+        let wished = options.topic.as_ref().map(|topic| topic.as_str());
+        let topics = Topics::choose(path, &bag.channels(), wished)?;
+        let (described, origin) = bag.describe(&topics, options)?;
+        let constants = Constants::from(options);
+        let assembler = SweepAssembler::new(&described.radar, constants);
+        let assembler = assembler.map_err(|error| {
+            RecordingError::unreadable(path, format!("cannot be read: {error}"))
+        })?;
+        let index = Index::of(&mut bag, &topics, &described, assembler)?;
+        if let Some(reason) = index.why_none_can_be_read(&topics.scans.name) {
+            return Err(RecordingError::unreadable(path, reason));
+        }
+        let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
+        let mut damage = bag.files.iter().filter_map(|file| file.damage(true));
+        Ok(Self {
+            damage: damage.next(),
+            period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
+            notes: notes(&bag, &topics, &described, &origin, &index),
+            files: bag.files.iter().map(|file| file.path.clone()).collect(),
+            path: path.to_owned(),
+            bag,
+            topics,
+            described,
+            constants,
+            index,
+            kept: (None, BTreeMap::new()),
+        })
+    }
+
+    fn assembler(&self) -> Option<SweepAssembler> {
+        SweepAssembler::new(&self.described.radar, self.constants).ok()
+    }
+
+    /// Reads the messages of scans of some spans, unless they are there.
+    fn keep(&mut self, spans: &RangeInclusive<u32>) -> Result<(), RecordingError> {
+        let topic = &self.topics.scans.name;
+        let (there, messages) = (self.kept.0.take(), &mut self.kept.1);
+        messages.retain(|key, _| spans.contains(&key.span));
+        let is_there = |span: &u32| there.as_ref().is_some_and(|there| there.contains(span));
+        for span in spans.clone().filter(|span| !is_there(span)) {
+            messages.extend(self.bag.read(span, |channel| channel.topic == *topic)?);
+        }
+        self.kept.0 = Some(spans.clone());
+        Ok(())
+    }
+
+    /// Returns why the message of a scan cannot be decoded.
+    fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
+        self.keep(&entry.spans)?;
+        let message = self.kept.1.get(&entry.start.message);
+        let decoded = message
+            .map(|message| azimuths(self.topics.scans.kind, message, &self.described, |_, _| {}));
+        let reason = decoded.and_then(Result::err);
+        Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
+    }
+
+    /// Assembles a scan from the azimuths from its entry's start on.
+    fn assemble(
+        &mut self,
+        index: usize,
+        entry: &Entry,
+        mut slot: ScanSlot<'_>,
+    ) -> Result<Option<SweepGeometry>, RecordingError> {
+        let Some(mut assembler) = self.assembler() else {
+            return Ok(None);
+        };
+        self.keep(&entry.spans)?;
+        let mut clock = self.index.clock(index);
+        let mut found = None;
+        for (key, message) in self.kept.1.range(entry.start.message..) {
+            if self.index.repeated.contains(key) {
+                continue;
+            }
+            let mut skipped = match *key == entry.start.message {
+                true => entry.start.row,
+                false => 0,
+            };
+            // A damaged one between was left out of the index, too.
+            let _ = azimuths(
+                self.topics.scans.kind,
+                message,
+                &self.described,
+                |azimuth, received_ns| {
+                    if skipped > 0 {
+                        skipped -= 1;
+                        return;
+                    }
+                    for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
+                        if found.is_none() {
+                            found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                        }
+                    }
+                },
+            );
+            if found.is_some() {
+                break;
+            }
+        }
+        Ok(found.map(|sweep| sweep.geometry))
+    }
+}
+
+fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
+    ScanSlot {
+        bytes: slot.bytes,
+        azimuth_rad: slot.azimuth_rad,
+        stamp_ns: slot.stamp_ns,
+        flags: slot.flags,
+    }
+}
+
+impl Dataset for Scans {
+    fn format(&self) -> Format {
+        Format::Ros2Bag
+    }
+
+    fn len(&self) -> usize {
+        self.index.entries.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        self.index.limits
+    }
+
+    fn image_size(&self) -> ImageSize {
+        ImageSize {
+            width: usize::from(self.described.radar.range_in_bins),
+            height: usize::from(self.described.radar.azimuth_samples),
+        }
+    }
+
+    fn files(&self) -> &FileList {
+        &self.files
+    }
+
+    fn file(&self, index: usize) -> &Path {
+        let entry = self.index.entries.get(index);
+        let file = entry.and_then(|entry| self.bag.file_of(entry.end.message.span));
+        file.map_or(Path::new(""), |file| &file.path)
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        Some(self.index.entries.get(index)?.stamp_ns)
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        Some(self.index.entries.get(index)?.logged_ns)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
+         is the middle of its first and last."
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        Some(self.described.radar.encoder_size)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
+    }
+
+    fn logged(
+        &mut self,
+        of: SampleKind,
+        topic: Option<&str>,
+    ) -> Result<Option<Vec<Sample>>, OpenError> {
+        Ok(samples::read(&mut self.bag, &self.path, of, topic)?)
+    }
+
+    fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
+        Ok(fixes::read(&mut self.bag, &self.path, topic)?)
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let len = self.len();
+        let entry = self.index.entries.get(index).cloned();
+        let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
+        check_capacity(self.limits(), &slot)?;
+        let path = self.file(index).to_owned();
+        let failed = |error| match error {
+            RecordingError::Io { path, source } => ReadError::Io { path, source },
+            error => ReadError::Damaged {
+                path: path.clone(),
+                reason: error.to_string(),
+            },
+        };
+        if entry.is_damaged {
+            let reason = self.why_damaged(&entry).map_err(failed)?;
+            return Err(ReadError::Message {
+                path,
+                index,
+                reason,
+            });
+        }
+        let assembled = self.assemble(index, &entry, slot).map_err(failed)?;
+        assembled.ok_or_else(|| ReadError::Damaged {
+            path: path.clone(),
+            reason: format!("scan {index} is not as it was when the bag was opened"),
+        })
+    }
+}

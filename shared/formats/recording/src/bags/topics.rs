@@ -1,0 +1,264 @@
+//! The topics of a radar in a bag, recognised by their types.
+
+use std::{collections::BTreeSet, path::Path};
+
+use gyre_storage::quoted;
+
+use crate::bags::{Channel, RecordingError};
+
+/// The content of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    Azimuths(Form),
+    /// Whole turns, with encoder values and times.
+    BScans,
+    /// Whole turns as images alone.
+    Images,
+    /// The radar's description of itself.
+    Configuration(Form),
+}
+
+/// The number format of Navtech's driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Form {
+    /// As numbers.
+    Numbers,
+    /// As arrays of their bytes: the older form, which some have kept under the newer name.
+    Bytes,
+}
+
+/// A topic of a radar.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Topic {
+    pub name: String,
+    pub kind: Kind,
+}
+
+impl Topic {
+    /// Returns the topic of a channel, if it is a radar's. Packages of messages have had several
+    /// names.
+    pub fn of(channel: &Channel) -> Option<Self> {
+        let (_, name) = channel.type_name.rsplit_once('/')?;
+        // Where the definition is missing, the type's name decides.
+        let form = |older: bool| match older || channel.schema.contains("uint8[] azimuth") {
+            true => Form::Bytes,
+            false => Form::Numbers,
+        };
+        let kind = match name {
+            "RadarFftDataMsg" => Kind::Azimuths(form(false)),
+            "RadarFftDataMessage" => Kind::Azimuths(form(true)),
+            "RadarBScanMsg" => Kind::BScans,
+            "RadarConfigurationMsg" => Kind::Configuration(form(false)),
+            "RadarConfigurationMessage" => Kind::Configuration(form(true)),
+            "Image" => Kind::Images,
+            _ => return None,
+        };
+        Some(Self {
+            name: channel.topic.clone(),
+            kind,
+        })
+    }
+
+    fn has_scans(&self) -> bool {
+        !matches!(self.kind, Kind::Configuration(_))
+    }
+
+    fn is_b_scan_image(&self) -> bool {
+        self.kind == Kind::Images && self.name.ends_with("b_scan_image")
+    }
+}
+
+/// The topics that are read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Topics {
+    pub scans: Topic,
+    pub configuration: Option<Topic>,
+}
+
+impl Topics {
+    /// Chooses the topic of scans, `wished` if it is named, and the nearest topic of the radar's
+    /// configuration.
+    pub fn choose(
+        path: &Path,
+        channels: &[&Channel],
+        wished: Option<&str>,
+    ) -> Result<Self, RecordingError> {
+        let topics: BTreeSet<Topic> = channels.iter().filter_map(|c| Topic::of(c)).collect();
+        let candidates = candidates(&topics, wished);
+        let scans = match (&candidates[..], wished) {
+            ([one], _) => (*one).clone(),
+            ([], Some(wished)) => return Err(no_such_topic(path, &topics, wished)),
+            ([], None) => return Err(no_scans(path, channels)),
+            (several, _) => return Err(ambiguous(path, several)),
+        };
+        let used = channels
+            .iter()
+            .filter(|channel| channel.topic == scans.name);
+        if let Some(channel) = used.into_iter().find(|channel| channel.encoding != "cdr") {
+            let encoding = quoted(&channel.encoding);
+            let reason = format!(
+                "has the messages of {} as {encoding}, expected `cdr`",
+                scans.name
+            );
+            return Err(RecordingError::unreadable(path, reason));
+        }
+        let near = |topic: &&Topic| common_prefix(&topic.name, &scans.name);
+        let configurations = topics.iter().filter(|topic| !topic.has_scans());
+        Ok(Self {
+            configuration: configurations.max_by_key(near).cloned(),
+            scans,
+        })
+    }
+
+    /// Returns whether a channel is one of them.
+    pub fn has(&self, channel: &Channel) -> bool {
+        let configuration = self.configuration.as_ref();
+        channel.topic == self.scans.name
+            || configuration.is_some_and(|topic| topic.name == channel.topic)
+    }
+}
+
+/// Returns the candidate topics. Images are of many sensors: only those that the driver names so
+/// are a radar's, unless one is named.
+fn candidates<'a>(topics: &'a BTreeSet<Topic>, wished: Option<&str>) -> Vec<&'a Topic> {
+    let scans = || topics.iter().filter(|topic| topic.has_scans());
+    if let Some(wished) = wished {
+        return scans().filter(|topic| topic.name == wished).collect();
+    }
+    let radar: Vec<_> = scans().filter(|topic| topic.kind != Kind::Images).collect();
+    match radar.is_empty() {
+        true => scans().filter(|topic| topic.is_b_scan_image()).collect(),
+        false => radar,
+    }
+}
+
+fn common_prefix(a: &str, b: &str) -> usize {
+    a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count()
+}
+
+/// Names that a sentence has room for.
+const NAMED: usize = 6;
+
+fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let mut names: BTreeSet<&str> = names.collect();
+    let more = names.len() > NAMED;
+    while names.len() > NAMED {
+        names.pop_last();
+    }
+    let listed: Vec<&str> = names.into_iter().collect();
+    listed.join(", ") + if more { ", ..." } else { "" }
+}
+
+fn no_scans(path: &Path, channels: &[&Channel]) -> RecordingError {
+    let reason = match channels.is_empty() {
+        true => "has no topics: it is empty, or damaged from its beginning".to_owned(),
+        false => format!(
+            "has no scans of a radar: none of its topics ({}) is of a type of Navtech's driver (RadarFftDataMsg, RadarBScanMsg)",
+            names(channels.iter().map(|channel| channel.topic.as_str()))
+        ),
+    };
+    RecordingError::unreadable(path, reason)
+}
+
+fn no_such_topic(path: &Path, topics: &BTreeSet<Topic>, wished: &str) -> RecordingError {
+    let all = topics.iter().filter(|topic| topic.has_scans());
+    let reason = format!(
+        "has no scans on the topic {wished} (dataset.topic), but on: {}",
+        names(all.map(|topic| topic.name.as_str()))
+    );
+    RecordingError::unreadable(path, reason)
+}
+
+fn ambiguous(path: &Path, several: &[&Topic]) -> RecordingError {
+    let reason = format!(
+        "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
+        names(several.iter().map(|topic| topic.name.as_str())),
+        several[0].name
+    );
+    RecordingError::unreadable(path, reason)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn channel(topic: &str, type_name: &str) -> Channel {
+        Channel {
+            topic: topic.to_owned(),
+            type_name: type_name.to_owned(),
+            encoding: "cdr".to_owned(),
+            ..Channel::default()
+        }
+    }
+
+    fn choose(channels: &[Channel], wished: Option<&str>) -> Result<Topics, String> {
+        let channels: Vec<&Channel> = channels.iter().collect();
+        Topics::choose(Path::new("b"), &channels, wished).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn topics_are_found_by_type_whatever_their_package_is() {
+        let topics = choose(
+            &[
+                channel("/camera", "sensor_msgs/msg/Image"),
+                channel("/odom", "nav_msgs/msg/Odometry"),
+                channel(
+                    "/left/configuration_data",
+                    "navtech_msgs/msg/RadarConfigurationMsg",
+                ),
+                channel(
+                    "/right/configuration_data",
+                    "navtech_msgs/msg/RadarConfigurationMsg",
+                ),
+                channel("/right/b_scan_msg", "vtr_radar_msgs/msg/RadarBScanMsg"),
+            ],
+            None,
+        )
+        .unwrap();
+        assert_eq!(topics.scans.kind, Kind::BScans);
+        assert_eq!(
+            topics.configuration.unwrap().name,
+            "/right/configuration_data"
+        );
+    }
+
+    #[test]
+    fn numbers_as_bytes_are_told_by_the_definition() {
+        let mut newer = channel("/fft", "nav_messages/msg/RadarFftDataMsg");
+        assert_eq!(
+            Topic::of(&newer).unwrap().kind,
+            Kind::Azimuths(Form::Numbers)
+        );
+        newer.schema = "uint8[] angle\nuint8[] azimuth\n".to_owned();
+        assert_eq!(Topic::of(&newer).unwrap().kind, Kind::Azimuths(Form::Bytes));
+    }
+
+    #[test]
+    fn one_of_several_topics_must_be_chosen() {
+        let both = [
+            channel("/b_scan_msg", "navtech_msgs/msg/RadarBScanMsg"),
+            channel("/fft_data", "navtech_msgs/msg/RadarFftDataMsg"),
+        ];
+        let refused = choose(&both, None).unwrap_err();
+        assert!(refused.contains("--set dataset.topic="), "{refused}");
+        assert_eq!(
+            choose(&both, Some("/b_scan_msg")).unwrap().scans.kind,
+            Kind::BScans
+        );
+        let refused = choose(&both, Some("/radar")).unwrap_err();
+        assert!(refused.contains("/fft_data"), "{refused}");
+    }
+
+    #[test]
+    fn a_bag_without_a_radar_says_what_it_has() {
+        let refused = choose(&[channel("/camera", "sensor_msgs/msg/Image")], None).unwrap_err();
+        assert!(
+            refused.contains("no scans of a radar") && refused.contains("/camera"),
+            "{refused}"
+        );
+        assert!(choose(&[], None).unwrap_err().contains("no topics"));
+        let image = [channel("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];
+        assert_eq!(choose(&image, None).unwrap().scans.kind, Kind::Images);
+    }
+}

@@ -1,0 +1,247 @@
+//! Writes a bag.
+
+mod metadata;
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::{self, BufWriter},
+    marker::PhantomData,
+    path::{Path, PathBuf},
+};
+
+use gyre_ros2_messages::{Ros2Message, encode};
+use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
+use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
+
+use crate::bags::{
+    RecordingError,
+    files::{METADATA, PROFILE},
+};
+use metadata::Described;
+
+/// The size of a chunk, uncompressed, bytes: a few scans.
+const CHUNK_BYTES: u64 = 4 << 20;
+/// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
+const LEVEL: u32 = 1;
+
+/// For whom `ros2 bag play` keeps the last message of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// For nobody: durability `volatile`.
+    ForNobody,
+    /// For subscribers that come later: durability `transient_local`, as `/tf_static` and maps have
+    /// it.
+    ForLater,
+}
+
+/// A topic of a bag that is written.
+#[derive(Debug)]
+pub struct Topic<T> {
+    index: usize,
+    message: PhantomData<T>,
+}
+
+/// Writes a bag: a folder with a `metadata.yaml`, or one file if the name ends in `.mcap`. It has
+/// another name until it is complete.
+pub struct BagWriter {
+    path: PathBuf,
+    aside: PathBuf,
+    /// The file within the folder.
+    file_name: Option<String>,
+    mcap: Writer<BufWriter<File>>,
+    topics: Vec<Written>,
+    times: Option<(i64, i64)>,
+    committed: bool,
+}
+
+struct Written {
+    channel: u16,
+    described: Described,
+}
+
+impl BagWriter {
+    /// Begins a bag, which must not exist.
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        require_new(path)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let aside = path.with_file_name(format!(".{name}.tmp"));
+        let is_file = path
+            .extension()
+            .is_some_and(|extension| extension == "mcap");
+        let file_name = (!is_file).then(|| format!("{name}_0.mcap"));
+        if let Some(parent) = path
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty())
+        {
+            fs::create_dir_all(parent).map_err(|e| unwritable(path, e.to_string()))?;
+        }
+        let file = match &file_name {
+            None => aside.clone(),
+            Some(name) => aside.join(name),
+        };
+        let file = create_aside(&aside, &file)
+            .map_err(|error| unwritable(path, error.to_string()))?
+            .ok_or_else(|| {
+                let reason = "another command is writing it; wait for that, or give another name";
+                unwritable(path, reason.to_owned())
+            })?;
+        // Another command may have come to its end meanwhile.
+        require_new(path)?;
+        let options = WriteOptions::new()
+            .profile(PROFILE)
+            .library(concat!("gyre ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_level(LEVEL)
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES));
+        let mcap = options.create(BufWriter::new(file));
+        Ok(Self {
+            path: path.to_owned(),
+            aside,
+            file_name,
+            mcap: mcap.map_err(|error| unwritable(path, error.to_string()))?,
+            topics: Vec::new(),
+            times: None,
+            committed: false,
+        })
+    }
+
+    pub fn topic<T: Ros2Message>(
+        &mut self,
+        name: &str,
+        kept: Kept,
+    ) -> Result<Topic<T>, RecordingError> {
+        let definition = T::DEFINITION;
+        let described = Described {
+            name: name.to_owned(),
+            type_name: definition.type_name(),
+            qualities: metadata::qualities(kept),
+            messages: 0,
+        };
+        let channel = self
+            .add_channel(&described, &definition.text())
+            .map_err(|error| unwritable(&self.path, error.to_string()))?;
+        self.topics.push(Written { channel, described });
+        Ok(Topic {
+            index: self.topics.len() - 1,
+            message: PhantomData,
+        })
+    }
+
+    fn add_channel(&mut self, topic: &Described, schema: &str) -> Result<u16, McapError> {
+        let type_name = &topic.type_name;
+        let schema = self
+            .mcap
+            .add_schema(type_name, "ros2msg", schema.as_bytes())?;
+        let qualities = ("offered_qos_profiles".to_owned(), topic.qualities.clone());
+        let metadata = BTreeMap::from([qualities]);
+        self.mcap.add_channel(schema, &topic.name, "cdr", &metadata)
+    }
+
+    /// Writes a message that was received at `log_ns`, ns since 1970.
+    pub fn write<T: Ros2Message>(
+        &mut self,
+        topic: &Topic<T>,
+        log_ns: i64,
+        message: &T,
+    ) -> Result<(), RecordingError> {
+        let data = encode(message)?;
+        let written = &mut self.topics[topic.index];
+        let time = u64::try_from(log_ns).unwrap_or_default();
+        let header = MessageHeader {
+            channel_id: written.channel,
+            sequence: written.described.messages as u32,
+            log_time: time,
+            publish_time: time,
+        };
+        written.described.messages += 1;
+        let (first, last) = self.times.unwrap_or((log_ns, log_ns));
+        self.times = Some((first.min(log_ns), last.max(log_ns)));
+        self.mcap
+            .write_to_known_channel(&header, &data)
+            .map_err(|error| unwritable(&self.path, error.to_string()))
+    }
+
+    /// Returns the names of the topics, and how many messages each has.
+    pub fn counts(&self) -> impl Iterator<Item = (&str, u64)> {
+        let topics = self.topics.iter().map(|topic| &topic.described);
+        topics.map(|topic| (topic.name.as_str(), topic.messages))
+    }
+
+    /// Ends the bag, and gives it its name.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        let path = self.path.clone();
+        let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
+        self.mcap.finish().map_err(|error| failed(&error))?;
+        let mut files = Vec::new();
+        if let Some(file) = &self.file_name {
+            let topics: Vec<&Described> = self.topics.iter().map(|t| &t.described).collect();
+            let text = metadata::text(file, &topics, self.times);
+            let description = self.aside.join(METADATA);
+            fs::write(&description, text).map_err(|error| failed(&error))?;
+            files.extend([self.aside.join(file), description]);
+        }
+        // A power failure leaves no name of a bag without its content.
+        files.push(self.aside.clone());
+        for file in files {
+            let synchronised = File::open(file).and_then(|file| file.sync_all());
+            synchronised.map_err(|error| failed(&error))?;
+        }
+        fs::rename(&self.aside, &self.path).map_err(|error| failed(&error))?;
+        self.committed = true;
+        let folder = self.path.parent().map_or(Ok(()), gyre_storage::sync_folder);
+        folder.map_err(|error| failed(&error))
+    }
+}
+
+impl Drop for BagWriter {
+    /// Removes a bag that is not complete.
+    fn drop(&mut self) {
+        if !self.committed {
+            remove(&self.aside);
+        }
+    }
+}
+
+/// Creates the file of an incomplete bag, and the folder of both where `aside` is a different one;
+/// `None` while another command writes the bag.
+fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
+    // Locked until it is removed, so that no other command takes it for its own.
+    let left_over = try_lock_existing(file);
+    match &left_over {
+        Ok(Attempt::Held(_)) => return Ok(None),
+        // Another command may create it by now: it is not removed.
+        Err(error) if error.kind() == io::ErrorKind::NotFound && aside == file => {}
+        _ => remove(aside),
+    }
+    if aside != file {
+        fs::create_dir(aside)?;
+    }
+    Ok(match try_lock(file)? {
+        Attempt::Locked(file) => Some(file),
+        Attempt::Held(_) => None,
+    })
+}
+
+fn require_new(path: &Path) -> Result<(), RecordingError> {
+    match path.exists() {
+        true => Err(unwritable(
+            path,
+            "it exists; remove it, or give another name".to_owned(),
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Removes the leftovers of an earlier writer. If the removal fails, the next creation reports it.
+fn remove(aside: &Path) {
+    let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
+}
+
+fn unwritable(path: &Path, reason: String) -> RecordingError {
+    RecordingError::Unwritable {
+        path: path.to_owned(),
+        reason,
+    }
+}

@@ -1,0 +1,136 @@
+//! The lines that are appended to `log.jsonl` of a run.
+
+use std::{
+    fs::File,
+    io::{Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use crate::LogLine;
+
+/// The most that is read at once, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// A position in the log.
+pub struct LogTail {
+    path: PathBuf,
+    offset: u64,
+    /// The start of a line whose end is not written yet.
+    begun: Vec<u8>,
+}
+
+impl LogTail {
+    /// Begins at the present end.
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            offset: path.metadata().map_or(0, |file| file.len()),
+            begun: Vec::new(),
+        }
+    }
+
+    /// Returns the lines that were appended since the last call. A log that cannot be read has
+    /// none.
+    pub fn lines(&mut self, now_ns: i64) -> Vec<LogLine> {
+        let Some(appended) = self.appended() else {
+            return Vec::new();
+        };
+        self.begun.extend(appended);
+        let Some(end) = self.begun.iter().rposition(|byte| *byte == b'\n') else {
+            if self.begun.len() as u64 > MAX_BYTES {
+                // The rest of the last part is not a line of the log, and is skipped.
+                self.begun.clear();
+            }
+            return Vec::new();
+        };
+        let rest = self.begun.split_off(end + 1);
+        let lines = std::mem::replace(&mut self.begun, rest);
+        lines
+            .split(|byte| *byte == b'\n')
+            .filter_map(|line| parse(line, now_ns))
+            .collect()
+    }
+
+    fn appended(&mut self) -> Option<Vec<u8>> {
+        let mut file = File::open(&self.path).ok()?;
+        let bytes = file.metadata().ok()?.len();
+        if bytes < self.offset {
+            // The supervisor has cut it.
+            (self.offset, self.begun) = (bytes, Vec::new());
+        }
+        let mut appended = Vec::new();
+        file.seek(SeekFrom::Start(self.offset)).ok()?;
+        file.take(MAX_BYTES).read_to_end(&mut appended).ok()?;
+        self.offset += appended.len() as u64;
+        Some(appended)
+    }
+}
+
+/// Parses a line; `None` if the line is not from the log.
+fn parse(line: &[u8], now_ns: i64) -> Option<LogLine> {
+    let line: Value = serde_json::from_slice(line).ok()?;
+    let text = |value: &Value| match value {
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    let fields = line.get("fields")?.as_object()?;
+    let mut message = fields.get("message").map(text).unwrap_or_default();
+    for (key, value) in fields.iter().filter(|(key, _)| *key != "message") {
+        message += &format!(" {key}={}", text(value));
+    }
+    Some(LogLine {
+        written_ns: now_ns,
+        level: text(line.get("level")?),
+        stage: line.pointer("/span/stage").map(text).unwrap_or_default(),
+        message,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::{fs::OpenOptions, io::Write};
+
+    use super::*;
+
+    #[test]
+    fn whole_lines_that_are_appended_are_returned_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.jsonl");
+        let append = |text: &str| {
+            let mut log = OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(&path)
+                .unwrap();
+            log.write_all(text.as_bytes()).unwrap();
+        };
+        append("{\"level\":\"INFO\",\"fields\":{\"message\":\"before\"}}\n");
+        let mut tail = LogTail::new(&path);
+        assert_eq!(tail.lines(5), []);
+        append("{\"level\":\"WARN\",\"fields\":{\"message\":\"skipped\",\"scan\":7},");
+        assert_eq!(tail.lines(6), []);
+        append("\"span\":{\"stage\":\"masking\"}}\nnonsense\n");
+        let line = LogLine {
+            written_ns: 7,
+            level: "WARN".to_owned(),
+            stage: "masking".to_owned(),
+            message: "skipped scan=7".to_owned(),
+        };
+        assert_eq!(tail.lines(7), [line]);
+        let endless = "x".repeat(MAX_BYTES as usize);
+        for _ in 0..3 {
+            append(&endless);
+            assert_eq!(tail.lines(8), []);
+            assert!(tail.begun.len() as u64 <= MAX_BYTES);
+        }
+        append("\n{\"level\":\"INFO\",\"fields\":{\"message\":\"after it\"}}\n");
+        assert_eq!(tail.lines(8)[0].message, "after it");
+        std::fs::write(&path, "").unwrap();
+        assert_eq!(tail.lines(8), []);
+        append("{\"level\":\"INFO\",\"fields\":{}}\n");
+        assert_eq!(tail.lines(9).len(), 1);
+    }
+}

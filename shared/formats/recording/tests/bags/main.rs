@@ -1,0 +1,402 @@
+//! Bags that are written, read, cut and damaged. One program, so that all of it is linked once.
+#![allow(clippy::unwrap_used)]
+
+mod damage;
+mod drivers;
+mod encoders;
+mod fixes;
+mod order;
+mod samples;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use gyre_colossus::Configuration;
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
+use gyre_ros2_messages::{
+    Ros2Message, encode,
+    messages::RadarFftDataMessage,
+    nav_msgs::Odometry,
+    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    radar::ScanMessages,
+};
+use mcap::{Compression, WriteOptions};
+
+const START_NS: i64 = 1_549_986_608_000_000_007;
+const TURN_NS: i64 = 250_000_000;
+const AZIMUTHS: usize = 40;
+const BINS: usize = 64;
+
+fn radar() -> Configuration {
+    Configuration {
+        azimuth_samples: AZIMUTHS as u16,
+        range_in_bins: BINS as u16,
+        encoder_size: 5600,
+        rotation_mhz: 4000,
+        range_resolution_m: Some(0.0438),
+        range_gain: 1.0,
+        ..Configuration::default()
+    }
+}
+
+/// The scan of a turn.
+fn scan(turn: usize) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
+    for row in 0..AZIMUTHS {
+        let encoder = (140 * row + 13) as f64;
+        scan.azimuth_rad[row] = (encoder * (std::f64::consts::TAU / 5600.0)) as f32;
+        scan.stamp_ns[row] = START_NS + TURN_NS * turn as i64 + 6_250_000 * row as i64;
+        scan.flags[row] = flag::MEASURED;
+        for bin in 0..BINS {
+            scan.bytes[row * BINS + bin] = (turn * 31 + row * 7 + bin * bin) as u8;
+        }
+    }
+    scan.geometry = SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride: BINS,
+        first_byte: 0,
+        range_resolution_m: 0.0438,
+        range_offset_m: 0.0,
+        doppler_s: 0.0,
+        sense: Sense::Clockwise,
+        stamp_ns: middle_ns(scan.stamp_ns[0], scan.stamp_ns[AZIMUTHS - 1]),
+    };
+    scan
+}
+
+/// The content of a bag: topic, schema, time and bytes of each message.
+#[derive(Default)]
+struct Messages(Vec<(String, String, String, i64, Vec<u8>)>);
+
+impl Messages {
+    fn add<T: Ros2Message>(&mut self, topic: &str, log_ns: i64, message: &T) {
+        let (name, text) = (T::DEFINITION.type_name(), T::DEFINITION.text());
+        self.add_bytes(topic, (&name, &text), log_ns, encode(message).unwrap());
+    }
+
+    fn add_bytes(&mut self, topic: &str, (name, text): (&str, &str), log_ns: i64, bytes: Vec<u8>) {
+        let texts = [topic, name, text].map(str::to_owned);
+        let [topic, name, text] = texts;
+        self.0.push((topic, name, text, log_ns, bytes));
+    }
+
+    /// Writes an MCAP file as recorders other than Gyre do.
+    fn write(&self, path: &Path, options: WriteOptions) {
+        let file = fs::File::create(path).unwrap();
+        let mut mcap = options.profile("ros2").create(file).unwrap();
+        for (sequence, (topic, name, text, log_ns, data)) in self.0.iter().enumerate() {
+            let schema = mcap.add_schema(name, "ros2msg", text.as_bytes()).unwrap();
+            let channel = mcap
+                .add_channel(schema, topic, "cdr", &BTreeMap::new())
+                .unwrap();
+            let header = mcap::records::MessageHeader {
+                channel_id: channel,
+                sequence: sequence as u32,
+                log_time: *log_ns as u64,
+                publish_time: *log_ns as u64,
+            };
+            mcap.write_to_known_channel(&header, data).unwrap();
+        }
+        mcap.finish().unwrap();
+    }
+}
+
+const B_SCANS: &str = "/radar_data/b_scan_msg";
+const AZIMUTH_DATA: &str = "/radar_data/fft_data";
+const CONFIGURATION: &str = "/radar_data/configuration_data";
+
+fn b_scans(turns: usize) -> Messages {
+    let (writer, mut messages) = (ScanMessages::new(radar(), "radar"), Messages::default());
+    messages.add(CONFIGURATION, START_NS, &writer.configuration(START_NS));
+    for turn in 0..turns {
+        let end_ns = START_NS + TURN_NS * (turn as i64 + 1);
+        messages.add(B_SCANS, end_ns, &writer.b_scan(scan(turn).view()));
+    }
+    messages
+}
+
+/// Azimuth by azimuth; `each` may change one, or leave it out.
+fn azimuths(
+    turns: usize,
+    mut each: impl FnMut(usize, usize, RadarFftDataMsg) -> Option<RadarFftDataMsg>,
+) -> Messages {
+    let (mut writer, mut messages) = (ScanMessages::new(radar(), "radar"), Messages::default());
+    messages.add(CONFIGURATION, START_NS, &writer.configuration(START_NS));
+    for turn in 0..turns {
+        let scan = scan(turn);
+        for (row, message) in writer.azimuths(scan.view()).enumerate() {
+            let log_ns = message.header.stamp.ns();
+            if let Some(message) = each(turn, row, message) {
+                messages.add(AZIMUTH_DATA, log_ns, &message);
+            }
+        }
+    }
+    messages
+}
+
+fn uncompressed() -> WriteOptions {
+    WriteOptions::new().compression(None)
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn bag(&self, messages: &Messages) -> PathBuf {
+        let path = self.path("bag.mcap");
+        messages.write(&path, uncompressed());
+        path
+    }
+}
+
+fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, ReadError> {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    scan.geometry = dataset.read(index, scan.slot())?;
+    Ok(scan)
+}
+
+fn opened(path: &Path) -> Box<dyn Dataset> {
+    open(path, &DatasetOptions::default()).unwrap()
+}
+
+fn refused(path: &Path) -> String {
+    let Err(error) = open(path, &DatasetOptions::default()) else {
+        panic!("{} was opened", path.display());
+    };
+    let sentence = error.to_string();
+    assert_eq!(sentence.lines().count(), 1, "{sentence}");
+    sentence
+}
+
+fn assert_is(found: &OwnedScan, turn: usize) {
+    let expected = scan(turn);
+    assert_eq!(found.geometry, expected.geometry, "{turn}");
+    assert_eq!(found.bytes, expected.bytes, "{turn}");
+    assert_eq!(found.azimuth_rad, expected.azimuth_rad, "{turn}");
+    assert_eq!(found.stamp_ns, expected.stamp_ns, "{turn}");
+}
+
+/// Reads all scans, in order and then from the last to the first.
+fn assert_has_turns(dataset: &mut dyn Dataset, turns: usize) {
+    assert_eq!(dataset.len(), turns);
+    for turn in (0..turns).chain((0..turns).rev()) {
+        assert_is(&read(dataset, turn).unwrap(), turn);
+    }
+}
+
+#[test]
+fn scans_of_both_forms_come_back_in_any_order() {
+    for messages in [b_scans(5), azimuths(5, |_, _, message| Some(message))] {
+        for options in [
+            uncompressed(),
+            WriteOptions::new().compression(Some(Compression::Zstd)),
+            WriteOptions::new().compression(Some(Compression::Lz4)),
+            // Chunks that divide turns.
+            uncompressed().chunk_size(Some(4000)),
+            // The preset `fastwrite` of rosbag2.
+            uncompressed().use_chunks(false),
+            uncompressed()
+                .use_chunks(false)
+                .emit_summary_records(false)
+                .emit_summary_offsets(false),
+        ] {
+            let folder = Folder::new();
+            let path = folder.path("bag.mcap");
+            messages.write(&path, options);
+            assert!(is_bag(&path));
+            let mut dataset = opened(&path);
+            assert_eq!(dataset.format(), Format::Ros2Bag);
+            assert_eq!(dataset.period_ns(), TURN_NS);
+            assert_eq!(dataset.nominal_stamp_ns(2), Some(scan(2).geometry.stamp_ns));
+            assert_has_turns(dataset.as_mut(), 5);
+        }
+    }
+}
+
+#[test]
+fn a_bag_of_several_files_is_one_recording() {
+    let folder = Folder::new();
+    let bag = folder.path("drive");
+    fs::create_dir(&bag).unwrap();
+    let mut all = azimuths(12, |_, _, message| Some(message)).0;
+    for part in [0, 1, 10] {
+        // Not at the ends of turns.
+        let rest = all.split_off(all.len().min(170));
+        Messages(all).write(&bag.join(format!("drive_{part}.mcap")), uncompressed());
+        all = rest;
+    }
+    assert!(is_bag(&bag));
+    let mut dataset = opened(&bag);
+    assert_eq!(dataset.files().len(), 3);
+    assert_has_turns(dataset.as_mut(), 12);
+    assert_eq!(dataset.file(11), bag.join("drive_10.mcap"));
+}
+
+#[test]
+fn a_written_bag_is_read_and_never_overwritten() {
+    let folder = Folder::new();
+    for name in ["bag", "bag.mcap"] {
+        let path = folder.path(name);
+        let mut bag = BagWriter::create(&path).unwrap();
+        let configurations = bag
+            .topic::<RadarConfigurationMsg>(CONFIGURATION, Kept::ForLater)
+            .unwrap();
+        let scans = bag
+            .topic::<RadarBScanMsg>(B_SCANS, Kept::ForNobody)
+            .unwrap();
+        let messages = ScanMessages::new(radar(), "radar");
+        bag.write(&configurations, START_NS, &messages.configuration(START_NS))
+            .unwrap();
+        for turn in 0..3 {
+            let log_ns = START_NS + TURN_NS * turn as i64;
+            bag.write(&scans, log_ns, &messages.b_scan(scan(turn).view()))
+                .unwrap();
+        }
+        assert!(!path.exists());
+        bag.finish().unwrap();
+        assert!(is_bag(&path));
+        assert_has_turns(opened(&path).as_mut(), 3);
+        let refused = BagWriter::create(&path).err().unwrap().to_string();
+        assert!(refused.contains("it exists"), "{refused}");
+    }
+    let dropped = folder.path("dropped");
+    let writing = BagWriter::create(&dropped).unwrap();
+    let refused = BagWriter::create(&dropped).err().unwrap().to_string();
+    assert!(refused.contains("another command is writing"), "{refused}");
+    drop(writing);
+    assert_eq!(fs::read_dir(folder.0.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn azimuths_of_the_older_form_are_read_under_both_names() {
+    let newer = azimuths(3, |_, _, message| Some(message));
+    for name in [
+        "messages/msg/RadarFftDataMessage",
+        "nav_messages/msg/RadarFftDataMsg",
+    ] {
+        let mut older = Messages::default();
+        for (topic, type_name, text, log_ns, data) in &newer.0 {
+            let Some(message) = (topic == AZIMUTH_DATA)
+                .then(|| gyre_ros2_messages::decode::<RadarFftDataMsg>(data).unwrap())
+            else {
+                older.add_bytes(topic, (type_name, text), *log_ns, data.clone());
+                continue;
+            };
+            let older_message = RadarFftDataMessage {
+                header: message.header,
+                angle: vec![0, 0],
+                azimuth: message.azimuth.to_be_bytes().to_vec(),
+                sweep_counter: message.sweep_counter.to_be_bytes().to_vec(),
+                ntp_seconds: message.ntp_seconds.to_be_bytes().to_vec(),
+                ntp_split_seconds: message.ntp_split_seconds.to_be_bytes().to_vec(),
+                data_length: message.data_length.to_be_bytes().to_vec(),
+                data: message.data,
+            };
+            let text = RadarFftDataMessage::DEFINITION.text();
+            older.add_bytes(
+                topic,
+                (name, &text),
+                *log_ns,
+                encode(&older_message).unwrap(),
+            );
+        }
+        let folder = Folder::new();
+        assert_has_turns(opened(&folder.bag(&older)).as_mut(), 3);
+    }
+}
+
+/// The driver's clock of a radar that has never received the time.
+#[test]
+fn a_radar_without_a_clock_has_the_times_of_the_driver() {
+    let messages = azimuths(6, |_, _, message| {
+        Some(RadarFftDataMsg {
+            ntp_seconds: 0,
+            ntp_split_seconds: 0,
+            ..message
+        })
+    });
+    let folder = Folder::new();
+    let mut dataset = opened(&folder.bag(&messages));
+    assert_has_turns(dataset.as_mut(), 6);
+    let notes = dataset.notes().join(" ");
+    assert!(notes.contains("time does not advance"), "{notes}");
+}
+
+#[test]
+fn bags_that_cannot_be_used_say_why_in_one_sentence() {
+    let folder = Folder::new();
+    let mut odometry = Messages::default();
+    odometry.add("/odom", START_NS, &Odometry::default());
+    assert!(refused(&folder.bag(&odometry)).contains("has no scans of a radar"));
+
+    let mut both = b_scans(3);
+    both.0.extend(azimuths(3, |_, _, message| Some(message)).0);
+    let path = folder.bag(&both);
+    assert!(
+        refused(&path).contains("--set dataset.topic=/radar_data"),
+        "{}",
+        refused(&path)
+    );
+    let chosen = DatasetOptions {
+        topic: Some(B_SCANS.try_into().unwrap()),
+        ..DatasetOptions::default()
+    };
+    assert_eq!(open(&path, &chosen).unwrap().len(), 3);
+
+    let few = azimuths(1, |_, row, message| (row < 10).then_some(message));
+    assert!(refused(&folder.bag(&few)).contains("no complete turn"));
+    assert!(refused(&folder.bag(&Messages::default())).contains("has no topics"));
+
+    let mut compressed = b_scans(3);
+    for (.., data) in &mut compressed.0 {
+        data.splice(..4, [0x28, 0xb5, 0x2f, 0xfd]);
+    }
+    assert!(refused(&folder.bag(&compressed)).contains("compression_mode: none"));
+
+    let path = folder.path("empty.mcap");
+    fs::write(&path, []).unwrap();
+    assert!(refused(&path).contains("signature of MCAP"));
+    let gone = folder.path("gone.mcap");
+    assert!(matches!(
+        open(&gone, &DatasetOptions::default()),
+        Err(OpenError::Io { .. })
+    ));
+}
+
+#[test]
+fn without_a_configuration_the_depth_of_a_bin_must_be_given() {
+    for messages in [b_scans(4), azimuths(4, |_, _, message| Some(message))] {
+        let without = Messages(messages.0.into_iter().skip(1).collect());
+        let folder = Folder::new();
+        let path = folder.bag(&without);
+        let sentence = refused(&path);
+        assert!(
+            sentence.contains("dataset.range_resolution_m"),
+            "{sentence}"
+        );
+        let options = DatasetOptions {
+            range_resolution_m: Some(0.0438),
+            ..DatasetOptions::default()
+        };
+        let mut dataset = open(&path, &options).unwrap();
+        assert_has_turns(dataset.as_mut(), 4);
+        let notes = dataset.notes().join(" ");
+        assert!(notes.contains("does not describe itself"), "{notes}");
+    }
+}

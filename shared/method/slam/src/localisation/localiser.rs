@@ -1,0 +1,359 @@
+//! The localiser.
+
+use std::f64::consts::PI;
+
+use gyre_estimation::places::{Candidate, Describer, Descriptor};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle};
+use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use nalgebra::{Matrix3, Point2, Vector3};
+
+use crate::localisation::{LocaliserOptions, Map, registration::Registration};
+
+/// Two poses are the same within this angle, rad.
+const SAME_RAD: f64 = 5.0 * PI / 180.0;
+/// The most similar poses of a search are aligned.
+const ALIGNED: usize = 3;
+
+/// A scan, with its motion by odometry.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// Time of the scan, ns.
+    pub stamp_ns: i64,
+    /// The points as measured.
+    pub points: &'a [SparsePoint],
+    /// The velocity of the sensor.
+    pub twist: Twist,
+    /// The motion from the scan before, with its covariance along that one's axes.
+    pub motion: UncertainMotion,
+}
+
+/// The state of the localisation of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    Lost,
+    /// A first fix, without prior.
+    Found,
+    /// A fix near the prediction.
+    Tracked,
+    /// A prediction by odometry from the last fix.
+    Predicted,
+}
+
+/// A measured place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fix {
+    /// The pose in the map, with its covariance along the map's axes.
+    pub pose: UncertainMotion,
+    /// Masked correlation of the scan with the submap.
+    pub correlation: f64,
+    /// Difference of the correlation from the next best pose that was tried; for a first fix only.
+    pub margin: f64,
+    /// The keyframe of the map that was used for registration.
+    pub keyframe: usize,
+}
+
+/// The place of a scan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Localisation {
+    pub status: Status,
+    /// The fix, or the prediction; `None` if lost or outside the map.
+    pub fix: Option<Fix>,
+}
+
+/// A pose that a search has found.
+#[derive(Clone, Copy)]
+struct Hypothesis {
+    pose: Pose,
+    correlation: f64,
+    keyframe: usize,
+}
+
+#[derive(Clone, Copy)]
+struct Track {
+    pose: UncertainMotion,
+    fixed_ns: i64,
+}
+
+/// Localises scans in a map.
+pub struct Localiser {
+    map: Map,
+    options: LocaliserOptions,
+    describer: Describer,
+    descriptor: Descriptor,
+    registration: Registration,
+    candidates: Vec<Candidate>,
+    hypotheses: Vec<Hypothesis>,
+    scan: Submap,
+    place: Submap,
+    /// The keyframe whose submap `place` is.
+    drawn: Option<usize>,
+    track: Option<Track>,
+}
+
+impl Localiser {
+    /// Plans the localisation of scans of at most `capacity` points. `refinement` is the
+    /// odometry's.
+    pub fn new(
+        map: Map,
+        options: LocaliserOptions,
+        refinement: &RefinementConfig,
+        capacity: usize,
+    ) -> Result<Self, ConfigError> {
+        Ok(Self {
+            registration: Registration::new(&options, refinement, capacity)?,
+            describer: Describer::new(),
+            descriptor: Descriptor::default(),
+            candidates: Vec::with_capacity(options.candidates),
+            hypotheses: Vec::with_capacity(4 * options.candidates),
+            scan: Submap::with_capacity(capacity),
+            place: map.new_submap(),
+            drawn: None,
+            track: None,
+            map,
+            options,
+        })
+    }
+
+    pub fn map(&self) -> &Map {
+        &self.map
+    }
+
+    /// Forgets the last known place.
+    pub fn reset(&mut self) {
+        self.track = None;
+    }
+
+    pub fn locate(&mut self, observation: &Observation<'_>) -> Localisation {
+        match self.track {
+            None => self.start(observation),
+            Some(track) => self.follow(&track, observation),
+        }
+    }
+
+    fn start(&mut self, observation: &Observation<'_>) -> Localisation {
+        let fix = self.find(observation.points, &observation.twist);
+        self.track = fix.map(|fix| Track {
+            pose: fix.pose,
+            fixed_ns: observation.stamp_ns,
+        });
+        let status = fix.map_or(Status::Lost, |_| Status::Found);
+        Localisation { status, fix }
+    }
+
+    /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of
+    /// the map look like it.
+    pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
+        let fix = self.most_similar(points, twist);
+        fix.filter(|fix| self.is_accepted(fix))
+    }
+
+    /// Finds the pose with the highest similarity of a scan to the map, however low.
+    pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
+        self.scan.start(points, twist);
+        self.registration.set_scan(&self.scan);
+        self.describer.describe(&self.scan, &mut self.descriptor);
+        self.choose_candidates();
+        self.hypotheses.clear();
+        let few = self.options.first_candidates.min(self.candidates.len());
+        (0..few).for_each(|k| self.search(k));
+        let fix = self.best().filter(|fix| self.is_accepted(fix));
+        fix.or_else(|| {
+            (few..self.candidates.len()).for_each(|k| self.search(k));
+            self.best()
+        })
+    }
+
+    fn is_accepted(&self, fix: &Fix) -> bool {
+        let place = Point2::from(fix.pose.motion.translation.vector);
+        fix.correlation >= self.options.min_correlation
+            && fix.margin >= self.options.min_margin
+            && self.map.nearest(place).1 <= self.options.reach_m
+    }
+
+    /// Chooses the places and headings that look most similar, each once.
+    fn choose_candidates(&mut self) {
+        let similar = self
+            .map
+            .similar(&self.descriptor, self.options.angles)
+            .to_vec();
+        self.candidates.clear();
+        for candidate in similar {
+            let is_new = |other: &Candidate| {
+                let [one, other] = [&candidate, other].map(|c| (self.map.pose(c.place), c.yaw_rad));
+                let apart_m = (one.0.translation.vector - other.0.translation.vector).norm();
+                let turned = |(pose, yaw_rad): (Pose, f64)| pose.rotation.angle() + yaw_rad;
+                // Up to half a turn.
+                let apart_rad = 0.5 * wrap_angle(2.0 * (turned(one) - turned(other)));
+                apart_m >= self.options.apart_m || apart_rad.abs() > SAME_RAD
+            };
+            if self.candidates.iter().all(is_new) {
+                self.candidates.push(candidate);
+            }
+            if self.candidates.len() == self.options.candidates {
+                break;
+            }
+        }
+    }
+
+    /// Searches around a candidate, at both headings, since its descriptor is ambiguous by half a
+    /// turn.
+    fn search(&mut self, candidate: usize) {
+        let Candidate { place, yaw_rad, .. } = self.candidates[candidate];
+        self.draw(place);
+        self.registration.set_place(&self.place);
+        for yaw_rad in [yaw_rad, wrap_angle(yaw_rad + PI)] {
+            let found = self.registration.search(yaw_rad);
+            let second = found
+                .runner_up
+                .map(|other| (other.x_m, other.y_m, other.score));
+            let first = (found.x_m, found.y_m, found.score);
+            for (x_m, y_m, correlation) in [Some(first), second].into_iter().flatten() {
+                self.hypotheses.push(Hypothesis {
+                    pose: self.map.pose(place) * pose(x_m, y_m, yaw_rad),
+                    correlation,
+                    keyframe: place,
+                });
+            }
+        }
+    }
+
+    /// Aligns the best poses that were found, and compares the best of them with all others.
+    fn best(&mut self) -> Option<Fix> {
+        self.hypotheses
+            .sort_by(|a, b| b.correlation.total_cmp(&a.correlation));
+        let mut best: Option<Fix> = None;
+        for k in 0..self.hypotheses.len().min(ALIGNED) {
+            let Hypothesis { pose, keyframe, .. } = self.hypotheses[k];
+            if let Some((pose, correlation)) = self.align(keyframe, &pose) {
+                let fix = Fix {
+                    pose,
+                    correlation,
+                    margin: 0.0,
+                    keyframe,
+                };
+                if best.is_none_or(|best| correlation > best.correlation) {
+                    best = Some(fix);
+                }
+            }
+        }
+        let best = best.filter(|best| best.pose.has_covariance())?;
+        let others = self.hypotheses.iter();
+        let rival = others
+            .filter(|other| !self.is_same(&best.pose.motion, &other.pose))
+            .map(|other| other.correlation)
+            .fold(0.0, f64::max);
+        Some(Fix {
+            margin: best.correlation - rival,
+            ..best
+        })
+    }
+
+    fn is_same(&self, one: &Pose, other: &Pose) -> bool {
+        let apart = one.inv_mul(other);
+        apart.translation.vector.norm() <= self.options.same_m
+            && apart.rotation.angle().abs() <= SAME_RAD
+    }
+
+    /// Aligns the scan with a keyframe from a pose on the map.
+    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<(UncertainMotion, f64)> {
+        self.draw(keyframe);
+        self.registration.set_place(&self.place);
+        let initial = self.map.pose(keyframe).inv_mul(from);
+        let (motion, correlation) = self.registration.align(&self.scan, &self.place, &initial)?;
+        let of_keyframe = UncertainMotion {
+            motion: self.map.pose(keyframe),
+            covariance: Matrix3::zeros(),
+        };
+        Some((of_keyframe.then(&motion), correlation))
+    }
+
+    /// Tracks the next scan from the last known place.
+    fn follow(&mut self, track: &Track, observation: &Observation<'_>) -> Localisation {
+        let predicted = track.pose.then(&observation.motion);
+        self.scan.start(observation.points, &observation.twist);
+        self.registration.set_scan(&self.scan);
+        let place = Point2::from(predicted.motion.translation.vector);
+        let (keyframe, distance_m) = self.map.nearest(place);
+        let is_inside = distance_m <= self.options.reach_m;
+        if let Some(fix) = self.register(keyframe, &predicted).filter(|_| is_inside) {
+            self.track = Some(Track {
+                pose: fix.pose,
+                fixed_ns: observation.stamp_ns,
+            });
+            return Localisation {
+                status: Status::Tracked,
+                fix: Some(fix),
+            };
+        }
+        let without_s = (observation.stamp_ns - track.fixed_ns) as f64 * 1e-9;
+        if without_s >= self.options.lost_after_s {
+            return self.start(observation);
+        }
+        self.track = Some(Track {
+            pose: predicted,
+            ..*track
+        });
+        let prediction = Fix {
+            pose: predicted,
+            correlation: 0.0,
+            margin: 0.0,
+            keyframe,
+        };
+        Localisation {
+            status: Status::Predicted,
+            fix: is_inside.then_some(prediction),
+        }
+    }
+
+    /// Registers the scan with a keyframe, and updates the prediction with the result; `None`
+    /// unless both agree.
+    fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
+        let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
+        if correlation < self.options.tracked_correlation {
+            return None;
+        }
+        Some(Fix {
+            pose: fused(predicted, &measured, self.options.gate)?,
+            correlation,
+            margin: 0.0,
+            keyframe,
+        })
+    }
+
+    fn draw(&mut self, keyframe: usize) {
+        if self.drawn != Some(keyframe) {
+            self.map.draw(keyframe, &mut self.place);
+            self.drawn = Some(keyframe);
+        }
+    }
+}
+
+/// Updates a prediction with a measurement (Joseph form); `None` if their difference exceeds the
+/// gate.
+fn fused(
+    predicted: &UncertainMotion,
+    measured: &UncertainMotion,
+    gate: f64,
+) -> Option<UncertainMotion> {
+    let innovation = measured.error(&predicted.motion);
+    let inverse = (predicted.covariance + measured.covariance).try_inverse()?;
+    let chi_square = (innovation.transpose() * inverse * innovation).x;
+    // Not a number does not.
+    let agrees = chi_square <= gate;
+    if !agrees {
+        return None;
+    }
+    let gain = predicted.covariance * inverse;
+    let rest = Matrix3::identity() - gain;
+    Some(UncertainMotion {
+        motion: moved(&predicted.motion, &(gain * innovation)),
+        covariance: rest * predicted.covariance * rest.transpose()
+            + gain * measured.covariance * gain.transpose(),
+    })
+}
+
+/// A pose moved by (x, y, yaw) along the map's axes.
+fn moved(from: &Pose, by: &Vector3<f64>) -> Pose {
+    let [x, y, yaw] = gyre_geometry::xy_yaw(from);
+    pose(x + by.x, y + by.y, yaw + by.z)
+}

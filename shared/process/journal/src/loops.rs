@@ -1,0 +1,79 @@
+//! The loops in the logs of a run, as they are published: for programs that must have all of them,
+//! whenever they come.
+
+use std::path::Path;
+
+use gyre_geometry::{covariance, xy_yaw};
+use gyre_messages::{Item, LoopHeader};
+use gyre_slam::{Keyframe, LoopCandidate, Query, RecordReader};
+use gyre_storage::LogError;
+
+/// The loops of a run so far.
+pub struct LoggedLoops {
+    keyframes: RecordReader<Keyframe>,
+    queries: RecordReader<Query>,
+    /// Number of queries whose loops are in `loops`.
+    read: usize,
+    loops: Vec<LoopHeader>,
+}
+
+impl LoggedLoops {
+    /// Opens the logs of the run that writes to `out`.
+    pub fn open(out: &Path) -> Result<Self, LogError> {
+        Ok(Self {
+            keyframes: RecordReader::open(out)?,
+            queries: RecordReader::open(out)?,
+            read: 0,
+            loops: Vec::new(),
+        })
+    }
+
+    /// Reads new records since the last call, and returns all loops so far, by their numbers.
+    pub fn refresh(&mut self) -> Result<&[LoopHeader], LogError> {
+        self.queries.refresh()?;
+        self.keyframes.refresh()?;
+        if self.queries.unchanged() < self.read {
+            self.loops.clear();
+            self.read = 0;
+        }
+        while self.read < self.queries.len() {
+            let query = self.queries.read(self.read)?;
+            for (candidate, _) in query.loops() {
+                let ends = [query.keyframe, candidate.place];
+                let [later, earlier] = ends.map(|index| self.keyframes.read_without_points(index));
+                let loops = self.loops.len() as u64;
+                self.loops
+                    .push(loop_header(loops, &later?, &earlier?, candidate));
+            }
+            self.read += 1;
+        }
+        Ok(&self.loops)
+    }
+}
+
+/// Returns the message of the loop with the number `loops`, which closes `candidate`.
+pub fn loop_header(
+    loops: u64,
+    later: &Keyframe,
+    earlier: &Keyframe,
+    candidate: &LoopCandidate,
+) -> LoopHeader {
+    let [x_m, y_m, yaw_rad] = xy_yaw(&candidate.motion.motion);
+    LoopHeader {
+        item: Item {
+            seq: loops,
+            scan: later.scan,
+            previous_scan: earlier.scan,
+            stamp_ns: later.stamp_ns,
+            ..Item::default()
+        },
+        later_seq: later.seq,
+        earlier_seq: earlier.seq,
+        x_m,
+        y_m,
+        yaw_rad,
+        covariance: covariance::pack(&candidate.motion.covariance),
+        correlation: candidate.correlation,
+        loops: loops + 1,
+    }
+}

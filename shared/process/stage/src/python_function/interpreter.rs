@@ -1,0 +1,66 @@
+//! The interpreter that functions are called in.
+
+use std::{
+    env,
+    process::{Command, Stdio},
+};
+
+use serde::Deserialize;
+use thiserror::Error;
+
+/// The environment variable that names the interpreter.
+const VARIABLE: &str = "GYRE_PYTHON";
+/// The oldest version that the interpreter's side runs in.
+const OLDEST: [u32; 2] = [3, 8];
+/// Prints an [`Interpreter`].
+const PROBE: &str = "
+import json, sys
+try:
+    import numpy
+    version = numpy.__version__
+except ImportError:
+    version = None
+print(json.dumps({'executable': sys.executable, 'version': list(sys.version_info[:3]), 'numpy': version}))
+";
+
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Interpreter {
+    pub executable: String,
+    pub version: [u32; 3],
+    /// The version of numpy; `None`: it cannot be imported.
+    pub numpy: Option<String>,
+}
+
+/// There is none.
+#[derive(Debug, Error)]
+pub enum NoInterpreter {
+    #[error("cannot start {python}: {source}; install Python 3, or name one with GYRE_PYTHON")]
+    Start {
+        python: String,
+        source: std::io::Error,
+    },
+    #[error("{python} is no Python of version {}.{} or newer: name one with GYRE_PYTHON", OLDEST[0], OLDEST[1])]
+    Other { python: String },
+}
+
+/// Returns what `GYRE_PYTHON` names, or `python3`.
+pub(crate) fn name() -> String {
+    env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
+}
+
+impl Interpreter {
+    /// Starts the interpreter for functions, and asks for its version and packages.
+    pub fn find() -> Result<Self, NoInterpreter> {
+        let python = name();
+        let mut command = Command::new(&python);
+        command.args(["-c", PROBE]).stdin(Stdio::null());
+        let output = match command.output() {
+            Ok(output) => output,
+            Err(source) => return Err(NoInterpreter::Start { python, source }),
+        };
+        let found: Option<Self> = serde_json::from_slice(&output.stdout).ok();
+        found
+            .filter(|found| found.version[..2] >= OLDEST[..])
+            .ok_or(NoInterpreter::Other { python })
+    }
+}

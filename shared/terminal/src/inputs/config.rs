@@ -1,0 +1,54 @@
+//! `gyre config`: the configurations in the program.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use crate::{Failure, WIDTH, print, wrap};
+use clap::Args;
+use gyre_configuration::{ConfigurationError, paths};
+
+/// Columns of the names.
+const NAMES: usize = 18;
+
+/// The arguments of `gyre config`.
+#[derive(Debug, Args)]
+pub struct ConfigArguments {
+    /// The name of a configuration, as oxford. Default: list all.
+    pub name: Option<PathBuf>,
+}
+
+/// Lists the configurations in the program, or prints one as it is.
+pub fn config(arguments: &ConfigArguments) -> Result<ExitCode, Failure> {
+    match &arguments.name {
+        Some(name) => {
+            let text = gyre_shipped::configuration(name).and_then(|path| gyre_shipped::text(&path));
+            let unknown = || ConfigurationError::Unknown {
+                name: name.display().to_string(),
+                suggestion: paths::suggestion(name),
+            };
+            print::line(text.ok_or_else(unknown)?.trim_end())?;
+        }
+        None => gyre_shipped::configurations().try_for_each(|it| print::line(entry(it)))?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns a name with its purpose beside it.
+fn entry((name, purpose): (&str, String)) -> String {
+    let indent = format!("\n{:NAMES$}", "");
+    let lines = wrap(&purpose, WIDTH - NAMES).join(&indent);
+    format!("{name:NAMES$}{lines}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_fits_a_terminal() {
+        for it in gyre_shipped::configurations() {
+            let entry = entry(it);
+            let widest = entry.lines().map(|line| line.chars().count()).max();
+            assert!(widest <= Some(WIDTH), "{entry}");
+        }
+    }
+}
