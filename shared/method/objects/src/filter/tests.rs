@@ -129,7 +129,7 @@ fn a_vehicle_that_goes_on_turning_is_found_to_turn_and_a_straight_one_is_not() {
         // A turn lasts half a second in the mean, so that each model expects it to end.
         let share = found_radps / wanted_radps;
         assert!(
-            (wanted_radps == 0.0 && found_radps.abs() < 0.1) || (0.3..1.0).contains(&share),
+            (wanted_radps == 0.0 && found_radps.abs() < 0.1) || (0.2..1.0).contains(&share),
             "{found_radps} {wanted_radps}"
         );
         assert!(error_mps < 1.4, "{error_mps} at {wanted_radps}");
