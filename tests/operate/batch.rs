@@ -274,6 +274,20 @@ fn what_is_complete_stays_when_its_recording_is_gone() {
     );
     assert_eq!(batch.table(), table);
 
+    // A configuration that became invalid is no success, whatever there was before.
+    fs::rename(&aside, &recording).unwrap();
+    let small = drives.path("small.toml");
+    fs::write(&small, "[raster]\nn = 0\n").unwrap();
+    assert_eq!(batch.finish().code(), Some(1));
+    assert_eq!(
+        batch.outcomes(),
+        [("part-6".to_owned(), "failed".to_owned())]
+    );
+    fs::write(&small, SMALL).unwrap();
+    batch.finish().succeeded();
+    assert_eq!(batch.table(), table);
+    fs::rename(&recording, &aside).unwrap();
+
     // Without its results a row is worth nothing.
     fs::remove_dir_all(batch.results("part-6")).unwrap();
     let collected = batch.clone().with(&["--collect"]).finish();

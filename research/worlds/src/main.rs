@@ -15,7 +15,7 @@ use toml::{Table, Value};
 /// Writes the recording of a simulated drive, or completes one.
 #[derive(Parser)]
 struct Arguments {
-    /// A configuration; only its section [simulation] is read. Default: the defaults of the section.
+    /// A configuration; only its section [simulation] is read. Default: the defaults.
     configuration: Option<PathBuf>,
     /// The folder of the recording.
     #[arg(long)]

@@ -35,8 +35,8 @@ pub use rule::{Rule, Verdict};
 pub use test::{Demands, InputScans, Prepare, Test};
 
 use checks::Examination;
+use reference::Context;
 use reference::Reference;
-use test::Context;
 
 /// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
 /// Breaches of the contract are in the report, not in the error.

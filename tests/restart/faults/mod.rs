@@ -6,7 +6,8 @@
 //! faults of each row, with one seed after the other:
 //!
 //! ```sh
-//! GYRE_FAULTS_EVENTS=20 cargo test --release -p gyre --test pipeline faults::nightly::radiate -- --ignored
+//! GYRE_FAULTS_EVENTS=20 cargo test --release -p gyre --test pipeline -- \
+//!     --ignored faults::nightly::radiate
 //! ```
 
 pub mod configurations;

@@ -45,7 +45,10 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     let path = given.data.as_ref().or(given.what.first());
     let is_missing = |path: &Path| matches!(path.try_exists(), Ok(false));
     if let Some(path) = path.filter(|path| is_missing(path) && shipped(path).is_none()) {
-        return Err(format!("there is nothing at {}", path.display()).into());
+        return Ok(End::unchecked(format!(
+            "there is nothing at {}",
+            path.display()
+        )));
     }
     let mut configuration = resolve(arguments)?;
     if configuration.is_radar() || configuration.source.repeat {
@@ -55,7 +58,10 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
         )
         .into());
     }
-    let out = locked(&run::results_folder(arguments)?)?;
+    let out = match locked(&run::results_folder(arguments)?) {
+        Err(error @ OutError::Held { .. }) => return Ok(End::unchecked(error.to_string())),
+        out => out?,
+    };
     // The folder is judged by the run that it is of.
     earlier::settle(&out)?;
     run::place_recording(&mut configuration, &out);
@@ -111,6 +117,7 @@ fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
     Ok(End {
         outcome,
         earlier,
+        unchecked: false,
         sentence: problem.unwrap_or_default().to_owned(),
     })
 }

@@ -105,8 +105,7 @@ impl Ended {
     fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
         let Batch { settings, out, .. } = batch;
         let row = Row::read(out, drive, settings)?;
-        let (row, earlier, note) = match row.outcome.has_results() && !end.outcome.has_results() {
-            // The results are still there, though they could not be checked again.
+        let (row, earlier, note) = match row.outcome.has_results() && end.unchecked {
             true => (
                 row,
                 true,

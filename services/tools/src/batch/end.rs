@@ -43,6 +43,8 @@ pub struct End {
     pub outcome: Outcome,
     /// True if the drive had ended so before.
     pub earlier: bool,
+    /// True if the drive was not looked at: its earlier results still count.
+    pub unchecked: bool,
     /// The reason why it is not complete; else empty.
     pub sentence: String,
 }
@@ -53,13 +55,25 @@ impl End {
         Self {
             outcome,
             earlier: false,
+            unchecked: false,
             sentence: sentence.into(),
+        }
+    }
+
+    /// Returns the end of a drive whose recording or folder could not be looked at.
+    pub fn unchecked(sentence: impl Into<String>) -> Self {
+        Self {
+            unchecked: true,
+            ..Self::of(Outcome::Failed, sentence)
         }
     }
 
     /// Returns the end of a drive that was interrupted.
     pub fn interrupted() -> Self {
         let sentence = "the batch was interrupted: the same command continues";
-        Self::of(Outcome::Interrupted, sentence)
+        Self {
+            outcome: Outcome::Interrupted,
+            ..Self::unchecked(sentence)
+        }
     }
 }

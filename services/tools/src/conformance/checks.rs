@@ -17,11 +17,11 @@ use gyre_supervise::rig::Recorded;
 use crate::conformance::{
     ProgramError,
     item::work_ns,
+    reference::Context,
     report::{Judged, Report, Work},
     result::{Differences, result_bytes},
     rule::{Findings, Rule},
     session::Session,
-    test::Context,
 };
 
 /// The test of one program.

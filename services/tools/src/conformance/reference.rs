@@ -66,6 +66,14 @@ impl Reference {
     }
 }
 
+/// The test with its inputs, as all checks need it.
+#[derive(Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub test: &'a Test,
+    pub reference: &'a Reference,
+    pub signals: &'a Signals,
+}
+
 /// Reads the scans, as the source does; the end of the stream follows.
 fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ProgramError> {
     let mut read: Vec<Recorded> = Vec::new();

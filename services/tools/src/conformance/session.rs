@@ -16,10 +16,10 @@ use gyre_supervise::{Death, Scheduling, rig::Recorded};
 use crate::conformance::{
     ProgramError,
     harness::{Harness, Sent, start_of_trajectory},
-    reference::{POLL_PERIOD, Reference},
+    reference::{Context, POLL_PERIOD, Reference},
     result::result_bytes,
     rule::{Findings, Rule},
-    test::{Context, Demands, Test},
+    test::{Demands, Test},
     topics::Direction,
 };
 

@@ -7,7 +7,7 @@ use gyre_messages::StageId;
 use gyre_stage::wake::Signals;
 use gyre_supervise::rig::Rig;
 
-use crate::conformance::{Candidate, ProgramError, reference::Reference};
+use crate::conformance::{Candidate, ProgramError};
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -77,12 +77,4 @@ impl Test {
         (self.prepare)(root).map_err(ProgramError::file(root))?;
         Ok(rig)
     }
-}
-
-/// The test with its inputs, as all checks need it.
-#[derive(Clone, Copy)]
-pub(crate) struct Context<'a> {
-    pub test: &'a Test,
-    pub reference: &'a Reference,
-    pub signals: &'a Signals,
 }

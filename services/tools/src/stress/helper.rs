@@ -4,7 +4,7 @@
 //! A helper ends with the process that has started it, even if that is killed.
 
 use std::{
-    io::{BufRead, BufReader, Write},
+    io::{BufRead, BufReader},
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Child, ChildStdout, Command, Stdio},
@@ -18,8 +18,6 @@ use crate::stress::{StressError, load};
 
 /// The command of `gyre` that calls [`help`].
 pub const COMMAND: &str = "stress-helper";
-/// The line that a helper prints when it works.
-const READY: &str = "ready";
 
 /// The work of a helper, which it gets as JSON on its command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,7 +88,7 @@ impl Helper {
             work,
             process,
         };
-        helper.await_line(READY)?;
+        helper.await_line(load::READY)?;
         Ok(helper)
     }
 
@@ -154,22 +152,4 @@ pub(crate) fn command(program: &Path, work: &Work) -> Result<Command, StressErro
 
 fn json(value: &impl Serialize) -> Result<String, StressError> {
     serde_json::to_string(value).map_err(|error| StressError::Usage(error.to_string()))
-}
-
-/// Prints that the work has begun.
-pub(crate) fn say_ready() {
-    say(READY);
-}
-
-/// Prints a result for the process that has started this one.
-pub(crate) fn say_result(result: &impl Serialize) -> Result<(), StressError> {
-    say(&json(result)?);
-    Ok(())
-}
-
-/// Prints a line for the process that has started this one. That it has ended is noticed by its
-/// death.
-fn say(line: &str) {
-    let mut output = std::io::stdout();
-    let _ = writeln!(output, "{line}").and_then(|()| output.flush());
 }

@@ -3,6 +3,7 @@
 use std::{
     fs,
     hint::black_box,
+    io::Write,
     path::Path,
     sync::mpsc::{self, Sender},
     thread,
@@ -17,11 +18,10 @@ use gyre_stage::{
 use gyre_supervise::memory::Room;
 use serde::{Deserialize, Serialize};
 
-use crate::stress::{
-    StressError,
-    helper::{say_ready, say_result},
-};
+use crate::stress::StressError;
 
+/// The line that a helper prints when it works.
+pub(super) const READY: &str = "ready";
 /// Memory that is always left, whatever the share: room for other programs that start meanwhile.
 const LEFT: u64 = 1 << 30;
 /// Bytes that are taken at once.
@@ -167,6 +167,25 @@ fn touched(bytes: &[u8]) -> u64 {
         .step_by(CACHE_LINE)
         .map(|byte| u64::from(*byte))
         .sum()
+}
+
+/// Prints that the work has begun.
+fn say_ready() {
+    say(READY);
+}
+
+/// Prints a result for the process that has started this one.
+fn say_result(result: &impl Serialize) -> Result<(), StressError> {
+    let text = serde_json::to_string(result);
+    say(&text.map_err(|error| StressError::Usage(error.to_string()))?);
+    Ok(())
+}
+
+/// Prints a line for the process that has started this one. That it has ended is noticed by its
+/// death.
+fn say(line: &str) {
+    let mut output = std::io::stdout();
+    let _ = writeln!(output, "{line}").and_then(|()| output.flush());
 }
 
 #[cfg(test)]
