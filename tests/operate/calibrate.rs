@@ -99,11 +99,13 @@ fn offset_of(block: &str) -> [f64; 2] {
 
 #[test]
 #[ignore = ".ci/nightly: calibrates two drives"]
-fn two_drives_of_one_radar_tell_more_than_one() {
+fn two_drives_determine_a_radar_better_than_one() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
+    let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
+    let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
     let with = ["--with", recording.to_str().unwrap()];
-    let ended = calibrate(recording, out.path(), &[FEW, NEAR], &with);
+    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &with);
     let said = ended.succeeded().stdout.clone();
     let (each, together) = said.split_once("all together: ").unwrap();
     let [alone, both] = [each, together].map(offset_of);

@@ -376,7 +376,7 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
 /// As `robot_localization` needs it, which publishes the transform of odometry itself and predicts
 /// where nothing was measured.
 #[test]
-fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predicted() {
+fn a_filter_can_have_its_own_transforms_and_sees_which_velocities_are_predicted() {
     if !can_speak() {
         return;
     }
@@ -386,7 +386,7 @@ fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predict
     let domain = domain(7);
     let bridge = Program::bridge(&run, &domain, &["--no-tf"]);
     let peer = Program::peer("observer.py", &[&domain, "/", "/tf"]);
-    run.complete();
+    run.finish().failed_with(&["predicted motions"]);
     let topics = received(peer);
     bridge.interrupt();
 
