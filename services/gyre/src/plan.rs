@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Mode, RecordConfig, RestartPolicy, Scheduling, Side, StageConfig};
+use gyre_run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
@@ -29,10 +29,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             None => own.scheduling.or(&configuration.run.scheduling),
         };
         StagePlan {
-            name: name.to_owned(),
-            command,
             programs,
-            directory: None,
             scheduling,
             restart: own.restart,
             outlives_restarts: live
@@ -46,6 +43,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
                 true => LinkConfig::END_TIMEOUT + END_TIMEOUT,
                 false => END_TIMEOUT,
             },
+            ..StagePlan::new(name, command)
         }
     };
     let stages = StageId::ALL
@@ -89,15 +87,8 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
         command.extend(["--topics".to_owned(), record.topics.join(",")]);
     }
     Some(StagePlan {
-        name: "recorder".to_owned(),
-        command,
-        programs: Vec::new(),
-        directory: None,
-        scheduling: Scheduling::default(),
-        restart: RestartPolicy::default(),
         outlives_restarts: true,
-        restarts_all: false,
-        end_timeout: END_TIMEOUT,
+        ..StagePlan::new("recorder", command)
     })
 }
 

@@ -67,33 +67,12 @@ impl Progress {
 
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
-            Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
             Event::Pose(pose) => self.pose(pose),
-            Event::Died { stage, death } => {
-                let output = death
-                    .last_output
-                    .as_ref()
-                    .map_or(String::new(), |line| format!(" ({line})"));
-                self.say(&format!("{stage} died by {}{output}", death.cause));
-            }
-            Event::Restarted { only: Some(name) } => self.say(&format!("restarted {name}")),
-            Event::Restarted { only: None } => self.say("restarted the stages from the journal"),
-            Event::GaveUp { follower, error } => {
-                self.say(&format!("{error}: odometry goes on without {follower}"));
-            }
-            Event::Note { sentence } => self.say(sentence),
+            Event::Note(sentence) => self.say(sentence),
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => {
                 self.radar = None;
                 self.following(follower, *progress);
-            }
-            Event::Swapped { stage, command } => {
-                self.say(&format!("{stage} is `{}` from here on", command.join(" ")));
-            }
-            Event::WentBack { stage, reason } => {
-                self.say(&format!(
-                    "{stage} goes back to the program before: {reason}"
-                ));
             }
             Event::Watched => self.silence(),
             Event::Stopping => self.radar = None,

@@ -4,12 +4,12 @@ use std::{
     collections::VecDeque,
     fs,
     os::unix::process::ExitStatusExt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitStatus,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{FollowerId, StageId};
+use gyre_messages::StageId;
 use gyre_stage::{
     Manifest, StageError,
     heartbeat::{self, Heartbeat},
@@ -85,11 +85,12 @@ impl Child {
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
-        if let Some(path) = self.changed_file() {
-            return Err(SuperviseError::Replaced {
-                stage: self.plan.name.clone(),
-                path: path.to_owned(),
-            });
+        if let Some(path) = self.plan.changed_file() {
+            return Err(SuperviseError::Process(format!(
+                "{} has ended, and {} has changed since it was started: another program may compute other motions; put back the one that the run was begun with",
+                self.plan.name,
+                path.display()
+            )));
         }
         self.last_words = last_words(manifest, &self.plan.name, Position::Free);
         self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
@@ -152,11 +153,6 @@ impl Child {
         true
     }
 
-    /// Returns a file of its command that has changed since it was started first.
-    pub(crate) fn changed_file(&self) -> Option<&Path> {
-        self.plan.changed_file()
-    }
-
     pub(crate) fn plan(&self) -> &StagePlan {
         &self.plan
     }
@@ -172,11 +168,6 @@ impl Child {
     /// Returns which stage it is; `None` for an additional process.
     pub(crate) fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
-    }
-
-    /// Returns whether it is a follower, and not in the stream.
-    pub(crate) fn follows(&self) -> bool {
-        FollowerId::by_name(self.name()).is_some()
     }
 
     /// Returns when the process was started.
@@ -227,7 +218,7 @@ impl Child {
     /// Counts a death against the restart policy.
     pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
-            return Err(SuperviseError::Permanent { message });
+            return Err(SuperviseError::Process(message));
         }
         let policy = self.plan.restart;
         let window = Duration::try_from_secs_f64(policy.window_s).unwrap_or(Duration::MAX);
@@ -236,24 +227,19 @@ impl Child {
         if self.deaths.len() <= policy.limit {
             return Ok(());
         }
-        Err(SuperviseError::TooManyDeaths {
-            stage: self.name().to_owned(),
-            times: self.deaths.len(),
-            window_s: policy.window_s,
-            cause: death.cause.clone(),
-            output: death
-                .last_output
-                .as_ref()
-                .map_or(String::new(), |line| format!(" ({line})")),
-        })
+        Err(SuperviseError::Process(format!(
+            "{} died {} times within {} s, the last time by {}{}; giving up",
+            self.name(),
+            self.deaths.len(),
+            policy.window_s,
+            death.cause,
+            death.output()
+        )))
     }
 
     /// Returns the failure of an ended process if a restart would repeat it.
     pub(crate) fn permanent_failure(&mut self) -> Option<String> {
-        let status = self.status?;
-        if status.code() != Some(PERMANENT) {
-            return None;
-        }
+        self.status?;
         let death = self.death();
         self.message_if_permanent(&death)
     }
@@ -303,10 +289,11 @@ impl Child {
         }
         match self.has_exited() {
             true => Ok(()),
-            false => Err(SuperviseError::Undying {
-                stage: self.name().to_owned(),
-                pid: self.pid(),
-            }),
+            false => Err(SuperviseError::System(format!(
+                "{} (process {}) does not end although it was killed: the kernel holds it, as it does while a disk or a network folder does not answer",
+                self.name(),
+                self.pid()
+            ))),
         }
     }
 

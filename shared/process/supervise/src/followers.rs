@@ -50,7 +50,7 @@ pub(crate) struct Followers<'a> {
     are_awaited: bool,
     clock: Clock,
     /// Those that are not restarted any more, and why.
-    given_up: Vec<(usize, SuperviseError)>,
+    given_up: Vec<(usize, String)>,
 }
 
 /// The decision about a follower that the run waits for.
@@ -86,8 +86,8 @@ impl<'a> Followers<'a> {
     }
 
     /// A follower is not restarted any more.
-    pub fn give_up(&mut self, follower: usize, error: SuperviseError) {
-        self.given_up.push((follower, error));
+    pub fn give_up(&mut self, follower: usize, reason: String) {
+        self.given_up.push((follower, reason));
     }
 
     /// Returns whether a process is a follower that is not restarted any more.
@@ -113,7 +113,7 @@ impl<'a> Followers<'a> {
     /// Returns how the run ends when no follower is behind any more.
     pub fn end(&mut self) -> Result<Ending, SuperviseError> {
         match self.given_up.pop() {
-            Some((_, error)) => Err(error),
+            Some((_, reason)) => Err(SuperviseError::Process(reason)),
             None => Ok(Ending::Complete),
         }
     }
@@ -177,7 +177,7 @@ mod tests {
         assert!(followers.is_behind(FOLLOWER) && !followers.is_behind(MASKING));
         assert_eq!(followers.behind(), [FOLLOWER]);
         assert!(matches!(followers.end(), Ok(Ending::Complete)));
-        followers.give_up(FOLLOWER, SuperviseError::TransportStuck);
+        followers.give_up(FOLLOWER, "it dies".to_owned());
         assert!(!followers.is_behind(FOLLOWER) && followers.behind().is_empty());
         assert!(followers.end().is_err());
     }

@@ -45,9 +45,11 @@ impl Guardian {
         root: &Path,
         groups: impl IntoIterator<Item = u32>,
     ) -> Result<Self, SuperviseError> {
-        let failed = |source| SuperviseError::Guardian {
-            command: command.join(" "),
-            source,
+        let failed = |error: io::Error| {
+            let command = command.join(" ");
+            SuperviseError::System(format!(
+                "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {error}"
+            ))
         };
         let (program, arguments) = command
             .split_first()

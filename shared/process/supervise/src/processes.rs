@@ -47,10 +47,7 @@ impl Processes {
         let plan = run.plan;
         for stage in &plan.stages {
             let child = Child::spawn(stage, &plan.manifest, &run.starter(), Position::Free)?;
-            run.say(Event::Started {
-                stage: &stage.name,
-                pid: child.pid(),
-            });
+            run.note(&format!("{:20} pid {}", stage.name, child.pid()));
             self.children.push(child);
         }
         Ok(())
@@ -98,7 +95,7 @@ impl Processes {
     /// it must not be ended.
     pub fn why_not_again(&self, mut processes: impl Iterator<Item = usize>) -> Option<String> {
         processes.find_map(|i| {
-            let (name, path) = (self[i].name(), self[i].changed_file()?.display());
+            let (name, path) = (self[i].name(), self[i].plan().changed_file()?.display());
             Some(format!(
                 "{name} could not be started again, since {path} has changed; `gyre swap {name}` takes the new one"
             ))
@@ -183,6 +180,6 @@ impl Processes {
         let children = self.children.iter_mut().enumerate();
         let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));
         let failed = judged.find_map(|(_, child)| child.permanent_failure());
-        failed.map_or(Ok(()), |message| Err(SuperviseError::Permanent { message }))
+        failed.map_or(Ok(()), |message| Err(SuperviseError::Process(message)))
     }
 }

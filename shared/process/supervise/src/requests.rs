@@ -10,7 +10,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, StagePlan, SuperviseError,
+    StagePlan, SuperviseError,
     process_status::status_of,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
@@ -212,10 +212,9 @@ impl Supervisor<'_> {
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
         self.swaps.has_swapped(child.plan(), self.poses.count());
-        self.run.say(Event::Swapped {
-            stage: child.name(),
-            command: &child.plan().command,
-        });
+        let (name, command) = (child.name(), child.plan().command.join(" "));
+        self.run
+            .note(&format!("{name} is `{command}` from here on"));
         self.swaps.await_trial(process, child, client);
     }
 

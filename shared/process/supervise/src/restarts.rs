@@ -38,14 +38,13 @@ impl Supervisor<'_> {
         for i in dead {
             let child = &mut self.processes[*i];
             let death = child.death();
-            self.run.say(Event::Died {
-                stage: child.name(),
-                death: &death,
-            });
+            let (name, output) = (child.name(), death.output());
+            self.run
+                .note(&format!("{name} died by {}{output}", death.cause));
             if !death.killed {
                 backoff = backoff.max(child.backoff());
                 if !child.is_on_trial() {
-                    failure = Some(format!("{} died after it: {death}", child.name()));
+                    failure = Some(format!("{name} died after it: {death}"));
                 }
             }
             self.require_restart(*i, &death)?;
@@ -75,7 +74,9 @@ impl Supervisor<'_> {
         let has_gone_back = self.swaps.go_back(process, child, begun, reason, poses);
         if has_gone_back {
             let stage = &begun.name;
-            self.run.say(Event::WentBack { stage, reason });
+            self.run.note(&format!(
+                "{stage} goes back to the program before: {reason}"
+            ));
         }
         has_gone_back
     }
@@ -92,11 +93,14 @@ impl Supervisor<'_> {
     }
 
     fn say_restarted(&mut self, processes: &[usize]) {
-        let only = match processes {
-            [process] => Some(self.processes[*process].name()),
-            _ => None,
-        };
-        self.run.say(Event::Restarted { only });
+        match processes {
+            [process] => {
+                let name = self.processes[*process].name();
+                self.run.note(&format!("restarted {name}"));
+            }
+            // All stages, or all but a live source.
+            _ => self.run.note("restarted the stages from the journal"),
+        }
     }
 
     /// Ends processes and starts replacements; one of the replacements may be the process on
@@ -132,10 +136,9 @@ impl Supervisor<'_> {
         loop {
             let (manifest, starter) = (self.run.manifest(), self.run.starter());
             match self.processes[process].respawn(manifest, &starter, newest) {
-                Err(error) if error.is_of_one_process() => {
-                    let reason = error.to_string();
+                Err(SuperviseError::Process(reason)) => {
                     if !self.go_back(process, &reason) {
-                        return Err(error);
+                        return Err(SuperviseError::Process(reason));
                     }
                     self.processes[process].start_error = Some(reason);
                 }
@@ -184,12 +187,11 @@ impl Supervisor<'_> {
         dead.retain(|i| self.followers.is_behind(*i));
         for follower in dead {
             match self.recover_follower(follower) {
-                Err(error) if error.is_of_one_process() => {
-                    self.run.say(Event::GaveUp {
-                        follower: self.processes[follower].name(),
-                        error: &error,
-                    });
-                    self.followers.give_up(follower, error);
+                Err(SuperviseError::Process(reason)) => {
+                    let name = self.processes[follower].name();
+                    self.run
+                        .note(&format!("{reason}: odometry goes on without {name}"));
+                    self.followers.give_up(follower, reason);
                 }
                 recovered => recovered?,
             }

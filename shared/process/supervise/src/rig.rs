@@ -13,7 +13,6 @@ use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
     StageId, Topic,
 };
-use gyre_run::RestartPolicy;
 use gyre_stage::{
     Launch, Manifest, StageError,
     reader::Port,
@@ -25,7 +24,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Death, END_TIMEOUT, Scheduling, StagePlan, SuperviseError,
+    Death, Scheduling, StagePlan, SuperviseError,
     child::Child,
     clean,
     guardian::Guardian,
@@ -133,15 +132,8 @@ impl<'a> Rig<'a> {
         scheduling: &Scheduling,
     ) -> Result<Process, SuperviseError> {
         let plan = StagePlan {
-            name: name.to_owned(),
-            command: command.to_vec(),
-            programs: Vec::new(),
-            directory: None,
             scheduling: scheduling.clone(),
-            restart: RestartPolicy::default(),
-            outlives_restarts: false,
-            restarts_all: false,
-            end_timeout: END_TIMEOUT,
+            ..StagePlan::new(name, command.to_vec())
         };
         let starter = Starter::new(self.signals, &self.guardian);
         Ok(Process {

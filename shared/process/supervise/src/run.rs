@@ -73,6 +73,13 @@ impl<'a> Run<'a> {
         (self.observe)(event);
     }
 
+    /// Reports a sentence, unless it is empty.
+    pub fn note(&mut self, sentence: &str) {
+        if !sentence.is_empty() {
+            self.say(Event::Note(sentence));
+        }
+    }
+
     /// Returns whether a process is a stage that has not opened its topics.
     pub fn is_starting(&self, child: &Child) -> bool {
         let stage = child.stage();

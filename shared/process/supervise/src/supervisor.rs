@@ -183,8 +183,7 @@ impl<'a> Supervisor<'a> {
             && let Some(sentence) = sink::notice(self.run.manifest())
         {
             self.has_notice = true;
-            let sentence = &sentence;
-            self.run.say(Event::Note { sentence });
+            self.run.note(&sentence);
         }
         let standby = self.swaps.pid();
         let others = standby

@@ -92,9 +92,7 @@ impl Swaps {
                     ready: None,
                 });
             }
-            Err(error) if error.is_of_one_process() => {
-                client.answer(&Answer::Refused(error.to_string()));
-            }
+            Err(SuperviseError::Process(reason)) => client.answer(&Answer::Refused(reason)),
             Err(error) => return Err(error),
         }
         Ok(())
@@ -195,10 +193,7 @@ impl Standby {
     fn why_not(&mut self) -> Option<String> {
         if self.child.has_exited() {
             let death = self.child.death();
-            let output = death
-                .last_output
-                .map_or(String::new(), |line| format!(" ({line})"));
-            return Some(format!("it ended by {}{output}", death.cause));
+            return Some(format!("it ended by {}{}", death.cause, death.output()));
         }
         let has_gone = self.client.has_gone();
         has_gone.then(|| "who has asked for it has gone".to_owned())
