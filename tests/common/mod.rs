@@ -145,7 +145,7 @@ impl Run {
 
     /// The same where the recording goes by another name.
     pub fn of_recording_named(name: &str) -> Self {
-        Self::small().argument("--data", name)
+        Self::small().option(name)
     }
 
     /// A run of small rasters whose recording is still to be named.
@@ -191,9 +191,9 @@ impl Run {
         Self::of_demo().data(recording::demo())
     }
 
-    /// The same with `--data`.
+    /// The same of this recording.
     pub fn data(self, folder: &Path) -> Self {
-        self.argument("--data", folder.to_str().unwrap())
+        self.option(folder.to_str().unwrap())
     }
 
     /// The same with `--rate`.
@@ -224,9 +224,9 @@ impl Run {
         self
     }
 
-    /// The same with an option that has no value.
-    pub fn option(mut self, option: &str) -> Self {
-        self.arguments.push(option.to_owned());
+    /// The same with another word.
+    pub fn option(mut self, word: &str) -> Self {
+        self.arguments.push(word.to_owned());
         self
     }
 

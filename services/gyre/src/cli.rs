@@ -16,7 +16,8 @@ use clap::{Args, Parser, Subcommand};
 use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
-use gyre_terminal::inputs::{ConfigArguments, Given, InputError, Inputs};
+use gyre_terminal::Failure;
+use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
 use gyre_tools::doctor::DoctorArguments;
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
@@ -168,12 +169,9 @@ pub struct RunArguments {
     /// or refined (source.from).
     #[arg(long, value_name = "TOPIC")]
     pub from: Option<String>,
-    /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
-    #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
-    pub radar: Option<String>,
     /// The topic of ROS 2 on which Navtech's driver publishes azimuths, as in /radar_data/fft_data:
     /// run live (source.kind, source.topic, run.mode).
-    #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
+    #[arg(long, value_name = "TOPIC")]
     pub ros2: Option<String>,
     /// The constants of the radar, of `gyre calibrate`, which override the configuration.
     #[arg(long, value_name = "FILE")]
@@ -223,9 +221,8 @@ impl From<DemoArguments> for RunArguments {
     fn from(demo: DemoArguments) -> Self {
         Self {
             inputs: Inputs {
-                config: Some("gyre:configs/demo.toml".into()),
+                what: vec!["gyre:configs/demo.toml".into()],
                 set: demo.set,
-                ..Inputs::default()
             },
             options: demo.options,
             ..Self::default()
@@ -246,11 +243,13 @@ impl RunOptions {
 
 impl RunArguments {
     /// Returns the inputs to run.
-    pub fn given(&self) -> Result<Given, InputError> {
-        let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
-        // A topic of ROS 2 is a radar too.
-        given.clone().with_radar(self.ros2.as_ref())?;
-        Ok(given)
+    pub fn given(&self) -> Result<Given, Failure> {
+        let given = self.inputs.given()?;
+        let has_source = given.data.is_some() || given.radar.is_some();
+        match self.ros2.is_some() && has_source {
+            true => Err("--ros2 names a radar, and another source is named too: name one".into()),
+            false => Ok(given),
+        }
     }
 }
 

@@ -19,8 +19,8 @@ use crate::{
     run::resolve,
 };
 
-/// The configuration of a test without `--config` and `--data`: the shape of the program's messages
-/// matters, not the accuracy.
+/// The configuration of a test that names neither a configuration nor a recording: the shape of the
+/// program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
 /// Places for observers in addition to the places of a run; the test uses some.
 const OBSERVERS: usize = 4;
@@ -143,7 +143,7 @@ fn configuration(
                 .chain(python)
                 .chain(lossless)
                 .collect(),
-            ..arguments.inputs.clone()
+            what: arguments.inputs.what.clone(),
         },
         ..RunArguments::default()
     })?;

@@ -46,8 +46,6 @@ pub enum AutomaticError {
     /// The configuration of a recorded run, or constants of a radar that TOML cannot hold.
     #[error(transparent)]
     Configuration(#[from] ConfigurationError),
-    #[error("the recording's configuration: {0}")]
-    Recorded(String),
 }
 
 /// Returns the settings of a recording from its format, its `dataset.toml` and its scans; for a
@@ -98,7 +96,8 @@ pub fn radar_constants(
 fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let recording = gyre_recording::open_recording(data)?;
     let parsed: Result<Table, toml::de::Error> = recording.head().configuration.parse();
-    let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
+    let mut table = parsed
+        .map_err(|error| ConfigurationError(format!("the recording's configuration: {error}")))?;
     // The recording itself describes its scans.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
     let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);

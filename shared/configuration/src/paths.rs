@@ -54,7 +54,8 @@ impl Named {
         let own = shipped(named);
         let mut table = match own.as_deref().and_then(gyre_shipped::text) {
             Some(text) => strict::parse(named, text)?,
-            None => strict::read_table(named).map_err(|error| unknown(named, error))?,
+            None if is_name(named) && !named.exists() => return Err(unknown(named)),
+            None => strict::read_table(named)?,
         };
         let file = match &own {
             Some(_) => named.to_owned(),
@@ -100,8 +101,7 @@ pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
 }
 
 fn put(path: &mut String, found: PathBuf) -> Result<(), ConfigurationError> {
-    let text = found.to_str().map(str::to_owned);
-    *path = text.ok_or(ConfigurationError::Name(found))?;
+    *path = strict::text_of(&found)?.to_owned();
     Ok(())
 }
 
@@ -162,17 +162,16 @@ pub fn suggestion(named: &Path) -> String {
     strict::suggestion(&named.display().to_string(), &known)
 }
 
-/// Returns the error for a name that is neither a file nor known.
-fn unknown(named: &Path, error: ConfigurationError) -> ConfigurationError {
-    let is_name = named.extension().is_none() && named.file_name() == Some(named.as_os_str());
-    match is_name && !named.exists() {
-        true => {
-            let suggestion = suggestion(named);
-            let name = named.display().to_string();
-            ConfigurationError::Unknown { name, suggestion }
-        }
-        false => error,
-    }
+/// Returns the error for a name that neither a file nor a configuration of the program has.
+pub fn unknown(named: &Path) -> ConfigurationError {
+    let (name, suggestion) = (named.display(), suggestion(named));
+    ConfigurationError(format!(
+        "`{name}` is neither a file nor a configuration of the program, which `gyre config` lists{suggestion}"
+    ))
+}
+
+fn is_name(named: &Path) -> bool {
+    named.extension().is_none() && named.file_name() == Some(named.as_os_str())
 }
 
 /// The places where the files of a configuration are looked for.

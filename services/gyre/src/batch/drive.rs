@@ -41,8 +41,7 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
 
 fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     // The recording may have been removed since the batch began.
-    let given = &arguments.inputs;
-    let path = given.data.as_ref().or(given.what.first());
+    let path = arguments.inputs.what.last();
     let is_missing = |path: &Path| matches!(path.try_exists(), Ok(false));
     if let Some(path) = path.filter(|path| is_missing(path) && shipped(path).is_none()) {
         return Ok(End::unchecked(format!(

@@ -21,15 +21,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         );
     }
     let overrides = overrides(arguments, &given)?;
-    let mut configuration = match (&given.configuration, &given.data) {
-        (Some(named), _) => gyre_terminal::inputs::configuration(named, &overrides)?,
-        (None, Some(data)) => {
-            let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
-            print::note(sentence);
-            configuration
-        }
-        (None, None) => Configuration::of_overrides(&overrides)?,
-    };
+    let mut configuration = given.read(&overrides)?;
     if given.data.is_some() {
         configuration.simulation = None;
     }

@@ -23,8 +23,6 @@ pub enum Kind {
     Data,
     /// The folder of a run's results.
     Results,
-    /// A folder whose name is also the name of a configuration in the program.
-    Ambiguous,
     /// The address of a radar.
     Radar,
     /// None of these.
@@ -39,12 +37,10 @@ impl Kind {
         let is_recording = ending.is_some_and(|ending| RECORDINGS.contains(&ending));
         let text = word.to_str().unwrap_or_default();
         if word.is_dir() {
-            return match () {
-                () if gyre_shipped::configuration(word).is_some() => Self::Ambiguous,
-                () if word.join("config.toml").is_file() && word.join("journal").is_dir() => {
-                    Self::Results
-                }
-                () => Self::Data,
+            let is_of_run = word.join("config.toml").is_file() && word.join("journal").is_dir();
+            return match is_of_run {
+                true => Self::Results,
+                false => Self::Data,
             };
         }
         match () {
