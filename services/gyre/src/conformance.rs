@@ -72,7 +72,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             .into_iter()
             .filter(|stage| configuration.has(*stage))
             .collect(),
-        prepare: Box::new(move |root| match &checked.recording {
+        prepare: Box::new(move |root| match &checked.scans.recording {
             Some(recording) => recording.listing.write(root),
             None => Ok(()),
         }),

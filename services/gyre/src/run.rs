@@ -4,10 +4,8 @@ mod resolve;
 
 use std::{
     env,
-    ffi::OsString,
-    os::unix::process::CommandExt,
     path::{Path, PathBuf},
-    process::{Command, ExitCode},
+    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -26,7 +24,7 @@ use gyre_stage::{
 };
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_tools::operate::detach_if_asked;
 
 use crate::{
@@ -141,8 +139,8 @@ fn make_ready(
         configuration,
         programs,
         resolved.dataset,
-        checked.scans,
-        checked.recording.as_ref().map(|it| &it.fingerprint),
+        checked.scans.count,
+        checked.scans.recording.as_ref().map(|it| &it.fingerprint),
     )?;
     if let Some((begun_with, holds)) = earlier.identity() {
         begun_with.require_recording(&identity, out.path(), holds)?;
@@ -197,7 +195,7 @@ fn play(
     prepare(configuration, &ready, &out, unfinished)?;
     let plan = plan_of(resolved, manifest(resolved, programs, &out, checked, &root));
     plan.manifest.write(&resolved.to_toml()?)?;
-    if let Some(recording) = &checked.recording {
+    if let Some(recording) = &checked.scans.recording {
         let path = root.path().display();
         let failed = |error| format!("cannot write to {path}: {error}");
         recording.listing.write(root.path()).map_err(failed)?;
@@ -207,7 +205,7 @@ fn play(
     describe_objects(resolved)?.iter().for_each(print::note);
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
-    let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
+    let mut progress = Progress::new(checked.scans.count, resumed, &checked.footprint);
     if resolved.is_radar() {
         progress.watch_radar(resolved.data(), plan.manifest.clone());
     }
@@ -226,15 +224,14 @@ fn play(
     progress.finish();
     notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
-        let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
-        return start_over(resumed, begins_anew);
+        return start_over(resumed);
     }
     let session = Session {
-        scans: checked.scans,
+        scans: checked.scans.count,
         resumed,
-        damage: checked.damage.as_deref(),
-        needs_all: checked.needs_all,
+        damage: checked.scans.damage.as_deref(),
+        needs_all: checked.scans.needs_all,
         wall: started.elapsed(),
         footprint: Some(&checked.footprint),
         ending: report.as_ref().ok().map(|report| report.ending),
@@ -263,7 +260,7 @@ fn prepare(
             earlier::begin(out, &ready.identity, &resolved, ready.recording_goes_on)?;
         }
     }
-    if let Some(truth) = &ready.checked.truth {
+    if let Some(truth) = &ready.checked.scans.truth {
         storage::write(&out.join(SIMULATED_TRUTH), truth)?;
     }
     Ok(storage::create_folder(&out.join("log"))?)
@@ -434,39 +431,13 @@ fn has_started_over_at(poses: usize) -> bool {
 }
 
 /// Executes the same command again. The transport hung on the remains of a dead process, which are
-/// removed now. The run resumes from the journal; if it was replacing a complete run and has
-/// computed nothing, it begins again as requested.
-fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
+/// removed now: it cannot be used again in this process. The run resumes from the journal.
+fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over",
     );
-    let failed = Command::new(own())
-        .args(again(env::args_os(), begins_anew))
-        .env(STARTED_OVER, resumed.to_string())
-        .exec();
+    // Computed poses are not discarded.
+    let arguments = env::args_os().filter(|argument| argument != "--fresh");
+    let failed = execute_again(arguments, STARTED_OVER, &resumed.to_string());
     Err(format!("cannot start over: {failed}").into())
-}
-
-/// Returns the arguments of a run that starts over. Computed poses are not discarded.
-fn again(
-    arguments: impl Iterator<Item = OsString>,
-    begins_anew: bool,
-) -> impl Iterator<Item = OsString> {
-    arguments
-        .skip(1)
-        .filter(move |argument| begins_anew || argument != "--fresh")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_a_run_that_has_computed_nothing_begins_anew_again() {
-        let given = || ["gyre", "run", "--fresh", "a.toml"].map(OsString::from);
-        let resumed: Vec<_> = again(given().into_iter(), false).collect();
-        assert_eq!(resumed, ["run", "a.toml"]);
-        let begun: Vec<_> = again(given().into_iter(), true).collect();
-        assert_eq!(begun, ["run", "--fresh", "a.toml"]);
-    }
 }

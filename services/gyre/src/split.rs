@@ -1,11 +1,11 @@
 //! The link of a run that is split between two machines.
 
-use std::{env, os::unix::process::CommandExt, process::Command};
+use std::env;
 
 use gyre_configuration::Configuration;
 use gyre_link::ONE_THREAD;
 use gyre_run::LinkConfig;
-use gyre_terminal::{Failure, own};
+use gyre_terminal::{Failure, execute_again};
 
 #[cfg(feature = "link")]
 pub use gyre_link::{run_base, run_robot};
@@ -33,10 +33,7 @@ pub fn set_environment() -> Result<(), Failure> {
     if env::var_os(name).is_some_and(|set| set == value) {
         return Ok(());
     }
-    let failed = Command::new(own())
-        .args(env::args_os().skip(1))
-        .env(name, value)
-        .exec();
+    let failed = execute_again(env::args_os(), name, value);
     Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 

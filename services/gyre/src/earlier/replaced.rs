@@ -55,7 +55,7 @@ fn is_whole(out: &Out) -> bool {
 
 /// Returns whether the run that is to replace a complete one has computed nothing: that is given
 /// back.
-pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
+fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
     }
