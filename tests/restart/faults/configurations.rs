@@ -429,24 +429,15 @@ pub fn doppler() -> Configuration {
     }
 }
 
-/// A network that masks each scan for itself.
-pub fn network_of_one_scan() -> Configuration {
-    Configuration {
-        name: "network_of_one_scan",
-        can: runtime_is_installed,
-        run: |recording| Run::small().data(recording).masked_by(&card("single-127")),
-        stateful: "masking",
-        differs_from: Some(Run::of_recording),
-        ..SMALL
-    }
-}
-
 /// A network that takes the scan before, too.
 pub fn network_of_two_scans() -> Configuration {
     Configuration {
         name: "network_of_two_scans",
+        can: runtime_is_installed,
         run: |recording| Run::small().data(recording).masked_by(&card("pair-127")),
-        ..network_of_one_scan()
+        stateful: "masking",
+        differs_from: Some(Run::of_recording),
+        ..SMALL
     }
 }
 
@@ -455,11 +446,8 @@ pub fn network_in_rten() -> Configuration {
     Configuration {
         name: "network_in_rten",
         can: || true,
-        run: |recording| {
-            let run = Run::small().data(recording).masked_by(&card("pair-127"));
-            run.set("masking.backend=rten")
-        },
-        ..network_of_one_scan()
+        run: |recording| (network_of_two_scans().run)(recording).set("masking.backend=rten"),
+        ..network_of_two_scans()
     }
 }
 

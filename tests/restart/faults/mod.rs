@@ -18,7 +18,6 @@ mod limits;
 mod results;
 mod scene;
 mod tools;
-mod watch;
 
 use std::env;
 
@@ -53,12 +52,10 @@ mod kinds {
 
     kinds! {
         each_process_is_killed: kills::each;
-        processes_are_killed_together: kills::together;
         a_process_is_killed_as_it_starts: kills::at_the_start;
         a_process_is_killed_as_it_writes: kills::at_a_write;
         a_process_is_killed_again_and_again: kills::again_and_again;
         a_process_is_killed_after_the_last_pose: kills::after_the_last_pose;
-        a_process_is_asked_to_end: kills::politely;
         processes_are_killed_in_storms: kills::storms;
         the_supervisor_is_killed: kills::supervisor;
         the_supervisor_is_killed_as_it_writes_results: kills::at_the_results;
@@ -66,7 +63,7 @@ mod kinds {
         the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
         the_disk_is_full: results::disk_full, Mounts;
         input_and_output_fail: results::io_errors, Fiu;
-        files_may_not_grow: results::file_size_limit, Prlimit;
+        files_may_not_grow: limits::file_sizes, Prlimit;
         the_results_are_read_only: results::read_only, Mounts, OtherUser;
         the_results_vanish: results::vanish;
         the_recording_has_gaps: input::gaps;
@@ -99,26 +96,24 @@ macro_rules! row {
 
 rows! {
     {}
-    plain: each_process_is_killed processes_are_killed_together a_process_is_killed_as_it_starts
-        a_process_is_killed_again_and_again a_process_is_asked_to_end the_supervisor_is_killed
-        the_run_is_interrupted the_run_is_interrupted_as_it_starts the_recording_has_gaps
-        the_recording_vanishes;
+    plain: each_process_is_killed processes_are_killed_in_storms a_process_is_killed_as_it_starts
+        a_process_is_killed_again_and_again the_supervisor_is_killed the_run_is_interrupted
+        the_run_is_interrupted_as_it_starts the_recording_has_gaps the_recording_vanishes;
     slam: each_process_is_killed a_process_is_killed_as_it_writes processes_are_killed_in_storms
         the_supervisor_is_killed the_supervisor_is_killed_as_it_writes_results the_disk_is_full
         input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
         the_clock_is_set memory_runs_out descriptors_run_out;
     loops: each_process_is_killed;
-    gap: processes_are_killed_together;
+    gap: each_process_is_killed;
     unreadable: each_process_is_killed;
     lost_azimuths: each_process_is_killed a_process_is_killed_again_and_again;
     standstill: a_process_is_killed_again_and_again;
     joint_search: each_process_is_killed;
     gyro_and_wheels: each_process_is_killed the_supervisor_is_killed;
     doppler: the_supervisor_is_killed;
-    network_of_one_scan: each_process_is_killed;
-    network_of_two_scans: each_process_is_killed processes_are_killed_together
+    network_of_two_scans: each_process_is_killed processes_are_killed_in_storms
         a_process_is_killed_again_and_again;
-    network_at_an_unreadable_scan: processes_are_killed_together;
+    network_at_an_unreadable_scan: each_process_is_killed;
     network_in_rten: each_process_is_killed;
     simulation: each_process_is_killed the_supervisor_is_killed;
     replayed: each_process_is_killed;
@@ -130,22 +125,21 @@ mod nightly {
         {#[ignore = ".ci/nightly: more rows"]}
         plain: a_process_is_killed_after_the_last_pose;
         small_map: a_process_is_killed_again_and_again the_supervisor_is_killed;
-        gap: each_process_is_killed;
         gyro_and_wheels: processes_are_killed_in_storms;
         doppler: each_process_is_killed;
         network_of_two_scans: the_supervisor_is_killed;
-        network_at_a_gap: processes_are_killed_together;
+        network_at_a_gap: each_process_is_killed;
         objects: a_process_is_killed_again_and_again the_run_is_interrupted;
         gnss: a_process_is_killed_again_and_again;
-        loops: processes_are_killed_together a_process_is_killed_as_it_starts
-            a_process_is_killed_as_it_writes a_process_is_killed_after_the_last_pose
+        loops: a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes
+            a_process_is_killed_after_the_last_pose
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
             input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
             the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
             descriptors_run_out;
-        radiate: each_process_is_killed processes_are_killed_together
-            a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes
+        radiate: each_process_is_killed a_process_is_killed_as_it_starts
+            a_process_is_killed_as_it_writes
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
             input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish

@@ -11,7 +11,7 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
-    tools::{AS_NOBODY, Mount, give_to_nobody, limit},
+    tools::{AS_NOBODY, Mount, give_to_nobody},
 };
 use crate::common::{Run, assert_nothing_left_of, wrapped};
 
@@ -76,39 +76,6 @@ pub fn io_errors(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let failing = wrapped(&["fiu-run", "-f", "", "-x", "-c", &command], &run.command());
     let ended = run.start_as(failing).finish();
-    scene.survived(&run, &ended);
-    Some(())
-}
-
-/// No file may become longer: of the whole run, or of a process in the middle. A signal reports the
-/// limit, unless the signal is ignored.
-pub fn file_size_limit(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let signal = if scene.one_in(2) {
-        "trap '' XFSZ; "
-    } else {
-        ""
-    };
-    let mut shell = vec!["sh", "-c"];
-    let start = format!("{signal}exec \"$@\"");
-    shell.extend([&start, "sh"]);
-    let most = (scene.configuration.undisturbed().bytes as f64).log2();
-    let bytes = scene.rng.random_range(12.0..most).exp2() as u64;
-    let at_start = format!("--fsize={bytes}:");
-    if scene.one_in(3) {
-        shell.extend(["prlimit", &at_start]);
-        let ended = run.start_as(wrapped(&shell, &run.command())).finish();
-        scene.survived(&run, &ended);
-        return Some(());
-    }
-    let mut running = run.start_as(wrapped(&shell, &run.command()));
-    scene.moment(&mut running)?;
-    let pid = match scene.one_in(3) {
-        true => running.pid(),
-        false => scene.stage(&running)?,
-    };
-    limit(pid, "fsize", bytes);
-    let ended = running.finish();
     scene.survived(&run, &ended);
     Some(())
 }

@@ -75,16 +75,6 @@ impl<'a> Scene<'a> {
         (!running.is_over()).then_some(())
     }
 
-    /// Waits until all processes live. `None` if the run is over.
-    pub fn await_processes(&mut self, running: &mut Running) -> Option<()> {
-        let names = self.processes();
-        self.until(running, |running| {
-            let living = running.stages();
-            let all = names.iter().all(|name| living.contains_key(name));
-            all.then_some(())
-        })
-    }
-
     /// A living stage or follower.
     pub fn stage(&mut self, running: &Running) -> Option<Pid> {
         let stages: Vec<Pid> = running.stages().into_values().collect();
@@ -98,17 +88,17 @@ impl<'a> Scene<'a> {
         Some(())
     }
 
-    /// Kills a process once it lives. `None` if the run is over.
+    /// Kills a process once it lives, or asks it to end. `None` if the run is over.
     pub fn kill(&mut self, running: &mut Running, name: &str) -> Option<()> {
-        let pid = self.until(running, |running| running.stages().get(name).copied())?;
-        send(pid, Signal::KILL);
-        Some(())
-    }
-
-    fn until<T>(&self, running: &mut Running, look: impl Fn(&Running) -> Option<T>) -> Option<T> {
         while !running.is_over() {
-            if let Some(seen) = look(running) {
-                return Some(seen);
+            if let Some(pid) = running.stages().get(name) {
+                let signal = if self.one_in(4) {
+                    Signal::TERM
+                } else {
+                    Signal::KILL
+                };
+                send(*pid, signal);
+                return Some(());
             }
             thread::sleep(LOOK);
         }
