@@ -72,7 +72,7 @@ impl Running {
     /// Waits until there is a guardian other than `not`.
     pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
         self.until("a guardian", |running| {
-            processes::guardian_of(running.pid()).filter(|pid| Some(*pid) != not)
+            processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
         })
     }
 

@@ -1,14 +1,13 @@
 //! Programs of the system that make faults.
 
 use std::{
-    ffi::OsStr,
     fs::{self, Permissions},
     os::unix::fs::{PermissionsExt, chown},
     path::{Path, PathBuf},
     process::Command,
 };
 
-use crate::common::{Pid, Run};
+use crate::common::{Pid, Run, processes::is_alive};
 
 /// A user and group without rights: nobody.
 const NOBODY: u32 = 65534;
@@ -31,10 +30,6 @@ pub enum Need {
 impl Need {
     /// Returns the name of the missing tool; `None` if nothing is.
     pub fn missing(self) -> Option<&'static str> {
-        let works = |command: &[&str]| {
-            let output = Command::new(command[0]).args(&command[1..]).output();
-            output.is_ok_and(|output| output.status.success())
-        };
         let (there, missing) = match self {
             Self::Mounts => (
                 works(&[
@@ -85,18 +80,9 @@ pub fn faketime() -> Option<PathBuf> {
     folders.map(library).find(|path| path.is_file())
 }
 
-/// Executes a program that must succeed.
-pub fn execute<T: AsRef<OsStr>>(program: &str, arguments: impl IntoIterator<Item = T>) {
-    let mut command = Command::new(program);
-    command.args(arguments);
-    let output = command
-        .output()
-        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-    assert!(
-        output.status.success(),
-        "{command:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+fn works(command: &[&str]) -> bool {
+    let output = Command::new(command[0]).args(&command[1..]).output();
+    output.is_ok_and(|output| output.status.success())
 }
 
 /// Limits a resource of a process of this user, or of nobody. That the process is gone already is
@@ -104,20 +90,10 @@ pub fn execute<T: AsRef<OsStr>>(program: &str, arguments: impl IntoIterator<Item
 pub fn limit(pid: Pid, resource: &str, value: u64) {
     let (pid_option, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
     let prlimit = ["prlimit", &pid_option, &limit];
-    let limited = |command: &[&str]| {
-        let output = Command::new(command[0]).args(&command[1..]).output();
-        output.is_ok_and(|output| output.status.success())
-    };
     assert!(
-        limited(&prlimit) || limited(&[&AS_NOBODY[..], &prlimit].concat()) || !is_alive(pid),
+        works(&prlimit) || works(&[&AS_NOBODY[..], &prlimit].concat()) || !is_alive(pid),
         "cannot limit {resource} of {pid}"
     );
-}
-
-fn is_alive(pid: Pid) -> bool {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    stat.rsplit_once(") ")
-        .is_some_and(|(_, fields)| !fields.starts_with(['Z', 'X']))
 }
 
 /// A mounted file system. Dropped, it is unmounted.
@@ -126,32 +102,26 @@ pub struct Mount(PathBuf);
 impl Mount {
     /// A file system in memory.
     pub fn tmpfs(place: &Path, bytes: u64) -> Self {
-        let size = format!("size={bytes},mode=755");
-        Self::at(
-            place,
-            &[
-                OsStr::new("-t"),
-                "tmpfs".as_ref(),
-                "-o".as_ref(),
-                size.as_ref(),
-                "tmpfs".as_ref(),
-            ],
-        )
-    }
-
-    fn at(place: &Path, options: &[&OsStr]) -> Self {
         fs::create_dir_all(place).unwrap();
-        execute("mount", options.iter().copied().chain([place.as_os_str()]));
-        Self(place.to_owned())
+        let mount = Self(place.to_owned());
+        mount.mount(&[
+            "-t",
+            "tmpfs",
+            "-o",
+            &format!("size={bytes},mode=755"),
+            "tmpfs",
+        ]);
+        mount
     }
 
     /// Changes its options.
     pub fn remount(&self, options: &str) {
-        let options = format!("remount,{options}");
-        execute(
-            "mount",
-            ["-o".as_ref(), options.as_ref(), self.0.as_os_str()],
-        );
+        self.mount(&["-o", &format!("remount,{options}")]);
+    }
+
+    fn mount(&self, options: &[&str]) {
+        let place = self.0.to_str().unwrap();
+        assert!(works(&[&["mount"][..], options, &[place]].concat()), "{place}");
     }
 }
 
