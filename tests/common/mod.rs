@@ -15,6 +15,7 @@ pub mod recording;
 mod running;
 mod server;
 mod shared;
+mod spawned;
 mod watch;
 
 use std::{

@@ -121,7 +121,10 @@ impl Mount {
 
     fn mount(&self, options: &[&str]) {
         let place = self.0.to_str().unwrap();
-        assert!(works(&[&["mount"][..], options, &[place]].concat()), "{place}");
+        assert!(
+            works(&[&["mount"][..], options, &[place]].concat()),
+            "{place}"
+        );
     }
 }
 
