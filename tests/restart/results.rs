@@ -57,34 +57,24 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     assert!(summary["evaluation"]["rpe"].is_object());
 }
 
-#[test]
-fn a_run_whose_results_are_written_is_begun_anew() {
-    let run = Run::of_recording();
-    run.complete();
-    run.complete();
-    assert_eq!(run.summary()["resumed_after"], 0);
+/// Makes the journal one of another version.
+fn age(journal: &Path) {
+    let mut bytes = fs::read(journal).unwrap();
+    bytes[..16].copy_from_slice(b"gyre journal v9 ");
+    fs::write(journal, bytes).unwrap();
 }
 
 #[test]
-fn results_without_a_journal_are_replaced_only_if_that_is_asked_for() {
+fn results_without_a_journal_or_of_another_version_are_replaced_only_if_that_is_asked_for() {
     let run = Run::of_recording();
     run.complete();
+    age(&run.out().join("journal/poses.journal"));
+    run.finish()
+        .refused_with(&["poses.journal", "another version", "--fresh"]);
+    assert_eq!(run.clone().option("--fresh").complete(), undisturbed());
     fs::remove_dir_all(run.out().join("journal")).unwrap();
     run.finish()
         .refused_with(&["summary.json", "journal is missing", "--fresh"]);
-}
-
-#[test]
-fn a_journal_of_another_version_is_replaced_only_if_that_is_asked_for() {
-    let run = Run::of_recording();
-    run.complete();
-    let path = run.out().join("journal/poses.journal");
-    let mut bytes = fs::read(&path).unwrap();
-    bytes[..16].copy_from_slice(b"gyre journal v9 ");
-    fs::write(&path, bytes).unwrap();
-    run.finish()
-        .refused_with(&["poses.journal", "another version", "--fresh"]);
-    assert_eq!(run.option("--fresh").complete(), undisturbed());
 }
 
 #[test]
@@ -99,9 +89,7 @@ fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
     let journal = run.out().join("journal/poses.journal");
     for (number, run) in [run.clone(), other.clone(), other].iter().enumerate() {
         if number == 2 {
-            let mut bytes = fs::read(&journal).unwrap();
-            bytes[..16].copy_from_slice(b"gyre journal v9 ");
-            fs::write(&journal, bytes).unwrap();
+            age(&journal);
         }
         let odometry = run.odometry();
         let out = run.out().canonicalize().unwrap();
@@ -153,6 +141,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     is_there();
     run.complete();
     is_there();
+    assert_eq!(run.summary()["resumed_after"], 0, "it is begun anew");
 }
 
 #[test]
@@ -184,19 +173,6 @@ fn results_of_a_run_are_not_taken_for_those_of_an_unknown_one_while_another_begi
 }
 
 #[test]
-fn no_draft_of_a_result_is_left() {
-    let run = interrupted();
-    run.complete();
-    for folder in [run.out().to_owned(), run.out().join("journal")] {
-        let names = names(&folder);
-        assert!(
-            !names.iter().any(|name| name.ends_with(".tmp")),
-            "{names:?}"
-        );
-    }
-}
-
-#[test]
 fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
     for damage in [
         |path: &Path| fs::write(path, ""),
@@ -206,6 +182,11 @@ fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
         let config = run.out().join("config.toml");
         damage(&config).unwrap();
         assert_eq!(run.complete(), undisturbed());
+        for folder in [run.out().to_owned(), run.out().join("journal")] {
+            let names = names(&folder);
+            let has_draft = names.iter().any(|name| name.ends_with(".tmp"));
+            assert!(!has_draft, "{names:?}");
+        }
         assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
         assert_eq!(Run::of_file(&config).complete(), undisturbed());
     }
@@ -359,16 +340,4 @@ fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
         .refused_with(&["another configuration", "simulation.seed"]);
     assert_eq!(names(&run.out().join("recording/radar")), images);
     assert_eq!(run.complete(), stored().complete());
-}
-
-#[test]
-fn a_recording_is_not_replaced_while_another_run_plays_it() {
-    let run = stored();
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2);
-    let images = names(&run.out().join("recording/radar"));
-    let other = run.clone().set("simulation.seed=4").option("--fresh");
-    Ended::of(other.command()).refused_with(&["another command is writing to"]);
-    assert_eq!(names(&run.out().join("recording/radar")), images);
-    running.finish().succeeded();
 }

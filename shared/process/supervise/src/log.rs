@@ -252,27 +252,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    #[test]
-    fn a_log_that_is_too_long_keeps_its_end() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("stage.txt");
-        let mut log = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .unwrap();
-        log.write_all(&vec![b'x'; 3 * MAX as usize]).unwrap();
-        log.write_all(b"the end").unwrap();
-        bound(&path);
-        log.write_all(b"and on").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"and on");
-        let old = fs::read(folder.path().join("stage.txt.old")).unwrap();
-        assert_eq!(old.len() as u64, MAX);
-        assert!(old.ends_with(b"the end"));
-        bound(&path);
-        assert_eq!(fs::read(&path).unwrap(), b"and on");
-    }
-
     fn log(folder: &tempfile::TempDir) -> (Log, PathBuf) {
         let path = folder.path().join("stage.txt");
         (Log::at(&path).unwrap(), path)
@@ -306,18 +285,6 @@ mod tests {
         }
         let caught = format!("{said}{frames}cannot open the radar\n");
         assert_eq!(last_line(&caught), Some("cannot open the radar"));
-    }
-
-    #[test]
-    fn only_the_end_of_a_long_output_is_looked_at_whatever_its_bytes() {
-        let folder = tempfile::tempdir().unwrap();
-        let (mut log, _) = log(&folder);
-        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
-        log.output().write_all(b"\nthe end\n").unwrap();
-        assert_eq!(log.last_line().as_deref(), Some("the end"));
-        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
-        let line = log.last_line().unwrap();
-        assert_eq!(line.chars().count(), TAIL);
     }
 
     #[test]

@@ -121,35 +121,29 @@ mod tests {
         }
     }
 
-    fn owed(newest: Option<u64>, published: u64, due_in_s: i64) -> Option<Stall> {
-        let due_ns = clock::now_ns() + due_in_s * 1_000_000_000;
-        let source = Schedule { published, due_ns };
-        watchdog(newest).owed_by(Some(source), LIMIT)
-    }
-
     #[test]
-    fn nothing_is_owed_until_the_next_scan_is_due() {
-        assert_eq!(owed(None, 0, 3600), None);
-        assert_eq!(owed(Some(6), 7, 3600), None);
-    }
-
-    #[test]
-    fn a_published_scan_owes_its_pose() {
-        assert_eq!(owed(None, 1, 3600), Some(Stall::Pose { limit: LIMIT }));
-        assert_eq!(owed(Some(6), 8, 3600), Some(Stall::Pose { limit: LIMIT }));
-        assert_eq!(owed(Some(6), 8, -1), Some(Stall::Pose { limit: LIMIT }));
-    }
-
-    #[test]
-    fn a_source_owes_the_scan_that_is_due() {
-        assert_eq!(owed(None, 0, -1), Some(Stall::Scan { limit: LIMIT }));
-        assert_eq!(owed(Some(6), 7, -1), Some(Stall::Scan { limit: LIMIT }));
-    }
-
-    #[test]
-    fn a_source_without_a_schedule_owes_always() {
-        let owed = watchdog(Some(6)).owed_by(None, LIMIT);
-        assert_eq!(owed, Some(Stall::Pose { limit: LIMIT }));
+    fn a_published_scan_owes_its_pose_and_a_source_the_scan_that_is_due() {
+        let (pose, scan) = (Stall::Pose { limit: LIMIT }, Stall::Scan { limit: LIMIT });
+        for (newest, published, due_in_s, expected) in [
+            (None, 0, 3600, None),
+            (Some(6), 7, 3600, None),
+            (None, 1, 3600, Some(&pose)),
+            (Some(6), 8, 3600, Some(&pose)),
+            (Some(6), 8, -1, Some(&pose)),
+            (None, 0, -1, Some(&scan)),
+            (Some(6), 7, -1, Some(&scan)),
+        ] {
+            let due_ns = clock::now_ns() + due_in_s * 1_000_000_000;
+            let source = Schedule { published, due_ns };
+            let owed = watchdog(newest).owed_by(Some(source), LIMIT);
+            assert_eq!(
+                owed.as_ref(),
+                expected,
+                "{newest:?}, {published}, {due_in_s}"
+            );
+        }
+        let without_schedule = watchdog(Some(6)).owed_by(None, LIMIT);
+        assert_eq!(without_schedule, Some(pose));
     }
 
     #[test]
