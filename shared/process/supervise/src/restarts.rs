@@ -6,7 +6,7 @@ use gyre_stage::clock;
 
 use crate::{
     Event, Stall, SuperviseError, child::Child, death::Death, followers::Patience,
-    recovery::restarted_after, supervisor::Supervisor, watchdog::Starting,
+    recovery::restarted_after, supervisor::Supervisor,
 };
 
 impl Supervisor<'_> {
@@ -150,10 +150,8 @@ impl Supervisor<'_> {
     /// Looks for stalls, and restarts what may be stuck.
     pub(crate) fn look_for_stalls(&mut self) -> Result<(), SuperviseError> {
         let (processes, run) = (&self.processes, &self.run);
-        let starting = processes.starting(run).map(|child| Starting {
-            stage: child.name(),
-            since: child.started(),
-        });
+        let starting = processes.starting(run);
+        let starting = starting.map(|child| (child.name(), child.started()));
         let hangs = |process, since| processes.hangs(process, since, run);
         let found = self.stalls.look(Instant::now(), hangs, starting);
         for (follower, hang) in found.followers {
