@@ -1,21 +1,20 @@
 //! `gyre conformance`: tests whether a program keeps the contract of a stage.
 
-use std::{path::Path, process::ExitCode};
+use std::process::ExitCode;
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
-use gyre_stage::{Manifest, wake::Signals};
+use gyre_stage::wake::Signals;
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 use gyre_tools::conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
-    preflight::{self, Preflight},
-    program,
+    preflight, program,
     run::resolve,
 };
 
@@ -65,7 +64,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             command,
             scheduling: Scheduling::default(),
             gyre: own().to_string_lossy().into_owned(),
-            manifest: manifest(&configuration, &checked, folder.path())?,
+            manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
         stages: StageId::ALL
@@ -178,22 +177,4 @@ fn command(
             Ok(configured.unwrap_or_default().command(&gyre, name))
         }
     }
-}
-
-fn manifest(
-    configuration: &Configuration,
-    checked: &Preflight,
-    out: &Path,
-) -> Result<Manifest, Failure> {
-    Ok(Manifest {
-        prefix: String::new(),
-        root: Path::new("").to_owned(),
-        out: out.to_owned(),
-        window: checked.window,
-        limits: checked.limits,
-        live: false,
-        refines: configuration.has(StageId::Refinement),
-        rate: None,
-        build: program::digest(&own())?,
-    })
 }

@@ -114,8 +114,10 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed = (!configuration.slam.is_on() || queries(out)?.has_ended())
-            && (!configuration.objects.is_on() || has_all_objects(out)?);
+        let is_followed = (!configuration.slam.is_on()
+            || has_ended::<Query>(out, "finds the loops")?)
+            && (!configuration.objects.is_on()
+                || has_ended::<LoggedObjects>(out, "tracks the objects")?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -207,27 +209,16 @@ pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
 
-/// Opens the candidates of the keyframes so far.
-fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
-    RecordReader::open(out.path()).map_err(|error| match error {
-        LogError::Damaged { .. } => {
-            format!("{error}: remove it, and the same command finds the loops anew").into()
+/// Returns whether a log of followers has its end; a damaged one may be removed, and is then
+/// computed again in these words.
+fn has_ended<R: gyre_slam::Record>(out: &Out, again: &str) -> Result<bool, Failure> {
+    match RecordReader::<R>::open(out.path()) {
+        Ok(records) => Ok(records.has_ended()),
+        Err(error @ LogError::Damaged { .. }) => {
+            Err(format!("{error}: remove it, and the same command {again} anew").into())
         }
-        _ => error.into(),
-    })
-}
-
-/// Returns whether the objects of all scans are known.
-fn has_all_objects(out: &Out) -> Result<bool, Failure> {
-    let opened = RecordReader::<LoggedObjects>::open(out.path());
-    opened
-        .map(|objects| objects.has_ended())
-        .map_err(|error| match error {
-            LogError::Damaged { .. } => {
-                format!("{error}: remove it, and the same command tracks the objects anew").into()
-            }
-            _ => error.into(),
-        })
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.

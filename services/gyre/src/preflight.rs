@@ -1,14 +1,18 @@
 //! Checks before the first process is started.
 
-use std::{net::UdpSocket, path::Path, time::Duration};
+use std::{
+    net::UdpSocket,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
+use gyre_run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
-use gyre_stage::run::free_shared_memory;
+use gyre_stage::{Manifest, run::free_shared_memory};
 use gyre_stages::live_radar::{Settings, Sizes};
 use gyre_stages::radar_replay::{Listing, Player};
 use gyre_terminal::{Failure, print};
@@ -26,6 +30,23 @@ pub struct Preflight {
     pub limits: Limits,
     /// Shared memory that the run takes.
     pub footprint: Footprint,
+}
+
+impl Preflight {
+    /// Returns the manifest of a run, without its place in shared memory.
+    pub fn manifest(&self, configuration: &Configuration, out: &Path, build: String) -> Manifest {
+        Manifest {
+            prefix: String::new(),
+            root: PathBuf::new(),
+            out: out.to_owned(),
+            window: self.window,
+            limits: self.limits,
+            live: configuration.run.mode == Mode::Live,
+            refines: configuration.has(StageId::Refinement),
+            rate: configuration.run.rate.factor(),
+            build,
+        }
+    }
 }
 
 /// A recording on the disk.

@@ -87,15 +87,21 @@ impl Progress {
     }
 
     fn pose(&mut self, pose: &PoseHeader) {
-        let message = self.message(&pose.item);
+        let mut message = self.message(&pose.item);
         match &self.bar {
-            Some(bar) => {
-                bar.set_position(self.done.saturating_add(pose.item.dropped()));
-                bar.set_message(message);
-            }
+            Some(bar) => bar.set_position(self.done.saturating_add(pose.item.dropped())),
+            None => message = format!("{}{} scans  {message}", self.done, self.of),
+        }
+        self.show_message(message);
+    }
+
+    /// Shows a message in the bar, or now and then in a line.
+    fn show_message(&mut self, message: String) {
+        match &self.bar {
+            Some(bar) => bar.set_message(message),
             None if self.last_line.elapsed() >= EVERY => {
                 self.last_line = Instant::now();
-                print::note(format_args!("{}{} scans  {message}", self.done, self.of));
+                print::note(message);
             }
             None => {}
         }
@@ -123,25 +129,15 @@ impl Progress {
 
     /// Reports the progress of a follower if the run has to wait for it.
     fn following(&mut self, follower: &str, progress: Following) {
-        let work = match FollowerId::by_name(follower) {
-            Some(FollowerId::LoopClosure) => "loop closing",
-            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => follower,
-            Some(FollowerId::Objects) => "objects",
-        };
-        let records = match FollowerId::by_name(follower) {
-            Some(FollowerId::Objects) => "scans",
-            _ => "keyframes",
+        let (work, records) = match FollowerId::by_name(follower) {
+            Some(FollowerId::LoopClosure) => ("loop closing", "keyframes"),
+            Some(FollowerId::Objects) => ("objects", "scans"),
+            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => {
+                (follower, "keyframes")
+            }
         };
         let Following { done, total } = progress;
-        let message = format!("{work}: {done} of {total} {records}");
-        match &self.bar {
-            Some(bar) => bar.set_message(message),
-            None if self.last_line.elapsed() >= EVERY => {
-                self.last_line = Instant::now();
-                print::note(message);
-            }
-            None => {}
-        }
+        self.show_message(format!("{work}: {done} of {total} {records}"));
     }
 
     /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen

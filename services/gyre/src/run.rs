@@ -11,10 +11,9 @@ use std::{
 
 use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
 use gyre_datasets::GnssLog;
-use gyre_messages::StageId;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
-use gyre_run::{Ending, Mode};
+use gyre_run::Ending;
 use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest,
@@ -193,7 +192,12 @@ fn play(
     };
     preflight::check_shared_memory(&checked.footprint)?;
     prepare(configuration, &ready, &out, unfinished)?;
-    let plan = plan_of(resolved, manifest(resolved, programs, &out, checked, &root));
+    let manifest = Manifest {
+        prefix: root.prefix(),
+        root: root.path().to_owned(),
+        ..checked.manifest(resolved, out.path(), programs.build.clone())
+    };
+    let plan = plan_of(resolved, manifest);
     plan.manifest.write(&resolved.to_toml()?)?;
     if let Some(recording) = &checked.scans.recording {
         let path = root.path().display();
@@ -276,26 +280,6 @@ fn plan_of(configuration: &Configuration, manifest: Manifest) -> Plan {
         start_timeout: limit(configuration.run.start_timeout_s),
         cpu_wake_us: configuration.run.cpu_wake_us,
         manifest,
-    }
-}
-
-fn manifest(
-    configuration: &Configuration,
-    programs: &Programs,
-    out: &Out,
-    checked: &Preflight,
-    root: &RunRoot,
-) -> Manifest {
-    Manifest {
-        prefix: root.prefix(),
-        root: root.path().to_owned(),
-        out: out.path().to_owned(),
-        window: checked.window,
-        limits: checked.limits,
-        live: configuration.run.mode == Mode::Live,
-        refines: configuration.has(StageId::Refinement),
-        rate: configuration.run.rate.factor(),
-        build: programs.build.clone(),
     }
 }
 

@@ -32,15 +32,11 @@ const RECORDING: &str = "record.file";
 #[derive(Clone, Debug)]
 pub struct Named {
     pub table: Table,
-    notes: Vec<Note>,
+    notes: Notes,
 }
 
-/// A sentence about a path, for as long as no other takes its place.
-#[derive(Clone, Debug)]
-struct Note {
-    key: String,
-    sentence: String,
-}
+/// Keys, and sentences about their paths, for as long as no others take their places.
+type Notes = Vec<(String, String)>;
 
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
@@ -74,9 +70,9 @@ impl Named {
 
     /// Returns sentences about the paths which `changed`, with overrides, still has.
     pub fn notes(&self, changed: &Table) -> Vec<String> {
-        let is_same = |note: &&Note| value(&self.table, &note.key) == value(changed, &note.key);
-        let notes = self.notes.iter().filter(is_same);
-        notes.map(|note| note.sentence.clone()).collect()
+        let notes = self.notes.iter();
+        let notes = notes.filter(|(key, _)| value(&self.table, key) == value(changed, key));
+        notes.map(|(_, sentence)| sentence.clone()).collect()
     }
 }
 
@@ -179,7 +175,7 @@ struct Places<'a> {
     file: &'a Path,
     folder: Option<&'a Path>,
     here: Option<PathBuf>,
-    notes: Vec<Note>,
+    notes: Notes,
 }
 
 impl Places<'_> {
@@ -221,8 +217,7 @@ impl Places<'_> {
             put(path, found)?;
         }
         let key = key.to_owned();
-        self.notes
-            .extend(sentence.map(|sentence| Note { key, sentence }));
+        self.notes.extend(sentence.map(|sentence| (key, sentence)));
         Ok(())
     }
 }
@@ -235,18 +230,14 @@ fn differs(own: &Path, file: &Path) -> bool {
 
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let (first, rest) = key.split_once('.')?;
-    let parts = rest.split('.');
-    parts
-        .into_iter()
-        .try_fold(table.get(first)?, |value, part| value.get(part))
+    let mut parts = rest.split('.');
+    parts.try_fold(table.get(first)?, |value, part| value.get(part))
 }
 
 fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
     let (first, rest) = key.split_once('.')?;
-    let parts = rest.split('.');
-    parts
-        .into_iter()
-        .try_fold(table.get_mut(first)?, |value, part| value.get_mut(part))
+    let mut parts = rest.split('.');
+    parts.try_fold(table.get_mut(first)?, |value, part| value.get_mut(part))
 }
 
 #[cfg(test)]

@@ -21,12 +21,6 @@ pub(crate) struct Processes {
     restarts: BTreeMap<String, usize>,
 }
 
-/// The processes that have ended.
-pub(crate) struct Ended {
-    pub stages: Vec<usize>,
-    pub followers: Vec<usize>,
-}
-
 impl Index<usize> for Processes {
     type Output = Child;
 
@@ -61,12 +55,11 @@ impl Processes {
         self.children.iter()
     }
 
-    /// Returns the processes that have ended.
-    pub fn ended(&mut self, roles: Roles<'_>) -> Ended {
+    /// Returns the followers and the stages that have ended.
+    pub fn ended(&mut self, roles: Roles<'_>) -> (Vec<usize>, Vec<usize>) {
         let children = self.children.iter_mut().enumerate();
         let ended = children.filter_map(|(i, child)| child.has_exited().then_some(i));
-        let (followers, stages) = ended.partition(|i| roles.follows(*i));
-        Ended { stages, followers }
+        ended.partition(|i| roles.follows(*i))
     }
 
     /// Returns whether all stages have opened their topics.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use gyre_stage::clock;
 
 use crate::{
-    Event, Stall, SuperviseError, child::Child, death::Death, followers::Patience,
+    Event, Stall, SuperviseError, child::Child, clean, death::Death, followers::Patience,
     recovery::restarted_after, supervisor::Supervisor,
 };
 
@@ -113,7 +113,8 @@ impl Supervisor<'_> {
     ) -> Result<(), SuperviseError> {
         self.processes.kill(processes, &self.run.guardian)?;
         let all_dead = processes.len() == self.processes.len() && successor.is_none();
-        self.run.remove_dead(all_dead)?;
+        let (manifest, transport) = (self.run.manifest(), &self.run.transport);
+        clean::remove_dead(manifest, transport, all_dead)?;
         for i in processes {
             match successor.take_if(|(place, _)| place == i) {
                 Some((_, successor)) => {

@@ -11,8 +11,8 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, Plan, SuperviseError, child::Child, clean, guardian::Guardian, roles::Roles,
-    start::Starter, wake_limit::WakeLimit,
+    Event, Plan, SuperviseError, child::Child, guardian::Guardian, roles::Roles, start::Starter,
+    wake_limit::WakeLimit,
 };
 
 /// The plan of a run, and its processes' needs for start, observation and cleanup.
@@ -26,7 +26,7 @@ pub(crate) struct Run<'a> {
     // Dropped in this order: services, node.
     services: Services,
     pub node: Node,
-    transport: Transport,
+    pub transport: Transport,
     pub signals: Signals,
 }
 
@@ -101,16 +101,6 @@ impl<'a> Run<'a> {
             self.say(Event::Watched);
         }
         Ok(())
-    }
-
-    /// Removes all that dead processes have left in the transport.
-    pub fn remove_dead(&self, all_dead: bool) -> Result<(), SuperviseError> {
-        clean::remove_dead(self.manifest(), &self.transport, all_dead)
-    }
-
-    /// Removes all that dead observers have left there.
-    pub fn remove_dead_observers(&self) -> Result<(), SuperviseError> {
-        clean::remove_dead_observers(self.manifest(), &self.transport)
     }
 
     /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried

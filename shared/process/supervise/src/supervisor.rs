@@ -17,7 +17,7 @@ use crate::{
     log::Logs,
     observers::Sweep,
     poses::{News, Poses},
-    processes::{Ended, Processes},
+    processes::Processes,
     recorder::Recorder,
     recovery::Recovery,
     run::Run,
@@ -107,7 +107,7 @@ impl<'a> Supervisor<'a> {
             self.keep_house()?;
             let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
             self.observers.run_if_due(&self.run, own);
-            let Ended { stages, followers } = self.processes.ended(self.run.roles());
+            let (followers, stages) = self.processes.ended(self.run.roles());
             self.recover_followers(&followers)?;
             match stages.is_empty() {
                 true => self.look_for_stalls()?,
