@@ -69,7 +69,6 @@ pub fn python() -> String {
     env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
-/// The program under test.
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
 }
@@ -92,7 +91,6 @@ pub fn install(program: &Path, content: impl AsRef<[u8]>) {
     assert!(writer.wait().unwrap().success());
 }
 
-/// Copies the program under test.
 pub fn copy_program(to: &Path) {
     install(to, fs::read(crate::PROGRAM).unwrap());
 }
@@ -154,7 +152,6 @@ impl Run {
         Self::configured(CONFIGURATION)
     }
 
-    /// A run of this configuration text.
     pub fn configured(text: &str) -> Self {
         let folder = tempfile::Builder::new()
             .prefix("gyre-test-")
@@ -171,7 +168,6 @@ impl Run {
         }
     }
 
-    /// A run of this configuration file.
     pub fn of_file(configuration: &Path) -> Self {
         Self {
             configuration: configuration.to_owned(),
@@ -187,7 +183,6 @@ impl Run {
             .set(&format!("masking.model='{}'", model.display()))
     }
 
-    /// The same, of the demo's drive as a recording.
     pub fn of_recorded_demo() -> Self {
         Self::of_demo().data(recording::demo())
     }
@@ -197,17 +192,14 @@ impl Run {
         self.option(folder.to_str().unwrap())
     }
 
-    /// The same with `--rate`.
     pub fn rate(self, rate: &str) -> Self {
         self.argument("--rate", rate)
     }
 
-    /// The same with `--set`.
     pub fn set(self, sentence: &str) -> Self {
         self.argument("--set", sentence)
     }
 
-    /// Masks with the network of this card.
     pub fn masked_by(self, card: &Path) -> Self {
         self.set("masking.kind=learned")
             .set(&format!("masking.model='{}'", card.display()))
@@ -225,7 +217,6 @@ impl Run {
         self
     }
 
-    /// The same with another word.
     pub fn option(mut self, word: &str) -> Self {
         self.arguments.push(word.to_owned());
         self
@@ -248,12 +239,10 @@ impl Run {
         self.folder.path()
     }
 
-    /// The folder of its results.
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// The command line.
     pub fn command(&self) -> Command {
         let mut command = gyre();
         command
@@ -285,7 +274,6 @@ impl Run {
         Some(command)
     }
 
-    /// Starts it.
     pub fn start(&self) -> Running {
         self.start_as(self.command())
     }
@@ -302,7 +290,6 @@ impl Run {
         Running::new(self.clone(), command.spawn().unwrap())
     }
 
-    /// Starts it and waits until it ends.
     pub fn finish(&self) -> Ended {
         self.start().finish()
     }
@@ -313,17 +300,14 @@ impl Run {
         self.odometry()
     }
 
-    /// Returns its `odometry.csv`.
     pub fn odometry(&self) -> String {
         self.result("odometry.csv")
     }
 
-    /// Returns its `summary.json`.
     pub fn summary(&self) -> Value {
         serde_json::from_str(&self.result("summary.json")).unwrap()
     }
 
-    /// A file of its results.
     pub fn result(&self, name: impl AsRef<Path>) -> String {
         let path = self.out.join(name);
         fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

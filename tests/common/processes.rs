@@ -12,7 +12,6 @@ use std::{
 use gyre_messages::{FollowerId, StageId};
 use rustix::process::{Signal, kill_process};
 
-/// A process id.
 pub type Pid = u32;
 
 /// Sends a signal. That the process is gone already is no error.
@@ -52,7 +51,6 @@ pub fn run_of(pid: Pid) -> Option<PathBuf> {
     Some(PathBuf::from(OsStr::from_bytes(run)))
 }
 
-/// A living child of a supervisor with this word in its command.
 pub fn child_with(supervisor: Pid, word: &str) -> Option<Pid> {
     children_of(supervisor).find(|pid| words(*pid).iter().any(|it| it == word))
 }
@@ -62,7 +60,6 @@ pub fn is_alive(pid: Pid) -> bool {
     stat(pid).is_some_and(|fields| !["Z", "X"].contains(&fields[0].as_str()))
 }
 
-/// The parent of a process.
 pub fn parent_of(pid: Pid) -> Option<Pid> {
     stat(pid)?[1].parse().ok()
 }
@@ -83,7 +80,6 @@ fn stat(pid: Pid) -> Option<Vec<String>> {
     Some(fields.split(' ').map(str::to_owned).collect())
 }
 
-/// The words of its command.
 fn words(pid: Pid) -> Vec<String> {
     let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
     let line = String::from_utf8_lossy(&line);

@@ -15,14 +15,12 @@ use tempfile::TempDir;
 
 use super::Run;
 
-/// Scans of the small recording.
 pub const SCANS: usize = 24;
 
 /// The radar of the small recordings in a section `[simulation]`. It has a sixth of the default
 /// one's bins: what happens between processes does not depend on them.
 pub const SENSOR: &str = "sensor.profile = 'cts350x-radiate'\noutput.format = 'oxford'\n";
 
-/// The small recording.
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| of_a_block(SCANS))
@@ -161,7 +159,6 @@ pub fn images(recording: &Path) -> Vec<PathBuf> {
     images
 }
 
-/// The files in a folder; none if it is a file.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten();
     entries.map(|entry| entry.unwrap().path()).collect()
@@ -205,7 +202,6 @@ pub fn complete(image: &Path) {
     rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
 }
 
-/// Edits the rows of an image: `edit` is given their numbers from 0.
 fn rewrite(image: &Path, edit: impl Fn(usize, &mut [u8])) {
     let bytes = fs::read(image).unwrap();
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();

@@ -9,10 +9,8 @@ use rustix::process::Signal;
 
 use super::{Pid, Run, gyre, spawned::Spawned};
 
-/// A running server.
 pub struct Server {
     process: Spawned,
-    /// The address that it has printed.
     pub address: String,
 }
 
@@ -48,7 +46,6 @@ impl Server {
         })
     }
 
-    /// The token in its address.
     pub fn token(&self) -> Option<&str> {
         self.address.split_once("?token=").map(|(_, token)| token)
     }

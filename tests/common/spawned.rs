@@ -39,12 +39,10 @@ impl Spawned {
         send(self.pid(), signal);
     }
 
-    /// Its words so far.
     pub fn said(&self) -> String {
         fs::read_to_string(&self.said).unwrap()
     }
 
-    /// Waits until its words have what is looked for.
     pub fn until<T>(&self, look: impl Fn(&str) -> Option<T>) -> T {
         let since = Instant::now();
         loop {
@@ -57,7 +55,6 @@ impl Spawned {
         }
     }
 
-    /// Waits until it ends.
     pub fn wait(&mut self) -> ExitStatus {
         let since = Instant::now();
         loop {

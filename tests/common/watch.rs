@@ -24,7 +24,6 @@ pub struct Watched {
 }
 
 impl Watch {
-    /// Starts one that watches a topic of a run.
     pub fn start(run: &Run, topic: &'static str) -> Self {
         static STARTED: AtomicUsize = AtomicUsize::new(0);
         let number = STARTED.fetch_add(1, Ordering::Relaxed);
@@ -44,7 +43,6 @@ impl Watch {
         self
     }
 
-    /// Sends it a signal.
     pub fn signal(&self, signal: Signal) {
         self.process.signal(signal);
     }

@@ -9,7 +9,6 @@ use rustix::process::Signal;
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
-/// A run that was interrupted in its middle.
 fn interrupted() -> Run {
     let run = Run::of_recording();
     let slow = run.clone().rate(MODERATE);

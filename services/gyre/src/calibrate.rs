@@ -24,11 +24,8 @@ use crate::cli::CalibrateArguments;
 use gyro::Gyro;
 use wheels::Wheels;
 
-/// The section for the configuration.
 const SECTION: &str = "calibration.toml";
-/// The picture of the first drive.
 const PICTURE: &str = "calibration.svg";
-/// Time between two lines of progress.
 const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
@@ -151,7 +148,6 @@ fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// A drive as it was read.
 struct Recorded {
     name: String,
     drive: Drive,

@@ -162,7 +162,6 @@ pub enum Command {
 /// The arguments of `gyre run`.
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
-    /// The recording or the radar, and the configuration.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Play a recording from this topic on, without the stages before it: masked, rotation, motion
@@ -176,7 +175,6 @@ pub struct RunArguments {
     /// The constants of the radar, of `gyre calibrate`, which override the configuration.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-    /// The results and the pace.
     #[command(flatten)]
     pub options: RunOptions,
 }
@@ -187,7 +185,6 @@ pub struct DemoArguments {
     /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// The results and the pace.
     #[command(flatten)]
     pub options: RunOptions,
 }
@@ -256,7 +253,6 @@ impl RunArguments {
 /// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// The recording; a configuration determines how it is read.
     #[command(flatten)]
     pub inputs: Inputs,
     /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
@@ -270,7 +266,6 @@ pub struct InspectArguments {
 /// The arguments of `gyre calibrate`.
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
-    /// The recording, and the configuration whose constants are checked.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Another drive of the same radar, read in the same way: the file has the constants from all

@@ -40,7 +40,6 @@ pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure
     }
 }
 
-/// Tests a program; `None` on an interrupt.
 fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> {
     let stage = StageId::by_name(&arguments.stage).ok_or("there is no such stage")?;
     let demands = demands(arguments)?;

@@ -32,10 +32,8 @@ pub use replaced::settle;
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 
-/// The state of an earlier run.
 #[derive(Debug)]
 pub enum Earlier {
-    /// Nothing to continue from.
     Nothing,
     /// The same run, begun and ended without a pose to continue from. Only its recording continues.
     WithoutPoses(Identity),
@@ -49,14 +47,12 @@ pub enum Earlier {
     Foreign(Failure),
 }
 
-/// A run that was begun.
 #[derive(Debug)]
 pub struct Begun {
     /// Poses in its journal to continue from.
     pub poses: u64,
     /// Records behind them, which a power failure has left in part: they are to be cut off.
     pub lost: u64,
-    /// The identity that it was begun with.
     pub identity: Identity,
 }
 
@@ -339,7 +335,6 @@ fn damaged(error: KeyframesError) -> Failure {
     }
 }
 
-/// The files of a run's state.
 fn state(out: &Path) -> [PathBuf; 12] {
     let [ledger, generations] = state_of_recording(out);
     [

@@ -2,7 +2,6 @@
 
 use gyre_stage::StageError;
 
-/// A part of Gyre that this build lacks.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "this gyre was built without {0}: build it with `cargo run --release --locked --features full -- ...`, or install its package or container"

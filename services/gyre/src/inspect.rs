@@ -9,7 +9,6 @@ use gyre_terminal::{Failure, print};
 
 use crate::cli::InspectArguments;
 
-/// Prints the contents of a dataset and its apparent faults.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory

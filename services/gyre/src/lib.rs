@@ -38,7 +38,6 @@ use cli::{Command, SchemaArguments};
 #[cfg(not(feature = "link"))]
 use split::absent as link;
 
-/// Executes a command of `gyre`.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
     if is_private(&command) {
@@ -113,7 +112,6 @@ fn is_private(command: &Command) -> bool {
     !matches!(command, Command::Simulate(_))
 }
 
-/// Prints the schema of configurations, or their reference.
 fn print_schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
     print::line(match arguments.markdown {
         true => schema::reference(),

@@ -13,7 +13,6 @@ use crate::{
     preflight, split,
 };
 
-/// Runs one end of a link.
 pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     split::set_environment()?;
     match &arguments.end {

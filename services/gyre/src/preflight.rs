@@ -24,11 +24,8 @@ use crate::{ros2, split};
 /// The limits of a run that follow from its dataset and configuration.
 pub struct Preflight {
     pub scans: Scans,
-    /// Limits on scans in flight.
     pub window: Window,
-    /// The largest payloads.
     pub limits: Limits,
-    /// Shared memory that the run takes.
     pub footprint: Footprint,
 }
 
@@ -49,14 +46,11 @@ impl Preflight {
     }
 }
 
-/// A recording on the disk.
 pub struct Recording {
-    /// The identity of the recording.
     pub fingerprint: Fingerprint,
     pub listing: Listing,
 }
 
-/// Asks a radar for the sizes of its scans.
 pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
@@ -110,11 +104,9 @@ pub struct Scans {
     /// `None`: without end.
     pub count: Option<usize>,
     period_ns: i64,
-    /// The largest scan.
     bytes: usize,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
-    /// The recording, if it is on the disk.
     pub recording: Option<Recording>,
     /// See [`Session::damage`](gyre_results::Session).
     pub damage: Option<String>,

@@ -16,10 +16,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use silence::Silence;
 
-/// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// Shows the progress of a run.
 pub struct Progress {
     bar: Option<ProgressBar>,
     /// `/100`, or nothing without an end.

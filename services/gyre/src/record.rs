@@ -34,7 +34,6 @@ pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-/// Returns the limits of a file; 0 is unlimited.
 fn split(arguments: &SplitArguments, span: Duration) -> Split {
     let span_ns = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
     Split {

@@ -86,7 +86,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     }
 }
 
-/// Returns the folder of the results that the arguments name.
 pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     if let Some(out) = &arguments.options.out {
         return Ok(out.clone());
@@ -383,7 +382,6 @@ fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>
     .into()
 }
 
-/// Prints the summary and returns the exit code.
 fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<ExitCode, Failure> {
     let problem = written.summary.problem();
     let is_printed = problem.is_none() || written.poses >= 2;

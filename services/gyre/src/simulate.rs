@@ -13,7 +13,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::SimulateArguments;
 
-/// Writes a simulated recording, or completes one.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;

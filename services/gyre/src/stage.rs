@@ -24,7 +24,6 @@ use rustix::{
 
 use crate::{program, ros2, split};
 
-/// The work of a process.
 type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
 
 /// Runs a stage or a follower by its name, with a function of Python if one is given.

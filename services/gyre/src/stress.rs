@@ -51,7 +51,6 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-/// Does the work of a helper process.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
     gyre_tools::stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)

@@ -12,12 +12,10 @@ use toml::{Table, Value};
 
 use crate::{ConfigurationError, MethodConfig, paths::Named, strict};
 
-/// Scans that are measured, evenly spread over the recording.
 const SCANS: usize = 8;
 /// The threshold above the noise floor, steps of half a decibel. Chosen on RADIATE and Oxford,
 /// whose floors are 17 steps apart.
 const ABOVE_NOISE: u8 = 36;
-/// Cells on a side of the rasters.
 const CELLS: f32 = 255.0;
 /// The largest cell, m: with it the rasters reach 102 m.
 const MAX_CELL_M: f32 = 0.8;
@@ -134,10 +132,8 @@ fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     strict::section(&mut table, "dataset")
 }
 
-/// Properties of a radar that its scans show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Measured {
-    /// Median of all powers, steps of half a decibel.
     noise: u8,
     /// Depth of a range bin, m.
     range_resolution_m: f32,

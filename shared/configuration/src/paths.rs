@@ -9,7 +9,6 @@ use toml::{Table, Value};
 
 use crate::{ConfigurationError, strict};
 
-/// The keys that name files or folders.
 const KEYS: [&str; 13] = [
     "run.ground_truth",
     "source.data",
@@ -25,7 +24,6 @@ const KEYS: [&str; 13] = [
     "link.certificate",
     "link.key",
 ];
-/// The key of the only file that is written.
 const RECORDING: &str = "record.file";
 
 /// A configuration as its file has it, but with each path absolute, or a file of the program.
@@ -170,7 +168,6 @@ fn is_name(named: &Path) -> bool {
     named.extension().is_none() && named.file_name() == Some(named.as_os_str())
 }
 
-/// The places where the files of a configuration are looked for.
 struct Places<'a> {
     file: &'a Path,
     folder: Option<&'a Path>,
@@ -222,7 +219,6 @@ impl Places<'_> {
     }
 }
 
-/// Returns whether a file differs from the program's file.
 fn differs(own: &Path, file: &Path) -> bool {
     let own = gyre_shipped::bytes(own);
     own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))

@@ -32,16 +32,13 @@ fn refused<T>(reason: &str) -> Result<T, SourceError> {
     Err(SourceError::Configuration(reason.to_owned()))
 }
 
-/// An open recording or simulation.
 pub struct Played {
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
-    /// The samples of a gyro and of wheels.
     pub samples: ScanSamples,
 }
 
-/// Opens the recording or the simulation that is to be played.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;

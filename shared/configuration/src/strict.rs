@@ -57,12 +57,10 @@ fn syntax(text: &str, error: &toml::de::Error) -> String {
     format!("TOML parse error at line {line}, column {column}: {reason}")
 }
 
-/// Returns a path as the value of a key.
 pub fn path_value(path: &Path) -> Result<Value, ConfigurationError> {
     text_of(path).map(Value::from)
 }
 
-/// Returns a path as text, which a configuration can hold.
 pub(crate) fn text_of(path: &Path) -> Result<&str, ConfigurationError> {
     path.to_str().ok_or_else(|| {
         ConfigurationError(format!(
@@ -71,7 +69,6 @@ pub(crate) fn text_of(path: &Path) -> Result<&str, ConfigurationError> {
     })
 }
 
-/// Returns the error of a value that a section cannot have.
 pub fn value(section: &str, reason: impl Display) -> ConfigurationError {
     ConfigurationError(format!("[{section}]: {reason}"))
 }
@@ -93,7 +90,6 @@ pub fn section<T: DeserializeOwned>(
     read(name, value)
 }
 
-/// Takes a section of sections out of the table, each with one of the names in `known`.
 pub fn sections<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,

@@ -36,7 +36,6 @@ pub fn words(command: &str) -> Result<Vec<String>, Failure> {
     }
 }
 
-/// Returns the time that an option gives in seconds.
 pub fn seconds(option: &str, seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds)
         .map_err(|_| format!("{option} is {seconds}, but must be 0 or more").into())

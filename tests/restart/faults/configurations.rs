@@ -41,7 +41,6 @@ pub struct Configuration {
     can: fn() -> bool,
     recording: fn() -> PathBuf,
     run: fn(&Path) -> Run,
-    /// Poses of a run.
     pub poses: usize,
     /// The poses between which faults strike.
     pub moments: Option<(usize, usize)>,
@@ -60,7 +59,6 @@ pub struct Configuration {
     shows: &'static [(&'static str, f64)],
     /// A run whose motions are the same: followers change no byte of odometry.
     same_as: Option<fn() -> Run>,
-    /// A run whose motions are different.
     differs_from: Option<fn() -> Run>,
 }
 
@@ -103,7 +101,6 @@ impl Configuration {
         (self.run)(recording).rate(rate)
     }
 
-    /// The rate of its runs.
     pub fn rate(&self) -> &str {
         self.rate
     }
@@ -119,7 +116,6 @@ impl Configuration {
         recording::linked(&(self.recording)(), keep)
     }
 
-    /// The results of a run that is complete.
     pub fn results(&self, run: &Run) -> Results {
         let names = ["odometry.csv", "trajectory.tum"].iter();
         let files = names.chain(self.results);
@@ -191,7 +187,6 @@ const SMALL: Configuration = Configuration {
     differs_from: None,
 };
 
-/// The small recording.
 pub fn plain() -> Configuration {
     SMALL
 }
@@ -374,7 +369,6 @@ fn with_logs() -> PathBuf {
     recording::of("gyro-and-wheels", &config)
 }
 
-/// The run of the same recording with its gyro, without its wheels.
 pub fn with_gyro() -> Run {
     let run = Run::small().data(&with_logs()).set("gyro.kind=auto");
     run.set(&format!("gyro.delay_s={LATE_S}"))
@@ -462,7 +456,6 @@ pub fn network_at_an_unreadable_scan() -> Configuration {
     }
 }
 
-/// Such a network, and a gap of a year.
 pub fn network_at_a_gap() -> Configuration {
     Configuration {
         name: "network_at_a_gap",

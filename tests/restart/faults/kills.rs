@@ -20,7 +20,6 @@ use crate::common::{Running, send};
 
 /// Storms in a run: a process is restarted five times at most.
 const STORMS: usize = 4;
-/// Deaths of one process in a run.
 const LIVES: usize = 8;
 
 /// All processes in random order, each at a moment of its own.

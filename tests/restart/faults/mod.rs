@@ -28,7 +28,6 @@ use tools::Need;
 /// Attempts at a fault that comes too late, because the run is over.
 const ATTEMPTS: usize = 20;
 
-/// A kind of faults.
 #[derive(Clone, Copy)]
 struct Fault {
     /// Runs a configuration, disturbs the run, and judges its results; `None` if the run ended

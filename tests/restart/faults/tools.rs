@@ -114,7 +114,6 @@ impl Mount {
         mount
     }
 
-    /// Changes its options.
     pub fn remount(&self, options: &str) {
         self.mount(&["-o", &format!("remount,{options}")]);
     }

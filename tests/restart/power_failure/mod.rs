@@ -101,7 +101,6 @@ fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
     }
 }
 
-/// The power fails at some changes, and at any change of the next run.
 #[test]
 #[ignore = ".ci/nightly: power fails thousands of times"]
 fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {

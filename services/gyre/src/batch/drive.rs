@@ -24,7 +24,6 @@ use crate::{
 
 /// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
 const ENDING: Duration = Duration::from_secs(60);
-/// Time between two attempts to lock the folder.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans,

@@ -10,7 +10,6 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// A log and the configuration of its gyro.
 pub(super) struct Gyro {
     log: GyroLog,
     configured: GyroConfig,

@@ -10,7 +10,6 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// A log and the configuration of its wheels.
 pub(super) struct Wheels {
     log: WheelLog,
     configured: WheelsConfig,

@@ -44,7 +44,6 @@ pub struct BatchDriveArguments {
     /// The process that has started it.
     #[arg(long)]
     pub parent: i32,
-    /// The run.
     #[command(flatten)]
     pub run: RunArguments,
 }

@@ -34,7 +34,6 @@ pub struct SendArguments {
     /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
     #[arg(long, default_value_t = 60.0, value_name = "S")]
     pub linger_s: f64,
-    /// The other machine.
     #[command(flatten)]
     pub network: NetworkArguments,
 }
@@ -47,7 +46,6 @@ pub struct ReceiveArguments {
     /// The topics that are received of those that are sent. Default: all.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
-    /// The other machine.
     #[command(flatten)]
     pub network: NetworkArguments,
 }

@@ -5,7 +5,6 @@ use gyre_stage::source::Received;
 /// The silence that is reported first, ns. The next lines come when it has doubled.
 const FIRST_NS: i64 = 3_000_000_000;
 
-/// Follows whether the radar of a run sends.
 pub struct Silence {
     /// As "the radar at 192.168.0.1:6317".
     radar: String,
@@ -35,7 +34,6 @@ impl Silence {
         }
     }
 
-    /// Returns what there is to report.
     pub fn update(&mut self, received: &Received, now_ns: i64) -> Option<Report> {
         let last_scan_ns = received.last_scan.map(|scan| scan.at_ns);
         let heard_ns = last_scan_ns.unwrap_or(i64::MIN).max(self.began_ns);

@@ -12,22 +12,18 @@ use crate::{cli::Ros2Arguments, features::Absent};
 
 const ABSENT: Absent = Absent("ROS 2");
 
-/// Refuses, since this build lacks ROS 2.
 pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
     Err(ABSENT.into())
 }
 
-/// Refuses, since this build lacks ROS 2.
 pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
     Err(ABSENT.into())
 }
 
-/// Returns that no driver comes.
 pub fn may_come(_: &Failure) -> bool {
     false
 }
 
-/// Refuses, since this build lacks ROS 2.
 pub fn receive(
     _: &Launch,
     _: &SourceConfig,

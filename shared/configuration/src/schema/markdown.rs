@@ -60,7 +60,6 @@ struct Page {
     usual: BTreeMap<String, String>,
 }
 
-/// The whole page.
 pub fn reference(schema: &Schema) -> String {
     let mut page = Page::default();
     for (name, section) in properties(schema.as_value()) {
@@ -74,7 +73,6 @@ pub fn reference(schema: &Schema) -> String {
     )
 }
 
-/// A section with a table of its keys, then the sections in it.
 fn write_section(page: &mut Page, name: &str, schema: &Value) {
     if schema["type"] == "array" {
         return write_object(page, &format!("[[{name}]]"), name, schema, &schema["items"]);
@@ -119,7 +117,6 @@ fn write_object(page: &mut Page, title: &str, name: &str, described: &Value, obj
     }
 }
 
-/// The row of a key.
 fn row(key: &str, schema: &Value) -> String {
     let default = schema.get("default").map_or(String::new(), toml_code);
     let meaning = text(&schema["description"]).replace('|', "\\|");

@@ -35,19 +35,14 @@ pub(crate) struct Child {
     process: std::process::Child,
     started: Instant,
     status: Option<ExitStatus>,
-    /// True if it did not end although it was killed.
     is_held: bool,
     deaths: VecDeque<Instant>,
-    /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
-    /// The file where the process writes why it ended.
     last_words: PathBuf,
     log: Log,
-    /// The cause of the last death of this program.
     last_death: Option<String>,
     /// Why the last program that was given up for this one could not be started.
     pub(crate) start_error: Option<String>,
-    /// The plan before a swap, to go back to.
     before: Option<StagePlan>,
     /// True from a swap until the new program has worked on a pose.
     is_on_trial: bool,
@@ -127,7 +122,6 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Returns whether its program has replaced another and has not worked on a pose yet.
     pub(crate) fn is_on_trial(&self) -> bool {
         self.is_on_trial
     }
@@ -170,17 +164,14 @@ impl Child {
         StageId::by_name(self.name())
     }
 
-    /// Returns when the process was started.
     pub(crate) fn started(&self) -> Instant {
         self.started
     }
 
-    /// Returns its newest heartbeat; `None` before the first one, or if it writes none.
     pub(crate) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
-    /// Returns the cause of its last death.
     pub(crate) fn last_death(&self) -> Option<&str> {
         self.last_death.as_deref()
     }
@@ -194,7 +185,6 @@ impl Child {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
 
-    /// Returns whether no pose was published since the last restart.
     pub(crate) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
         self.pose_at_restart == Some(newest_pose)
     }
@@ -210,7 +200,6 @@ impl Child {
         self.status.is_some()
     }
 
-    /// Returns whether it was found to have exited.
     pub(crate) fn is_known_to_have_exited(&self) -> bool {
         self.status.is_some()
     }
@@ -274,14 +263,12 @@ impl Child {
         }
     }
 
-    /// Kills the process without waiting for its end.
     pub(crate) fn kill(&self) {
         if self.status.is_none() {
             self.signal(Signal::KILL);
         }
     }
 
-    /// Waits for the end of a killed process.
     pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
         // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
@@ -297,7 +284,6 @@ impl Child {
         }
     }
 
-    /// Sends a signal to the process group.
     fn signal(&self, signal: Signal) {
         if let Some(group) = Pid::from_raw(self.process.id() as i32) {
             // Fails if all its processes have exited meanwhile.

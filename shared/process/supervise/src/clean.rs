@@ -23,7 +23,6 @@ use gyre_stage::{
 
 use crate::SuperviseError;
 
-/// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
 /// Time after which a file that is still empty is not being created any more, which takes
 /// microseconds.

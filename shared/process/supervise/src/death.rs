@@ -4,13 +4,10 @@ use std::fmt;
 
 #[derive(Clone, Debug)]
 pub struct Death {
-    /// True if a signal killed it, false if it exited.
     pub killed: bool,
     /// The cause, as `signal 9` or `exit code 3`.
     pub cause: String,
-    /// The exit code, if it exited.
     pub code: Option<i32>,
-    /// The last line of its output.
     pub last_output: Option<String>,
 }
 

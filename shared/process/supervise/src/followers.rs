@@ -10,7 +10,6 @@ use gyre_stage::{
 
 use crate::{Ending, Plan, Stall, SuperviseError, roles::Roles};
 
-/// Stalls of a follower in a row after which the run ends.
 const MAX_STALLS: usize = 3;
 
 /// The clock of the follower that the run waits for.
@@ -18,7 +17,6 @@ const MAX_STALLS: usize = 3;
 struct Clock {
     /// The follower, its position, and since when it is there.
     at: Option<(usize, Progress, Instant)>,
-    /// The farthest that this follower has been.
     farthest: u64,
     /// The stalls without going farther.
     stalls_in_a_row: usize,
@@ -41,7 +39,6 @@ impl Clock {
     }
 }
 
-/// The followers of a run.
 pub(crate) struct Followers<'a> {
     roles: Roles<'a>,
     manifest: &'a Manifest,
@@ -75,17 +72,14 @@ impl<'a> Followers<'a> {
         }
     }
 
-    /// The stream has ended: from here on followers are waited for.
     pub fn begin_to_be_awaited(&mut self) {
         self.are_awaited = true;
     }
 
-    /// Returns whether the stream has ended.
     pub fn are_awaited(&self) -> bool {
         self.are_awaited
     }
 
-    /// A follower is not restarted any more.
     pub fn give_up(&mut self, follower: usize, reason: String) {
         self.given_up.push((follower, reason));
     }
@@ -118,13 +112,11 @@ impl<'a> Followers<'a> {
         }
     }
 
-    /// Returns the position of a follower in its logs.
     pub fn progress_of(&self, follower: usize) -> Progress {
         follower::progress_of(self.manifest, self.roles.name(follower))
             .map_or_else(Progress::default, |(progress, _)| progress)
     }
 
-    /// Judges a follower that is here, and whose process was started then.
     pub fn judge(&mut self, follower: usize, progress: Progress, started: Instant) -> Patience {
         let waited = self.clock.look(follower, progress, started);
         let Some(limit) = self.limit.filter(|limit| waited > *limit) else {

@@ -26,7 +26,6 @@ use rustix::{
 
 use crate::{ProcessStat, SuperviseError, end::ends_within};
 
-/// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);

@@ -21,7 +21,6 @@ use crate::Plan;
 
 /// Size of a log beyond which it is moved to its `.old`, bytes.
 const MAX: u64 = 8 << 20;
-/// Time between two looks at the sizes.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// The log of a supervisor that runs in the background, by its name in the folder of the logs.
@@ -46,7 +45,6 @@ pub(crate) struct Log {
     collected: Arc<Mutex<Collected>>,
 }
 
-/// The end of the pipe, and the file.
 struct Collected {
     input: PipeReader,
     file: File,
@@ -87,7 +85,6 @@ impl Log {
         Ok(Self { output, collected })
     }
 
-    /// Returns the pipe for the stage's output.
     pub fn output(&self) -> &PipeWriter {
         &self.output
     }
@@ -142,7 +139,6 @@ impl Collected {
         true
     }
 
-    /// Writes the first bytes of the buffer.
     fn write(&mut self, bytes: usize) {
         let bytes = &self.buffer[..bytes];
         // On a full disk it is lost but for its end.
@@ -194,7 +190,6 @@ impl Logs {
         }
     }
 
-    /// Bounds all logs, if it is time to look.
     pub fn bound_if_due(&mut self) {
         let now = Instant::now();
         if now >= self.due {
@@ -208,7 +203,6 @@ impl Logs {
     }
 }
 
-/// Returns the log of a process.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }

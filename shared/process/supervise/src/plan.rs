@@ -12,7 +12,6 @@ use thiserror::Error;
 
 use crate::program::Program;
 
-/// The plan of a run.
 #[derive(Debug)]
 pub struct Plan {
     /// The manifest, which all processes read.

@@ -11,10 +11,8 @@ use gyre_stage::{
 
 use crate::run::Run;
 
-/// The reader of the poses.
 pub(crate) struct Poses {
     port: Port<Pose>,
-    /// The item of the newest pose, and when it was seen.
     newest: Option<Item>,
     seen: Option<Instant>,
 }
@@ -22,7 +20,6 @@ pub(crate) struct Poses {
 /// A message with new information.
 pub(crate) enum News {
     Pose(Received<Pose>),
-    /// The end of the stream.
     End,
 }
 

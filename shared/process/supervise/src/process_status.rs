@@ -39,7 +39,6 @@ pub(crate) fn activity(beat: Heartbeat) -> Activity {
     }
 }
 
-/// Returns the state of a process that has never been restarted.
 pub(crate) fn of_child(
     child: &Child,
     beat: Option<Heartbeat>,

@@ -155,7 +155,6 @@ impl Recorder {
         self.respawn(run, newest)
     }
 
-    /// Returns the state of the recorder.
     pub fn status(&self, manifest: &Manifest) -> ProcessStatus {
         let beat = self.child.heartbeat(manifest);
         let activity = match beat {

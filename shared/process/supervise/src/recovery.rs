@@ -29,7 +29,6 @@ impl Recovering {
 }
 
 impl Recovery {
-    /// A stage has been started again that died, or was ended, at `died_ns`.
     pub fn begins(&mut self, hop: StageId, died_ns: i64) {
         self.recovering.push(Recovering {
             hop,
@@ -38,7 +37,6 @@ impl Recovery {
         });
     }
 
-    /// Returns whether the newest process of a stage has worked on a pose.
     pub fn has_worked(&self, hop: StageId, pose: &PoseHeader) -> bool {
         let started = self.recovering.iter().rev().find(|stage| stage.hop == hop);
         started.is_none_or(|stage| stage.has_worked(pose))

@@ -94,7 +94,6 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// The same without any service.
     pub fn without_services(
         mut manifest: Manifest,
         configuration: &str,
@@ -118,7 +117,6 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Returns the manifest of the run.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -147,7 +145,6 @@ impl<'a> Rig<'a> {
         clean::remove_dead(&self.manifest, &self.transport, false)
     }
 
-    /// Returns whether a stage has opened the topic that it publishes.
     pub fn has_publisher(&self, stage: StageId) -> bool {
         let services = self.services.as_ref();
         services.is_some_and(|services| services.has_publisher(stage))
@@ -166,7 +163,6 @@ impl<'a> Rig<'a> {
         self.manifest.root.join(self.transport.services_folder())
     }
 
-    /// Opens a topic of a stage for publishing.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         self.ports().feed(topic)
     }
@@ -248,12 +244,10 @@ impl<'a> Ports<'a> {
         }
     }
 
-    /// Opens a topic of a stage for publishing.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         of_topic!(topic, self.open_feed())
     }
 
-    /// Subscribes to a topic of a stage.
     pub fn tap(&self, topic: &str, joining: Joining) -> Result<Box<dyn Tap>, StageError> {
         of_topic!(topic, self.open_tap(joining))
     }

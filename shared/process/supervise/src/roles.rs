@@ -18,12 +18,10 @@ impl<'a> Roles<'a> {
         &self.0[process].name
     }
 
-    /// Returns whether a process is a follower, and not in the stream.
     pub fn follows(self, process: usize) -> bool {
         FollowerId::by_name(self.name(process)).is_some()
     }
 
-    /// Returns the process of this name.
     pub fn named(self, name: &str) -> Option<usize> {
         self.0.iter().position(|plan| plan.name == name)
     }

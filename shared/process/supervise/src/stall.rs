@@ -22,7 +22,6 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// Time after which all processes have beaten again that can run.
 const RESUMED: Duration = wake::MAX_WAIT.saturating_mul(5);
 
-/// The stalls of a run.
 pub(crate) struct Stalls<'a> {
     roles: Roles<'a>,
     manifest: &'a Manifest,
@@ -41,7 +40,6 @@ pub(crate) struct Stalls<'a> {
 pub(crate) struct Found {
     /// Followers that hang: odometry continues, with them or without.
     pub followers: Vec<(usize, Stall)>,
-    /// The stall of the stages.
     pub stall: Option<Stall>,
 }
 

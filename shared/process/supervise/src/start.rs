@@ -41,7 +41,6 @@ impl<'a> Starter<'a> {
         Self { signals, guardian }
     }
 
-    /// Starts a stage. Its standard output and error go to `log`.
     pub fn start(
         &self,
         plan: &StagePlan,

@@ -43,7 +43,6 @@ pub fn supervise(
     Ok(supervisor.report(ending?))
 }
 
-/// The parts of the supervisor.
 pub(crate) struct Supervisor<'a> {
     pub processes: Processes,
     /// No stage, and no follower.

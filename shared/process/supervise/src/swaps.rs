@@ -31,17 +31,14 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 const ENDED: &str = "the stream has ended";
 
-/// The swaps of a run: at most one at a time.
 #[derive(Default)]
 pub(crate) struct Swaps {
-    /// The program that stands by to replace another.
     standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
     done: Vec<Swapped>,
 }
 
-/// A program that stands by.
 pub(crate) struct Standby {
     /// The index of the process whose place it is to take.
     pub process: usize,
@@ -51,7 +48,6 @@ pub(crate) struct Standby {
     ready: Option<Instant>,
 }
 
-/// The decision about the program that stands by.
 pub(crate) enum Step {
     Wait,
     TakeOver(Standby),
@@ -128,7 +124,6 @@ impl Swaps {
         }
     }
 
-    /// Returns the swap that is not done yet.
     pub fn pending(&self, processes: &Processes, run: &Run<'_>) -> Option<PendingSwap> {
         let Some(standby) = &self.standby else {
             return self.pending_trial(processes);
@@ -149,12 +144,10 @@ impl Swaps {
         Some((standby, ENDED))
     }
 
-    /// Returns the process that stands by.
     pub fn pid(&self) -> Option<u32> {
         self.standby.as_ref().map(|standby| standby.child.pid())
     }
 
-    /// Records that a program has replaced another.
     pub fn has_swapped(&mut self, plan: &StagePlan, after_poses: u64) {
         self.done.push(Swapped {
             stage: plan.name.clone(),
@@ -189,7 +182,6 @@ impl Swaps {
 }
 
 impl Standby {
-    /// Returns why it cannot take over any more.
     fn why_not(&mut self) -> Option<String> {
         if self.child.has_exited() {
             let death = self.child.death();
@@ -240,7 +232,6 @@ fn judge(
     }
 }
 
-/// Returns the plan of a process after a swap.
 pub(crate) fn plan_of(begun: &StagePlan, swap: &Swap) -> StagePlan {
     match &swap.command {
         None => begun.clone(),

@@ -14,7 +14,6 @@ use crate::SuperviseError;
 /// The system applies the value written here until the process closes the file (Linux, "PM QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
-/// A limit that is in effect until it is dropped.
 pub(crate) struct WakeLimit {
     _file: File,
 }

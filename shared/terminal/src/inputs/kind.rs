@@ -14,7 +14,6 @@ const RECORDINGS: [&str; 3] = ["mcap", "db3", "bag"];
 /// Bytes at the start of a file that decide whether it is a text: a text has no zero byte.
 const START: u64 = 4096;
 
-/// The kind of a word of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A configuration: a file, or the name of one in the program.
@@ -23,9 +22,7 @@ pub enum Kind {
     Data,
     /// The folder of a run's results.
     Results,
-    /// The address of a radar.
     Radar,
-    /// None of these.
     Unknown,
 }
 
@@ -56,7 +53,6 @@ impl Kind {
     }
 }
 
-/// Returns whether a path is a file that begins as a text.
 fn is_text(path: &Path) -> bool {
     let start = || -> io::Result<Vec<u8>> {
         let mut start = Vec::new();

@@ -12,7 +12,6 @@ use crate::{child::Child, processes::Processes, run::Run, socket::Client};
 /// radar may be switched off.
 const LIMIT: Duration = Duration::from_secs(10);
 
-/// A client that waits for the result.
 pub(super) struct Trial {
     /// The index of the process on trial.
     process: usize,
@@ -58,7 +57,6 @@ impl Swaps {
         }
     }
 
-    /// Returns the swap whose program is on trial.
     pub(super) fn pending_trial(&self, processes: &Processes) -> Option<PendingSwap> {
         let trial = self.trial.as_ref()?;
         let plan = processes[trial.process].plan();
