@@ -31,25 +31,25 @@ const KILL_TIMEOUT: Duration = Duration::from_secs(10);
 const PERMANENT: i32 = StageError::PERMANENT as i32;
 
 pub(crate) struct Child {
-    plan: StagePlan,
+    pub plan: StagePlan,
     process: std::process::Child,
-    started: Instant,
+    pub started: Instant,
     status: Option<ExitStatus>,
     is_held: bool,
     deaths: VecDeque<Instant>,
     pose_at_restart: Option<Option<u64>>,
     last_words: PathBuf,
     log: Log,
-    last_death: Option<String>,
+    pub last_death: Option<String>,
     /// Why the last program that was given up for this one could not be started.
-    pub(crate) start_error: Option<String>,
+    pub start_error: Option<String>,
     before: Option<StagePlan>,
     /// True from a swap until the new program has worked on a pose.
-    is_on_trial: bool,
+    pub is_on_trial: bool,
 }
 
 impl Child {
-    pub(crate) fn spawn(
+    pub fn spawn(
         plan: &StagePlan,
         manifest: &Manifest,
         starter: &Starter<'_>,
@@ -74,7 +74,7 @@ impl Child {
         })
     }
 
-    pub(crate) fn respawn(
+    pub fn respawn(
         &mut self,
         manifest: &Manifest,
         starter: &Starter<'_>,
@@ -96,7 +96,7 @@ impl Child {
     }
 
     /// Takes the place of a process that has ended, with another program that stood by for it.
-    pub(crate) fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
+    pub fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
         // It opens its topics when its standard input ends.
         drop(successor.process.stdin.take());
         successor.started = Instant::now();
@@ -108,7 +108,7 @@ impl Child {
     }
 
     /// Uses a different program from the next start on.
-    pub(crate) fn change(&mut self, plan: StagePlan) {
+    pub fn change(&mut self, plan: StagePlan) {
         let before = std::mem::replace(&mut self.plan, plan);
         self.deaths.clear();
         self.try_after(before);
@@ -122,18 +122,9 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    pub(crate) fn is_on_trial(&self) -> bool {
-        self.is_on_trial
-    }
-
-    /// The replacing program has worked on a pose.
-    pub(crate) fn pass_trial(&mut self) {
-        self.is_on_trial = false;
-    }
-
     /// Returns to the program before a swap, from the next start on; or to `begun`, the program of
     /// the run's begin, if a file of the former has changed since. False without such a program.
-    pub(crate) fn go_back(&mut self, begun: &StagePlan) -> bool {
+    pub fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
         let mut plans = plans.chain(is_another.then(|| begun.clone()));
@@ -147,49 +138,37 @@ impl Child {
         true
     }
 
-    pub(crate) fn plan(&self) -> &StagePlan {
-        &self.plan
-    }
-
-    pub(crate) fn name(&self) -> &str {
+    pub fn name(&self) -> &str {
         &self.plan.name
     }
 
-    pub(crate) fn pid(&self) -> u32 {
+    pub fn pid(&self) -> u32 {
         self.process.id()
     }
 
     /// Returns which stage it is; `None` for an additional process.
-    pub(crate) fn stage(&self) -> Option<StageId> {
+    pub fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
     }
 
-    pub(crate) fn started(&self) -> Instant {
-        self.started
-    }
-
-    pub(crate) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
+    pub fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
-    pub(crate) fn last_death(&self) -> Option<&str> {
-        self.last_death.as_deref()
-    }
-
     /// Returns whether it has lived for longer than the window for counting its deaths.
-    pub(crate) fn has_outlived_its_window(&self) -> bool {
+    pub fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
     }
 
-    pub(crate) fn backoff(&self) -> Duration {
+    pub fn backoff(&self) -> Duration {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
 
-    pub(crate) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
+    pub fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
         self.pose_at_restart == Some(newest_pose)
     }
 
-    pub(crate) fn has_exited(&mut self) -> bool {
+    pub fn has_exited(&mut self) -> bool {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
             if self.status.is_some() {
@@ -200,12 +179,12 @@ impl Child {
         self.status.is_some()
     }
 
-    pub(crate) fn is_known_to_have_exited(&self) -> bool {
+    pub fn is_known_to_have_exited(&self) -> bool {
         self.status.is_some()
     }
 
     /// Counts a death against the restart policy.
-    pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
+    pub fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Process(message));
         }
@@ -227,7 +206,7 @@ impl Child {
     }
 
     /// Returns the failure of an ended process if a restart would repeat it.
-    pub(crate) fn permanent_failure(&mut self) -> Option<String> {
+    pub fn permanent_failure(&mut self) -> Option<String> {
         self.status?;
         let death = self.death();
         self.message_if_permanent(&death)
@@ -239,7 +218,7 @@ impl Child {
         is_permanent.then(|| death.last_output.clone().unwrap_or_else(message))
     }
 
-    pub(crate) fn death(&mut self) -> Death {
+    pub fn death(&mut self) -> Death {
         let status = self.status.unwrap_or_default();
         let cause = match (status.signal(), status.code()) {
             (Some(signal), _) if signal == Signal::BUS.as_raw() => {
@@ -257,19 +236,19 @@ impl Child {
         }
     }
 
-    pub(crate) fn terminate(&self) {
+    pub fn terminate(&self) {
         if self.status.is_none() {
             self.signal(Signal::TERM);
         }
     }
 
-    pub(crate) fn kill(&self) {
+    pub fn kill(&self) {
         if self.status.is_none() {
             self.signal(Signal::KILL);
         }
     }
 
-    pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
+    pub fn await_end(&mut self) -> Result<(), SuperviseError> {
         // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
             self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
@@ -292,7 +271,7 @@ impl Child {
     }
 
     /// Returns the reason that the process gave, else the last line of its output.
-    pub(crate) fn last_output(&mut self) -> Option<String> {
+    pub fn last_output(&mut self) -> Option<String> {
         let reason = fs::read_to_string(&self.last_words).ok();
         let _ = fs::remove_file(&self.last_words);
         let output = self.log.last_line();

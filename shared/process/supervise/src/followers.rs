@@ -44,10 +44,10 @@ pub(crate) struct Followers<'a> {
     manifest: &'a Manifest,
     limit: Option<Duration>,
     /// True when the stream has ended, and followers are waited for.
-    are_awaited: bool,
+    pub are_awaited: bool,
     clock: Clock,
     /// Those that are not restarted any more, and why.
-    given_up: Vec<(usize, String)>,
+    pub given_up: Vec<(usize, String)>,
 }
 
 /// The decision about a follower that the run waits for.
@@ -70,18 +70,6 @@ impl<'a> Followers<'a> {
             clock: Clock::default(),
             given_up: Vec::new(),
         }
-    }
-
-    pub fn begin_to_be_awaited(&mut self) {
-        self.are_awaited = true;
-    }
-
-    pub fn are_awaited(&self) -> bool {
-        self.are_awaited
-    }
-
-    pub fn give_up(&mut self, follower: usize, reason: String) {
-        self.given_up.push((follower, reason));
     }
 
     /// Returns whether a process is a follower that is not restarted any more.
@@ -169,7 +157,7 @@ mod tests {
         assert!(followers.is_behind(FOLLOWER) && !followers.is_behind(MASKING));
         assert_eq!(followers.behind(), [FOLLOWER]);
         assert!(matches!(followers.end(), Ok(Ending::Complete)));
-        followers.give_up(FOLLOWER, "it dies".to_owned());
+        followers.given_up.push((FOLLOWER, "it dies".to_owned()));
         assert!(!followers.is_behind(FOLLOWER) && followers.behind().is_empty());
         assert!(followers.end().is_err());
     }

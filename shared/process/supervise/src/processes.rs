@@ -18,7 +18,8 @@ use crate::{
 #[derive(Default)]
 pub(crate) struct Processes {
     children: Vec<Child>,
-    restarts: BTreeMap<String, usize>,
+    /// The numbers of restarts by name.
+    pub restarts: BTreeMap<String, usize>,
 }
 
 impl Index<usize> for Processes {
@@ -71,7 +72,7 @@ impl Processes {
     /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
         let opening = self.iter().filter(|child| run.is_starting(child));
-        opening.min_by_key(|child| child.started())
+        opening.min_by_key(|child| child.started)
     }
 
     /// Returns whether a process has not come to its next wait for longer than `since`. A stage
@@ -88,7 +89,7 @@ impl Processes {
     /// it must not be ended.
     pub fn why_not_again(&self, mut processes: impl Iterator<Item = usize>) -> Option<String> {
         processes.find_map(|i| {
-            let (name, path) = (self[i].name(), self[i].plan().changed_file()?.display());
+            let (name, path) = (self[i].name(), self[i].plan.changed_file()?.display());
             Some(format!(
                 "{name} could not be started again, since {path} has changed; `gyre swap {name}` takes the new one"
             ))
@@ -100,20 +101,10 @@ impl Processes {
         *self.restarts.entry(name).or_default() += 1;
     }
 
-    pub fn restarts_of(&self, process: usize) -> usize {
-        let restarts = self.restarts.get(self[process].name());
-        restarts.copied().unwrap_or_default()
-    }
-
-    /// Returns the numbers of restarts by name.
-    pub fn into_restarts(self) -> BTreeMap<String, usize> {
-        self.restarts
-    }
-
     /// Lets programs pass their trials that have worked on a pose since they took the place of
     /// others.
     pub fn pass_trials(&mut self, pose: &PoseHeader, recovery: &Recovery) {
-        let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial());
+        let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial);
         for child in on_trial {
             let has_passed = match child.stage() {
                 Some(hop) => recovery.has_worked(hop, pose),
@@ -121,7 +112,7 @@ impl Processes {
                 None => child.has_outlived_its_window(),
             };
             if has_passed {
-                child.pass_trial();
+                child.is_on_trial = false;
             }
         }
     }
@@ -161,7 +152,7 @@ impl Processes {
         let children = self.children.iter_mut();
         let living = children.filter_map(|child| (!child.has_exited()).then_some(&*child));
         let timeouts = living.map(|child| match is_complete {
-            true => child.plan().end_timeout,
+            true => child.plan.end_timeout,
             false => END_TIMEOUT,
         });
         timeouts.max()

@@ -12,7 +12,8 @@ use crate::roles::Roles;
 pub(crate) struct Recovery {
     /// Without a pose yet that the new process worked on.
     recovering: Vec<Recovering>,
-    times: Vec<Duration>,
+    /// The time from each death to the first pose with work of the new process.
+    pub times: Vec<Duration>,
 }
 
 /// A restarted stage without a pose that the new process has worked on.
@@ -52,11 +53,6 @@ impl Recovery {
             .extend(recovered.map(|stage| {
                 Duration::from_nanos((clock::now_ns() - stage.died_ns).max(0) as u64)
             }));
-    }
-
-    /// Returns the time from each death to the first pose with work of the new process.
-    pub fn into_times(self) -> Vec<Duration> {
-        self.times
     }
 }
 
@@ -110,7 +106,7 @@ mod tests {
         assert!(recovery.has_worked(StageId::Masking, &pose));
         recovery.see(&pose);
         recovery.see(&pose);
-        let times = recovery.into_times();
+        let times = recovery.times;
         assert_eq!(times.len(), 1);
         assert!(times[0] >= Duration::from_secs(7));
     }

@@ -117,7 +117,7 @@ impl Supervisor<'_> {
             self.refuse_unknown(&swap.process, client);
             return Ok(());
         };
-        if let Some(reason) = self.swaps.why_not_now(self.followers.are_awaited()) {
+        if let Some(reason) = self.swaps.why_not_now(self.followers.are_awaited) {
             client.answer(&Answer::Refused(reason.to_owned()));
             return Ok(());
         }
@@ -144,7 +144,7 @@ impl Supervisor<'_> {
         self.processes[process].change(plan);
         self.restart_and_count(&stages)?;
         let child = &mut self.processes[process];
-        if child.is_on_trial() {
+        if child.is_on_trial {
             self.has_swapped(process, client);
             return Ok(());
         }
@@ -211,8 +211,8 @@ impl Supervisor<'_> {
     /// itself.
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
-        self.swaps.has_swapped(child.plan(), self.poses.count());
-        let (name, command) = (child.name(), child.plan().command.join(" "));
+        self.swaps.has_swapped(&child.plan, self.poses.count());
+        let (name, command) = (child.name(), child.plan.command.join(" "));
         self.run
             .note(&format!("{name} is `{command}` from here on"));
         self.swaps.await_trial(process, child, client);
@@ -224,7 +224,7 @@ impl Supervisor<'_> {
         let mut processes: Vec<ProcessStatus> = processes.collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
         let phase = match () {
-            () if self.followers.are_awaited() => Phase::Following,
+            () if self.followers.are_awaited => Phase::Following,
             () if processes.iter().any(is_starting) => Phase::Starting,
             () => Phase::Running,
         };

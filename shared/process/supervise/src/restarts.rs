@@ -25,7 +25,7 @@ impl Supervisor<'_> {
     /// Returns to the programs before those on trial while another stage fails: their messages may
     /// be the cause. Returns them.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
-        let is_blamed = |i: &usize| self.processes[*i].is_on_trial() && !dead.contains(i);
+        let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
         blamed.retain(|i| self.go_back(*i, failure));
         blamed
@@ -43,7 +43,7 @@ impl Supervisor<'_> {
                 .note(&format!("{name} died by {}{output}", death.cause));
             if !death.killed {
                 backoff = backoff.max(child.backoff());
-                if !child.is_on_trial() {
+                if !child.is_on_trial {
                     failure = Some(format!("{name} died after it: {death}"));
                 }
             }
@@ -57,7 +57,7 @@ impl Supervisor<'_> {
     /// Checks whether a dead process may be started again, by its policy. One that has taken the
     /// place of another gives way to it first.
     fn require_restart(&mut self, process: usize, death: &Death) -> Result<(), SuperviseError> {
-        if self.processes[process].is_on_trial() && self.go_back(process, &death.to_string()) {
+        if self.processes[process].is_on_trial && self.go_back(process, &death.to_string()) {
             return Ok(());
         }
         match self.processes[process].may_restart(death) {
@@ -152,7 +152,7 @@ impl Supervisor<'_> {
     pub(crate) fn look_for_stalls(&mut self) -> Result<(), SuperviseError> {
         let (processes, run) = (&self.processes, &self.run);
         let starting = processes.starting(run);
-        let starting = starting.map(|child| (child.name(), child.started()));
+        let starting = starting.map(|child| (child.name(), child.started));
         let hangs = |process, since| processes.hangs(process, since, run);
         let found = self.stalls.look(Instant::now(), hangs, starting);
         for (follower, hang) in found.followers {
@@ -172,7 +172,7 @@ impl Supervisor<'_> {
         self.run.say(Event::Stalled(&stall));
         for i in &processes {
             self.processes.count_restart(*i);
-            if self.processes[*i].is_on_trial() {
+            if self.processes[*i].is_on_trial {
                 self.go_back(*i, &stall.to_string());
             }
         }
@@ -190,7 +190,7 @@ impl Supervisor<'_> {
                     let name = self.processes[follower].name();
                     self.run
                         .note(&format!("{reason}: odometry goes on without {name}"));
-                    self.followers.give_up(follower, reason);
+                    self.followers.given_up.push((follower, reason));
                 }
                 recovered => recovered?,
             }
@@ -215,7 +215,7 @@ impl Supervisor<'_> {
             follower: child.name(),
             progress,
         });
-        match self.followers.judge(follower, progress, child.started()) {
+        match self.followers.judge(follower, progress, child.started) {
             Patience::Wait => Ok(()),
             Patience::GiveUp(stall) => Err(SuperviseError::Stalled(stall)),
             Patience::End(stall) => {

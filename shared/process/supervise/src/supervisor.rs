@@ -119,7 +119,7 @@ impl<'a> Supervisor<'a> {
     /// read what one writes that dies again and again. The stream has ended, so the death of a
     /// stage changes nothing.
     fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
-        self.followers.begin_to_be_awaited();
+        self.followers.are_awaited = true;
         // The last pose may have been the first of a program on trial.
         self.swaps.continue_trial(&self.processes, &self.run);
         self.swaps.end_trial(&self.processes);
@@ -216,10 +216,10 @@ impl<'a> Supervisor<'a> {
     fn report(self, ending: Ending) -> Report {
         Report {
             ending,
-            restarts: self.processes.into_restarts(),
-            recovery: self.recovery.into_times(),
+            restarts: self.processes.restarts,
+            recovery: self.recovery.times,
             counters: counters(self.run.plan),
-            swaps: self.swaps.into_done(),
+            swaps: self.swaps.done,
         }
     }
 }

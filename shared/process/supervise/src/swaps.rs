@@ -36,7 +36,8 @@ pub(crate) struct Swaps {
     standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
-    done: Vec<Swapped>,
+    /// The programs that have taken the place of others, in order.
+    pub done: Vec<Swapped>,
 }
 
 pub(crate) struct Standby {
@@ -128,7 +129,7 @@ impl Swaps {
         let Some(standby) = &self.standby else {
             return self.pending_trial(processes);
         };
-        let plan = standby.child.plan();
+        let plan = &standby.child.plan;
         Some(PendingSwap {
             process: plan.name.clone(),
             command: plan.command.clone(),
@@ -166,18 +167,13 @@ impl Swaps {
         reason: &str,
         after_poses: u64,
     ) -> bool {
-        let failed = child.plan().command.join(" ");
+        let failed = child.plan.command.join(" ");
         let has_gone_back = child.go_back(begun);
         if has_gone_back {
             self.fail_trial(process, child.name(), &failed, reason);
-            self.has_swapped(child.plan(), after_poses);
+            self.has_swapped(&child.plan, after_poses);
         }
         has_gone_back
-    }
-
-    /// Returns the programs that have taken the place of others, in order.
-    pub fn into_done(self) -> Vec<Swapped> {
-        self.done
     }
 }
 
@@ -201,7 +197,7 @@ impl Standby {
     /// process that it was.
     pub fn give_up(self, reason: &str) -> u32 {
         let name = self.child.name();
-        let command = self.child.plan().command.join(" ");
+        let command = self.child.plan.command.join(" ");
         let sentence =
             format!("{name} goes on as before, since `{command}` cannot take over: {reason}");
         self.client.answer(&Answer::Refused(sentence));

@@ -45,7 +45,7 @@ impl Swaps {
             trial.since = Instant::now();
         }
         match () {
-            () if !child.is_on_trial() => trial.client.answer(&Answer::Done),
+            () if !child.is_on_trial => trial.client.answer(&Answer::Done),
             () if trial.since.elapsed() > LIMIT => {
                 let name = child.name();
                 trial.client.answer(&Answer::Untried(format!(
@@ -59,7 +59,7 @@ impl Swaps {
 
     pub(super) fn pending_trial(&self, processes: &Processes) -> Option<PendingSwap> {
         let trial = self.trial.as_ref()?;
-        let plan = processes[trial.process].plan();
+        let plan = &processes[trial.process].plan;
         Some(PendingSwap {
             process: plan.name.clone(),
             command: plan.command.clone(),
