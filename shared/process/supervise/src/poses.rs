@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use gyre_messages::{Item, Pose, flag};
 use gyre_stage::{
-    Listener, Manifest, StageError,
+    Manifest, StageError,
     reader::{Port, Received},
     schedule,
 };
@@ -12,7 +12,7 @@ use gyre_stage::{
 use crate::run::Run;
 
 pub(crate) struct Poses {
-    port: Port<Pose>,
+    pub port: Port<Pose>,
     newest: Option<Item>,
     seen: Option<Instant>,
 }
@@ -30,10 +30,6 @@ impl Poses {
             newest: None,
             seen: None,
         })
-    }
-
-    pub fn listener(&self) -> &Listener {
-        self.port.listener()
     }
 
     /// Returns the next new pose, or the end; `None` if nothing has come.

@@ -189,22 +189,18 @@ impl Supervisor<'_> {
             return Ok(());
         }
         let (child, client) = standby.into_parts(self.run.manifest());
-        let stages = match self.ends_between_scans(process)? {
-            true => vec![process],
-            false => stages,
+        self.processes[process].kill();
+        self.processes[process].await_end()?;
+        // If the one before has left no scan without a pose, the one after it numbers scans as it
+        // would have, and no other process need be restarted with it.
+        let stages = match self.poses.are_owed(self.run.manifest()) {
+            true => stages,
+            false => vec![process],
         };
         self.replace(&stages, clock::now_ns(), Some((process, child)))?;
         self.stalls.restarted();
         self.has_swapped(process, client);
         Ok(())
-    }
-
-    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it
-    /// numbers scans as it would have, and no other process need be restarted with it.
-    fn ends_between_scans(&mut self, process: usize) -> Result<bool, SuperviseError> {
-        self.processes[process].kill();
-        self.processes[process].await_end()?;
-        Ok(!self.poses.are_owed(self.run.manifest()))
     }
 
     /// Reports that a program has replaced another, and lets the client wait until it proves

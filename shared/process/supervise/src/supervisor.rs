@@ -23,7 +23,7 @@ use crate::{
     run::Run,
     socket::ControlSocket,
     stall::Stalls,
-    swaps::Swaps,
+    swaps::{ENDED, Swaps},
 };
 
 /// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not
@@ -102,7 +102,11 @@ impl<'a> Supervisor<'a> {
             }
             self.swaps.continue_trial(&self.processes, &self.run);
             self.continue_swap()?;
-            self.report_readiness();
+            if !self.is_ready && self.processes.are_ready(&self.run) {
+                self.is_ready = true;
+                self.run.say(Event::Ready);
+            }
+            self.run.say(Event::Watched);
             self.keep_house()?;
             let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
             self.observers.run_if_due(&self.run, own);
@@ -123,8 +127,8 @@ impl<'a> Supervisor<'a> {
         // The last pose may have been the first of a program on trial.
         self.swaps.continue_trial(&self.processes, &self.run);
         self.swaps.end_trial(&self.processes);
-        if let Some((standby, reason)) = self.swaps.end() {
-            self.give_up(standby, reason);
+        if let Some(standby) = self.swaps.standby.take() {
+            self.give_up(standby, ENDED);
         }
         loop {
             let mut behind = self.followers.behind();
@@ -144,7 +148,7 @@ impl<'a> Supervisor<'a> {
 
     /// Sleeps until there is a pose, a request or a dead process; true on a request to stop.
     fn sleep(&self) -> Result<bool, SuperviseError> {
-        let (poses, requests) = (self.poses.listener(), self.socket.descriptor());
+        let (poses, requests) = (self.poses.port.listener(), self.socket.descriptor());
         let woken =
             self.run
                 .signals
@@ -167,14 +171,6 @@ impl<'a> Supervisor<'a> {
         Ok(false)
     }
 
-    fn report_readiness(&mut self) {
-        if !self.is_ready && self.processes.are_ready(&self.run) {
-            self.is_ready = true;
-            self.run.say(Event::Ready);
-        }
-        self.run.say(Event::Watched);
-    }
-
     /// Keeps the logs short, and the processes alive that nothing depends on.
     fn keep_house(&mut self) -> Result<(), SuperviseError> {
         self.logs.bound_if_due();
@@ -184,10 +180,8 @@ impl<'a> Supervisor<'a> {
             self.has_notice = true;
             self.run.note(&sentence);
         }
-        let standby = self.swaps.pid();
-        let others = standby
-            .into_iter()
-            .chain(self.recorder.as_ref().map(Recorder::pid));
+        let standby = self.swaps.standby.iter().map(|it| it.child.pid());
+        let others = standby.chain(self.recorder.as_ref().map(Recorder::pid));
         let living = self.processes.iter().map(Child::pid).chain(others);
         self.run.keep_guardian(living);
         match &mut self.recorder {

@@ -29,11 +29,11 @@ use trial::Trial;
 /// such moment.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-const ENDED: &str = "the stream has ended";
+pub(crate) const ENDED: &str = "the stream has ended";
 
 #[derive(Default)]
 pub(crate) struct Swaps {
-    standby: Option<Standby>,
+    pub standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
     /// The programs that have taken the place of others, in order.
@@ -43,7 +43,7 @@ pub(crate) struct Swaps {
 pub(crate) struct Standby {
     /// The index of the process whose place it is to take.
     pub process: usize,
-    child: Child,
+    pub child: Child,
     client: Client,
     since: Instant,
     ready: Option<Instant>,
@@ -137,16 +137,6 @@ impl Swaps {
             waited_s: standby.since.elapsed().as_secs_f64(),
             limit_s: run.plan.start_timeout.map(|limit| limit.as_secs_f64()),
         })
-    }
-
-    /// Takes back the program that stands by, since the stream has ended.
-    pub fn end(&mut self) -> Option<(Standby, &'static str)> {
-        let standby = self.standby.take()?;
-        Some((standby, ENDED))
-    }
-
-    pub fn pid(&self) -> Option<u32> {
-        self.standby.as_ref().map(|standby| standby.child.pid())
     }
 
     pub fn has_swapped(&mut self, plan: &StagePlan, after_poses: u64) {
