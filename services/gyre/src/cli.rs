@@ -57,7 +57,13 @@ pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
     /// Run a simulated drive around a block, which needs no data: `gyre run demo`.
-    Demo(DemoArguments),
+    Demo {
+        /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        #[command(flatten)]
+        options: RunOptions,
+    },
     /// Run the pipeline on many drives, and write a table of their results. The same command
     /// continues after an interruption.
     Batch(BatchArguments),
@@ -146,7 +152,11 @@ pub enum Command {
     /// List the configurations in the program, or print one of them to edit it.
     Config(ConfigArguments),
     /// Print the JSON schema of configurations, for editors.
-    Schema(SchemaArguments),
+    Schema {
+        /// Print the reference of the configuration in Markdown instead.
+        #[arg(long)]
+        markdown: bool,
+    },
     /// Print the completions of a shell.
     Completions {
         /// The shell.
@@ -179,16 +189,6 @@ pub struct RunArguments {
     pub options: RunOptions,
 }
 
-/// The arguments of `gyre demo`.
-#[derive(Debug, Args)]
-pub struct DemoArguments {
-    /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    #[command(flatten)]
-    pub options: RunOptions,
-}
-
 /// The results of a run and its pace.
 #[derive(Default, Debug, Args)]
 pub struct RunOptions {
@@ -212,19 +212,6 @@ pub struct RunOptions {
     /// another or of a live run.
     #[arg(long)]
     pub fresh: bool,
-}
-
-impl From<DemoArguments> for RunArguments {
-    fn from(demo: DemoArguments) -> Self {
-        Self {
-            inputs: Inputs {
-                what: vec!["gyre:configs/demo.toml".into()],
-                set: demo.set,
-            },
-            options: demo.options,
-            ..Self::default()
-        }
-    }
 }
 
 impl RunOptions {
@@ -290,14 +277,6 @@ pub struct CalibrateArguments {
     /// Maximum number of scans of a drive. Their points are kept in memory.
     #[arg(long, default_value = "2000")]
     pub scans: usize,
-}
-
-/// The arguments of `gyre schema`.
-#[derive(Debug, Args)]
-pub struct SchemaArguments {
-    /// Print the reference of the configuration in Markdown instead.
-    #[arg(long)]
-    pub markdown: bool,
 }
 
 /// The arguments of `gyre simulate`.

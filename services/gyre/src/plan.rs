@@ -68,24 +68,15 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
     if !record.is_on() {
         return None;
     }
-    let text = |path: &Path| path.to_string_lossy().into_owned();
-    let mut command = vec![text(gyre), "record".to_owned(), text(out)];
-    command.extend([
-        "--continues".to_owned(),
-        "--to".to_owned(),
-        text(&record.file),
-    ]);
-    for (option, value) in [
-        ("--split-mb", record.split_mb.to_string()),
-        ("--split-s", record.split_s.to_string()),
-    ] {
-        if value != "0" {
-            command.extend([option.to_owned(), value]);
-        }
+    let [gyre, out, file] = [gyre, out, record.file.as_path()].map(Path::to_string_lossy);
+    let (split_mb, split_s) = (record.split_mb.to_string(), record.split_s.to_string());
+    let topics = record.topics.join(",");
+    let mut command = vec![&*gyre, "record", &*out, "--continues", "--to", &*file];
+    command.extend(["--split-mb", &split_mb, "--split-s", &split_s]);
+    if !topics.is_empty() {
+        command.extend(["--topics", &topics]);
     }
-    if !record.topics.is_empty() {
-        command.extend(["--topics".to_owned(), record.topics.join(",")]);
-    }
+    let command = command.into_iter().map(str::to_owned).collect();
     Some(StagePlan {
         outlives_restarts: true,
         ..StagePlan::new("recorder", command)
