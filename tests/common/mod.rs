@@ -153,10 +153,7 @@ impl Run {
     }
 
     pub fn configured(text: &str) -> Self {
-        let folder = tempfile::Builder::new()
-            .prefix("gyre-test-")
-            .tempdir()
-            .unwrap();
+        let folder = folder();
         let configuration = folder.path().join("test.toml");
         fs::write(&configuration, text).unwrap();
         let out = folder.path().join("out");
@@ -166,6 +163,11 @@ impl Run {
             configuration,
             arguments: Vec::new(),
         }
+    }
+
+    /// A run of a simulation of so many scans on small rasters.
+    pub fn simulated(scans: usize) -> Self {
+        Self::configured(&format!("{CONFIGURATION}[simulation]\nscans = {scans}\n"))
     }
 
     pub fn of_file(configuration: &Path) -> Self {

@@ -53,7 +53,7 @@ pub fn demo() -> &'static Path {
 
 /// The recording of a drive with this section `[simulation]`.
 pub fn configured(name: &str, settings: &str) -> PathBuf {
-    simulated(name, &toml::from_str(settings).unwrap())
+    of(name, &toml::from_str(settings).unwrap())
 }
 
 /// The recording of a drive along a trajectory in the format TUM.
@@ -64,12 +64,7 @@ pub fn along(name: &str, trajectory: &str) -> PathBuf {
         drive: DriveConfig::along_file(file.path().to_owned()),
         ..SimulationConfig::default()
     };
-    simulated(name, &config)
-}
-
-/// The recording of a simulated drive.
-pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
-    simulated(name, config)
+    of(name, &config)
 }
 
 fn of_a_block(scans: usize) -> PathBuf {
@@ -86,7 +81,7 @@ pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
     config.sensor.lost_azimuths = loses_azimuths;
-    simulated(&format!("radiate-{loses_azimuths}"), &config)
+    of(&format!("radiate-{loses_azimuths}"), &config)
 }
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links:
@@ -231,7 +226,8 @@ fn replace(image: &Path, bytes: &[u8]) {
     fs::write(image, bytes).unwrap();
 }
 
-fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
+/// The recording of a simulated drive.
+pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
     prepared(name, |recording| {
         write_dataset(config, recording, &mut |_, _| ()).unwrap();
     })

@@ -297,24 +297,19 @@ fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
 }
 
 fn stored() -> Run {
-    Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 6\n")
-        .set("simulation.output.store=true")
+    Run::simulated(6).set("simulation.output.store=true")
 }
 
 #[test]
-fn a_recording_that_gyre_did_not_write_is_never_removed() {
+fn a_file_that_gyre_did_not_write_into_a_recording_is_never_removed() {
     let run = stored();
-    let theirs = run.out().join("recording");
-    fs::create_dir_all(theirs.join("radar")).unwrap();
-    fs::write(theirs.join("radar/1.png"), "theirs").unwrap();
+    let theirs = run.out().join("recording/radar/1.png");
+    fs::create_dir_all(theirs.parent().unwrap()).unwrap();
+    fs::write(&theirs, "theirs").unwrap();
     run.finish()
         .failed_with(&["recording", "1.png", "no file of this dataset", "--out"]);
-    assert_eq!(fs::read(theirs.join("radar/1.png")).unwrap(), b"theirs");
-}
-
-#[test]
-fn a_file_that_was_added_to_a_recording_is_never_removed() {
-    let run = stored();
+    assert_eq!(fs::read(&theirs).unwrap(), b"theirs");
+    fs::remove_dir_all(run.out().join("recording")).unwrap();
     run.complete();
     let notes = run.out().join("recording/notes.txt");
     fs::write(&notes, "rain").unwrap();

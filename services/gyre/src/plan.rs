@@ -112,25 +112,20 @@ mod tests {
                 .map(|plan| plan.name)
                 .collect()
         };
-        let (source, halves) = (
-            ["radar-replay", "masking"],
-            ["rotation-search", "translation-search"],
-        );
-        let (joint, refined, searched) = (
-            ["joint-search"],
-            ["refinement", "pose-integration"],
-            ["pose-integration"],
-        );
-        assert_eq!(names(""), [&source[..], &halves, &refined].concat());
-        assert_eq!(
-            names("[refinement]\nkind = 'none'"),
-            [&source[..], &halves, &searched].concat()
-        );
-        let exhaustive = "[search]\nkind = 'exhaustive'\n";
-        assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
-        assert_eq!(
-            names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
-            [&source[..], &joint, &searched].concat()
-        );
+        for (text, expected) in [
+            ("", "rotation-search translation-search refinement"),
+            (
+                "[refinement]\nkind = 'none'",
+                "rotation-search translation-search",
+            ),
+            ("[search]\nkind = 'exhaustive'", "joint-search refinement"),
+            (
+                "[search]\nkind = 'exhaustive'\n[refinement]\nkind = 'none'",
+                "joint-search",
+            ),
+        ] {
+            let expected = format!("radar-replay masking {expected} pose-integration");
+            assert_eq!(names(text).join(" "), expected);
+        }
     }
 }

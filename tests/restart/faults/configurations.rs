@@ -456,24 +456,11 @@ pub fn network_at_an_unreadable_scan() -> Configuration {
     }
 }
 
-pub fn network_at_a_gap() -> Configuration {
-    Configuration {
-        name: "network_at_a_gap",
-        run: network_of_two_scans().run,
-        can: runtime_is_installed,
-        ..gap()
-    }
-}
-
 /// A simulation that is rendered while it is played.
 pub fn simulation() -> Configuration {
     Configuration {
         name: "simulation",
-        run: |_| {
-            let run =
-                Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n");
-            run.set("simulation.sensor.profile=cts350x-radiate")
-        },
+        run: |_| Run::simulated(24).set("simulation.sensor.profile=cts350x-radiate"),
         ..SMALL
     }
 }

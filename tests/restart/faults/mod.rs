@@ -127,7 +127,6 @@ mod nightly {
         gyro_and_wheels: processes_are_killed_in_storms;
         doppler: each_process_is_killed;
         network_of_two_scans: the_supervisor_is_killed;
-        network_at_a_gap: each_process_is_killed;
         objects: a_process_is_killed_again_and_again the_run_is_interrupted;
         gnss: a_process_is_killed_again_and_again;
         loops: a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes

@@ -211,13 +211,4 @@ mod tests {
         settle(&out).unwrap();
         assert!(!is_kept(&out) && !is_complete(out.path()));
     }
-
-    #[test]
-    fn a_run_without_a_motion_makes_no_way_for_itself() {
-        let (_folder, out) = being_replaced();
-        compute(&out, 0..1);
-        assert!(!make_way(&out, 1).unwrap());
-        settle(&out).unwrap();
-        assert!(!is_kept(&out) && is_complete(out.path()));
-    }
 }

@@ -188,17 +188,4 @@ mod tests {
         forgotten.kill().unwrap();
         forgotten.wait().unwrap();
     }
-
-    #[test]
-    fn a_guardian_has_the_groups_that_there_are_when_it_begins() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("messages");
-        let script = format!("cat > {}", path.display());
-        let command = ["sh", "-c", &script].map(str::to_owned);
-        let guardian = Guardian::start(&command, folder.path(), [7, 9]).unwrap();
-        guardian.forget(7);
-        drop(guardian);
-        let messages = [7, 9, -7].map(RawPid::to_ne_bytes);
-        assert_eq!(std::fs::read(path).unwrap(), messages.as_flattened());
-    }
 }

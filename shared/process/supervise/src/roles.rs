@@ -66,30 +66,3 @@ impl<'a> Roles<'a> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tests::{FOLLOWER, MASKING, REFINEMENT, SOURCE, plan};
-
-    #[test]
-    fn a_restart_of_all_spares_a_living_live_source_and_the_followers() {
-        let mut plan = plan();
-        let all = |plan: &Plan, dead: &[usize]| Roles::of(plan).all_but_survivors(dead);
-        assert_eq!(all(&plan, &[]), [SOURCE, MASKING, REFINEMENT]);
-        plan.stages[SOURCE].outlives_restarts = true;
-        assert_eq!(all(&plan, &[MASKING]), [MASKING, REFINEMENT]);
-        assert_eq!(all(&plan, &[SOURCE]), [SOURCE, MASKING, REFINEMENT]);
-        assert!(Roles::of(&plan).follows(FOLLOWER));
-    }
-
-    #[test]
-    fn a_process_is_restarted_alone_unless_that_does_not_recover_its_state() {
-        let mut plan = plan();
-        assert_eq!(Roles::of(&plan).restarted_with(MASKING), [MASKING]);
-        plan.stages[MASKING].restarts_all = true;
-        let all = [SOURCE, MASKING, REFINEMENT];
-        assert_eq!(Roles::of(&plan).restarted_with(MASKING), all);
-        assert_eq!(Roles::of(&plan).restarted_with(FOLLOWER), [FOLLOWER]);
-    }
-}

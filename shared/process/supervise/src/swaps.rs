@@ -233,7 +233,6 @@ pub(crate) fn plan_of(begun: &StagePlan, swap: &Swap) -> StagePlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::{MASKING, plan};
 
     #[test]
     fn a_ready_program_takes_over_between_scans_or_when_there_is_no_such_moment() {
@@ -259,22 +258,5 @@ mod tests {
         let swaps = Swaps::default();
         assert_eq!(swaps.why_not_now(true), Some(ENDED));
         assert_eq!(swaps.why_not_now(false), None);
-    }
-
-    #[test]
-    fn a_swap_changes_the_command_alone() {
-        let begun = &plan().stages[MASKING];
-        let swap = |command| Swap {
-            process: begun.name.clone(),
-            command,
-            directory: "/".into(),
-            cold: false,
-        };
-        let other = plan_of(begun, &swap(Some(vec!["other".to_owned()])));
-        assert_eq!(
-            (other.name.as_str(), other.command),
-            ("masking", vec!["other".to_owned()])
-        );
-        assert_eq!(plan_of(begun, &swap(None)).command, begun.command);
     }
 }
