@@ -11,7 +11,6 @@
 //! ```
 
 pub mod configurations;
-mod environment;
 mod input;
 mod kills;
 mod limits;
@@ -41,7 +40,7 @@ struct Fault {
 mod kinds {
     #![allow(non_upper_case_globals)]
 
-    use super::{Fault, Need, environment, input, kills, limits, results};
+    use super::{Fault, Need, input, kills, limits, results};
 
     macro_rules! kinds {
         ($($name:ident: $strike:path $(, $need:ident)*;)*) => {
@@ -61,15 +60,13 @@ mod kinds {
         the_run_is_interrupted: kills::interrupt;
         the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
         the_disk_is_full: results::disk_full, Mounts;
-        input_and_output_fail: results::io_errors, Fiu;
-        files_may_not_grow: limits::file_sizes, Prlimit;
+        files_may_not_grow: limits::file_sizes;
         the_results_are_read_only: results::read_only, Mounts, OtherUser;
         the_results_vanish: results::vanish;
         the_recording_has_gaps: input::gaps;
         the_recording_vanishes: input::vanishes;
-        the_clock_is_set: environment::clock_step, Faketime;
-        memory_runs_out: limits::memory, Prlimit;
-        descriptors_run_out: limits::descriptors, Prlimit;
+        memory_runs_out: limits::memory;
+        descriptors_run_out: limits::descriptors;
     }
 }
 
@@ -100,8 +97,8 @@ rows! {
         the_run_is_interrupted_as_it_starts the_recording_has_gaps the_recording_vanishes;
     slam: each_process_is_killed a_process_is_killed_as_it_writes processes_are_killed_in_storms
         the_supervisor_is_killed the_supervisor_is_killed_as_it_writes_results the_disk_is_full
-        input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-        the_clock_is_set memory_runs_out descriptors_run_out;
+        files_may_not_grow the_results_are_read_only the_results_vanish
+        memory_runs_out descriptors_run_out;
     loops: each_process_is_killed;
     gap: each_process_is_killed;
     unreadable: each_process_is_killed;
@@ -133,15 +130,15 @@ mod nightly {
             a_process_is_killed_after_the_last_pose
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
-            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes memory_runs_out
             descriptors_run_out;
         radiate: each_process_is_killed a_process_is_killed_as_it_starts
             a_process_is_killed_as_it_writes
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
-            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes memory_runs_out
             descriptors_run_out;
     }
 }

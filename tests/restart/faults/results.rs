@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use rand::{Rng, seq::IndexedRandom};
+use rand::Rng;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
@@ -50,32 +50,6 @@ pub fn disk_full(scene: &mut Scene) -> Option<()> {
     let ended = running.finish();
     let _ = fs::remove_file(run.out().join(FILLER));
     mount.remount(&format!("size={PLENTY}"));
-    scene.survived(&run, &ended);
-    Some(())
-}
-
-/// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers
-/// of its own.
-pub fn io_errors(scene: &mut Scene) -> Option<()> {
-    let call = *[
-        "rw/write",
-        "rw/pwrite",
-        "rw/*",
-        "sync/*",
-        "dir/rename",
-        "oc/open",
-    ]
-    .choose(&mut scene.rng)?;
-    // As Linux numbers them.
-    let (io_error, no_space) = (5, 28);
-    let error = *[io_error, no_space].choose(&mut scene.rng)?;
-    let probability = 10_f64.powf(scene.rng.random_range(-4.0..-1.0));
-    let command =
-        format!("enable_random name=posix/io/{call},probability={probability:.5},failinfo={error}");
-    println!("{command}");
-    let run = scene.run();
-    let failing = wrapped(&["fiu-run", "-f", "", "-x", "-c", &command], &run.command());
-    let ended = run.start_as(failing).finish();
     scene.survived(&run, &ended);
     Some(())
 }

@@ -19,12 +19,6 @@ pub enum Need {
     Mounts,
     /// Another user who can execute the program.
     OtherUser,
-    /// `prlimit` of util-linux.
-    Prlimit,
-    /// libfiu's preloaded library.
-    Fiu,
-    /// libfaketime's preloaded library.
-    Faketime,
 }
 
 impl Need {
@@ -40,18 +34,6 @@ impl Need {
             Self::OtherUser => (
                 works(&[&AS_NOBODY[..], &[crate::PROGRAM, "--version"]].concat()),
                 "another user cannot execute the program (needs root, and a build folder that all can read)",
-            ),
-            Self::Prlimit => (
-                works(&["prlimit", "--version"]),
-                "prlimit of util-linux is not installed",
-            ),
-            Self::Fiu => (
-                works(&["fiu-run", "-x", "true"]),
-                "fiu-run is not installed (Debian: fiu-utils)",
-            ),
-            Self::Faketime => (
-                faketime().is_some(),
-                "libfaketime is not installed (Debian: faketime)",
             ),
         };
         (!there).then_some(missing)
@@ -71,13 +53,6 @@ pub fn give_to_nobody(run: &Run) {
     fs::set_permissions(run.folder(), Permissions::from_mode(0o755)).unwrap();
     fs::create_dir_all(run.out()).unwrap();
     chown(run.out(), Some(NOBODY), Some(NOBODY)).unwrap();
-}
-
-/// The library that fakes the clock.
-pub fn faketime() -> Option<PathBuf> {
-    let folders = fs::read_dir("/usr/lib").into_iter().flatten().flatten();
-    let library = |folder: fs::DirEntry| folder.path().join("faketime/libfaketimeMT.so.1");
-    folders.map(library).find(|path| path.is_file())
 }
 
 fn works(command: &[&str]) -> bool {
