@@ -184,8 +184,7 @@ impl Recorded {
         })
     }
 
-    /// Refuses another drive that was read with different constants, since its findings are changes
-    /// to those constants.
+    /// The findings are changes to the constants that a drive was read with.
     fn require_same_constants(&self, other: &Self) -> Result<(), Failure> {
         let constants = [self, other].map(|it| {
             let geometry = &it.configured.geometry;

@@ -18,8 +18,7 @@ use crate::{
     run::resolve,
 };
 
-/// The configuration of a test that names neither a configuration nor a recording: the shape of the
-/// program's messages matters, not the accuracy.
+/// The shape of the program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
 /// Places for observers in addition to the places of a run; the test uses some.
 const OBSERVERS: usize = 4;
@@ -27,8 +26,7 @@ const OBSERVERS: usize = 4;
 /// The exit code if some rules could not be tested, which is no evidence against the program.
 const NOT_TESTED: u8 = 2;
 
-/// Tests a program, and prints the rules that it breaks. The exit code is 0 if it keeps the
-/// contract, 1 if it breaks a rule, and 2 if not all could be tested.
+/// The exit code is 0 if it keeps the contract, 1 if not, and 2 if not all could be tested.
 pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
     match examine(arguments) {
         Ok(Some(report)) => print(&report, arguments.json),
@@ -117,8 +115,6 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
     })
 }
 
-/// The configuration of the runs that the program is tested in: lossless, with the stage, of some
-/// scans.
 fn configuration(
     arguments: &ConformanceArguments,
     stage: StageId,

@@ -155,8 +155,7 @@ impl Earlier {
     }
 }
 
-/// Returns the state of a folder without poses: anything begun there may begin again, and the same
-/// run may continue its recording.
+/// Anything begun there may begin again, and the same run may continue its recording.
 fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
     let holds = Holds::Unfinished(0);
     let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
@@ -166,8 +165,7 @@ fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) 
     }
 }
 
-/// Checks that a complete run may be replaced by this one without being asked for it: by the same
-/// results.
+/// A complete run may be replaced by the same results without being asked for it.
 fn complete(
     out: &Out,
     configuration: &Configuration,
@@ -205,8 +203,7 @@ pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
 
-/// Returns whether a log of followers has its end; a damaged one may be removed, and is then
-/// computed again in these words.
+/// A damaged log may be removed, and is then computed again in these words.
 fn has_ended<R: gyre_slam::Record>(out: &Out, again: &str) -> Result<bool, Failure> {
     match RecordReader::<R>::open(out.path()) {
         Ok(records) => Ok(records.has_ended()),
@@ -395,8 +392,7 @@ pub fn begin(
     Ok(storage::write(&out.join(CONFIGURATION), resolved)?)
 }
 
-/// Returns whether results of so many poses may take the place of those in the folder: a run
-/// without a motion does not replace a complete one.
+/// A run without a motion does not replace a complete one.
 pub fn replaces(out: &Out, poses: usize) -> bool {
     poses >= replaced::WITH_MOTION || !replaced::is_kept(out)
 }
@@ -411,8 +407,7 @@ pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
     Ok(replaces)
 }
 
-/// Ends a run whose results are in place, and survive a power failure by now. A complete run is
-/// marked as complete.
+/// Ends a run whose results are in place, and survive a power failure by now.
 pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     if !replaces(out, poses) {
         return Ok(replaced::give_back(out)?);

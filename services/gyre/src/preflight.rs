@@ -229,8 +229,7 @@ pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     }
 }
 
-/// Returns whether each scan that cannot be read is a problem: see
-/// [`Session::needs_all`](gyre_results::Session).
+/// See [`Session::needs_all`](gyre_results::Session).
 pub(crate) fn needs_all(dataset: &dyn Dataset) -> bool {
     matches!(dataset.format(), Format::Mcap | Format::Ros2Bag)
 }
@@ -249,8 +248,7 @@ fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
     })
 }
 
-/// Checks that a process may open as many files as it needs. The transport's own errors would not
-/// name the missing limit.
+/// The transport's own errors would not name the missing limit.
 pub fn check_open_files() -> Result<(), Failure> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(format!(
@@ -261,8 +259,7 @@ pub fn check_open_files() -> Result<(), Failure> {
     }
 }
 
-/// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire
-/// the run's root first, which removes them.
+/// Acquire the run's root first, which removes the memory of killed runs.
 pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
     let free = free_shared_memory();
     let free = free.map_err(|error| format!("cannot use shared memory at /dev/shm: {error}"))?;

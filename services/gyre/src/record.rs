@@ -7,8 +7,6 @@ use gyre_terminal::{Failure, print, seconds};
 
 use crate::cli::{RecordArguments, SplitArguments};
 
-/// Records a run until its end or an interrupt, and reports the numbers of recorded and missed
-/// messages.
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     let span = seconds("--split-s", arguments.split.split_s)?;
     let options = Options {

@@ -59,8 +59,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     )
 }
 
-/// Runs a resolved configuration, and prints its figures in a form. A `fresh` run starts from
-/// nothing.
+/// A `fresh` run starts from nothing.
 pub(crate) fn compute(
     mut configuration: Configuration,
     out: Out,
@@ -344,8 +343,7 @@ fn finish(
     Ok(written)
 }
 
-/// Puts the fixes that the run has used beside its recording, for its replays. The run has its
-/// results without, as it has without the recording.
+/// Puts the fixes that the run has used beside its recording, for its replays.
 fn keep_fixes(configuration: &Configuration, out: &Out) {
     let (record, gnss) = (&configuration.record, &configuration.gnss);
     let received = received_fixes(out.path());
@@ -406,8 +404,7 @@ fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<Exit
 /// The environment variable of a run that has started over: the poses that it resumed after before.
 const STARTED_OVER: &str = "GYRE_STARTED_OVER";
 
-/// Returns whether the run has started over since it resumed after so many poses: once more would
-/// not help.
+/// Once more would not help.
 fn has_started_over_at(poses: usize) -> bool {
     env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
 }

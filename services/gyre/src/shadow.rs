@@ -13,8 +13,7 @@ use gyre_tools::operate::chosen;
 
 use crate::{cli::ShadowArguments, preflight};
 
-/// Compares until the run ends or the given time is over, and prints the report. The exit code is 1
-/// if nothing was compared, or the program died, hung or broke the contract.
+/// The exit code is 1 if nothing was compared, or the program died, hung or broke the contract.
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;

@@ -69,8 +69,7 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     Ok(arguments.set.iter().cloned().chain(options).collect())
 }
 
-/// Writes the recording of a run to `out`, or completes it. If `replace`, it replaces the recording
-/// of an earlier run.
+/// If `replace`, it replaces the recording of an earlier run.
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     match write(threads, simulation, out) {

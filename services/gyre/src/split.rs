@@ -26,8 +26,7 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
         .map_err(|error| format!("[link]: {error}").into())
 }
 
-/// Executes the same command again with the environment that the network layer needs, unless it has
-/// that already.
+/// Executes the same command again with the environment that the network layer needs.
 pub fn set_environment() -> Result<(), Failure> {
     let (name, value) = ONE_THREAD;
     if env::var_os(name).is_some_and(|set| set == value) {

@@ -81,8 +81,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
     })
 }
 
-/// Checks that this is the supervisor's build. A command of the configuration may name a different
-/// build.
+/// A command of the configuration may name a different build.
 fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     let path = own();
     let supervisor = PathBuf::from(format!(
@@ -111,8 +110,6 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     }
 }
 
-/// Receives from a radar or from the other side of a link, or plays a recording, or a simulation as
-/// it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {

@@ -74,8 +74,7 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
-/// Returns the format of a recording and the constants of its radar: from its `dataset.toml`, then
-/// from its format. A recorded run has its own.
+/// The constants of a `dataset.toml` go before those of its format. A recorded run has its own.
 pub fn radar_constants(
     data: &Path,
     wished: &DatasetOptions,
@@ -114,8 +113,6 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     })
 }
 
-/// Returns the constants of the radar of a dataset, from its configuration in the
-/// program.
 fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     let name = match format {
         Format::Oxford => "oxford",

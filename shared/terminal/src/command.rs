@@ -11,8 +11,7 @@ use std::{
 
 use crate::failure::Failure;
 
-/// Returns a path that leads to the program that this process executes, for this process and its
-/// children.
+/// Returns a path of the program that this process executes, for its children too.
 pub fn own() -> PathBuf {
     PathBuf::from(format!("/proc/{}/exe", process::id()))
 }

@@ -39,8 +39,8 @@ fn recorded(machine: &Machine, out: &Path) -> Vec<Operation> {
     recorder.operations()
 }
 
-/// Lets the next run follow a power failure that left `state`: a power failure alone damages nothing
-/// that was safe, so no run is refused.
+/// Lets the next run follow a power failure that left `state`: a power failure alone damages
+/// nothing that was safe, so no run is refused.
 fn check(machine: &Machine, tried: &mut HashSet<u64>, state: &State, case: &str) {
     let mut hasher = DefaultHasher::new();
     state.hash(&mut hasher);

@@ -91,8 +91,7 @@ fn is_same(begun: &Identity, configuration: &Configuration) -> Result<bool, Fail
     begun.has_inputs_of(configuration, &replaced)
 }
 
-/// Returns whether the folder has the results of all these scans with this configuration, by
-/// whatever build.
+/// Returns whether the folder has the results of these scans, by whatever build.
 fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     // A run reports files that cannot be read.
@@ -120,8 +119,7 @@ fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
     })
 }
 
-/// Returns whether an unfinished run in the folder, if there is one, continues with this
-/// configuration. A run of another configuration, build or version is discarded.
+/// A run of another configuration, build or version is discarded.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
     let earlier = Earlier::of(out, configuration, &program::now(configuration)?, false)?;
     Ok(match (&earlier, earlier.identity()) {

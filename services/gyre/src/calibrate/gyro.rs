@@ -18,8 +18,7 @@ pub(super) struct Gyro {
 }
 
 impl Gyro {
-    /// Reads the log that is named, or else that which lies beside the scans. One that lies there
-    /// and cannot be used is named, and left alone.
+    /// A log that lies beside the scans and cannot be used is named, and left alone.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,

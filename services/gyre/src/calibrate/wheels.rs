@@ -18,8 +18,6 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
-    /// Reads the log that is named, or else that which lies beside the scans. One that lies there
-    /// and cannot be used is named, and left alone.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,

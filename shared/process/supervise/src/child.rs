@@ -122,8 +122,7 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Returns to the program before a swap, from the next start on; or to `begun`, the program of
-    /// the run's begin, if a file of the former has changed since. False without such a program.
+    /// Or to `begun`, the program of the run's begin, if a file of the one before has changed.
     pub fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
@@ -280,8 +279,7 @@ impl Child {
     }
 }
 
-/// Returns the file where a process writes why it ended. One that stands by has its own: the other
-/// is in use.
+/// A process that stands by has its own file: the other is in use.
 fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
     let stands_by = position == Position::Taken;
     manifest.root.join(launch::last_words(name, stands_by))

@@ -83,8 +83,7 @@ impl<'a> Followers<'a> {
         self.roles.follows(process) && !self.has_given_up(process) && !is_done()
     }
 
-    /// Returns the followers to wait for. None reads what one writes that is not restarted any
-    /// more, or one behind it.
+    /// No follower reads a log of one that was given up, or one behind it.
     pub fn behind(&self) -> Vec<usize> {
         let given_up = self.given_up.iter().map(|(follower, _)| *follower).min();
         let followers = self.roles.followers();

@@ -84,8 +84,7 @@ impl Guardian {
         self.process.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
-    /// Takes a group from the care of the guardian: its processes are dead, and its number may be
-    /// reused.
+    /// Forgets a group: the processes are dead, and the number may be reused.
     pub fn forget(&self, group: u32) {
         if let Some(pipe) = &self.groups {
             send(pipe, -(group as RawPid));
@@ -153,8 +152,7 @@ pub fn guard(mut messages: impl Read, root: Option<&Path>) {
     }
 }
 
-/// Returns whether a group has a process that has not ended. One that nobody waits for stays as a
-/// zombie.
+/// A process that nobody waits for stays as a zombie.
 fn lives(group: Pid) -> bool {
     let group = group.as_raw_pid() as u32;
     ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)

@@ -124,8 +124,7 @@ fn lock(collected: &Mutex<Collected>) -> MutexGuard<'_, Collected> {
 }
 
 impl Collected {
-    /// Writes the data in the pipe; returns whether more can come. A stage that floods is left for
-    /// others to look at after a while.
+    /// A stage that floods is left for others to look at after a while.
     fn take(&mut self) -> bool {
         for _ in 0..ROUNDS {
             match rustix::io::read(&self.input, &mut self.buffer[..]) {
@@ -207,8 +206,7 @@ fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
-/// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append
-/// to it do not notice.
+/// The processes that append to it do not notice.
 fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {

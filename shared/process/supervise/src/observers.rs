@@ -26,8 +26,7 @@ impl Sweep {
         }
     }
 
-    /// Removes what killed observers left, if it is time to look. `processes` is the number of the
-    /// run's own processes.
+    /// `processes` is the number of the run's own processes.
     pub(crate) fn run_if_due(&mut self, run: &Run<'_>, processes: usize) {
         let now = Instant::now();
         if now < self.due {

@@ -37,7 +37,6 @@ impl IndexMut<usize> for Processes {
 }
 
 impl Processes {
-    /// Starts all processes of the plan.
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
@@ -63,13 +62,11 @@ impl Processes {
         ended.partition(|i| roles.follows(*i))
     }
 
-    /// Returns whether all stages have opened their topics.
     pub fn are_ready(&self, run: &Run<'_>) -> bool {
         let mut stages = self.iter().filter(|child| child.stage().is_some());
         stages.all(|stage| !run.is_starting(stage))
     }
 
-    /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
         let opening = self.iter().filter(|child| run.is_starting(child));
         opening.min_by_key(|child| child.started)

@@ -79,8 +79,7 @@ impl Supervisor<'_> {
         )));
     }
 
-    /// Ends a process and starts it again, which counts as a restart and not as a death. A process
-    /// that could not be started again continues.
+    /// It counts as a restart and not as a death.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(name) else {
             let newest = self.poses.newest_seq();
@@ -110,8 +109,7 @@ impl Supervisor<'_> {
         self.restart(stages, clock::now_ns())
     }
 
-    /// Starts a program that is to replace another. The client has its answer when that has done
-    /// so, and has worked on a first pose.
+    /// The client has its answer when the new program has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
@@ -128,8 +126,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends a process, and starts another program in its place. If that cannot be started, the one
-    /// before is started again.
+    /// If the new program cannot be started, the one before is started again.
     fn swap_cold(
         &mut self,
         process: usize,
@@ -203,8 +200,6 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Reports that a program has replaced another, and lets the client wait until it proves
-    /// itself.
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
         self.swaps.has_swapped(&child.plan, self.poses.count());

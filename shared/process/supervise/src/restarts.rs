@@ -22,8 +22,7 @@ impl Supervisor<'_> {
         self.restart(&restarted, died_ns)
     }
 
-    /// Returns to the programs before those on trial while another stage fails: their messages may
-    /// be the cause. Returns them.
+    /// The messages of a program on trial may be why another stage fails. Returns them.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
@@ -54,8 +53,7 @@ impl Supervisor<'_> {
         Ok(failure)
     }
 
-    /// Checks whether a dead process may be started again, by its policy. One that has taken the
-    /// place of another gives way to it first.
+    /// A program that has taken the place of another gives way to it first.
     fn require_restart(&mut self, process: usize, death: &Death) -> Result<(), SuperviseError> {
         if self.processes[process].is_on_trial && self.go_back(process, &death.to_string()) {
             return Ok(());
@@ -103,8 +101,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends processes and starts replacements; one of the replacements may be the process on
-    /// standby.
+    /// One of the replacements may be the process on standby.
     pub(crate) fn replace(
         &mut self,
         processes: &[usize],
@@ -130,8 +127,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Starts a process again. If its program cannot be started and had replaced another, the
-    /// replaced program is started.
+    /// If its program cannot be started and had replaced another, that one is started.
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
@@ -179,8 +175,7 @@ impl Supervisor<'_> {
         self.restart(&processes, clock::now_ns())
     }
 
-    /// Restarts dead followers that are not at their end. The stages do not notice, and one that
-    /// cannot be restarted does not end them.
+    /// The stages do not notice, and one that cannot be restarted does not end them.
     pub(crate) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let mut dead = dead.to_vec();
         dead.retain(|i| self.followers.is_behind(*i));
@@ -206,8 +201,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Reports the progress of a follower, and ends one that has stayed there for too long: it is
-    /// then started again as after a death.
+    /// A follower that has stayed for too long is started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
         let progress = self.followers.progress_of(follower);

@@ -45,8 +45,7 @@ pub struct Rig<'a> {
     _root: RunRoot,
 }
 
-/// A process that is started in a [`Rig`] as the supervisor starts it. It is killed when this value
-/// is dropped.
+/// A process as the supervisor starts it. It is killed when this value is dropped.
 pub struct Process {
     child: Child,
     death: Option<Death>,
@@ -121,7 +120,6 @@ impl<'a> Rig<'a> {
         &self.manifest
     }
 
-    /// Starts a process with the environment and the process group that a stage of this name has.
     /// The output is appended to the log of the process.
     pub fn start(
         &self,
@@ -179,8 +177,7 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// Sleeps until one of these topics has a new reader, a connection has something to read, or
-    /// `limit` has passed; true on a request to stop.
+    /// True on a request to stop.
     pub fn sleep_until_readable(
         &self,
         feeds: &[&dyn Feed],
@@ -194,8 +191,7 @@ impl<'a> Rig<'a> {
         Ok(woken.stop)
     }
 
-    /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to
-    /// stop.
+    /// True on a request to stop.
     pub fn sleep(&self, taps: &[&dyn Tap], limit: Duration) -> Result<bool, StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
         self.signals.sleep_until_any(&listeners, limit)

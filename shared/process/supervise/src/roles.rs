@@ -57,8 +57,6 @@ impl<'a> Roles<'a> {
         self.0[process].restarts_all
     }
 
-    /// Returns the processes to restart with one of them: itself, or all stages if its restart
-    /// alone does not recover its state.
     pub fn restarted_with(self, process: usize) -> Vec<usize> {
         match self.restarts_all(process) {
             true => self.all_but_survivors(&[process]),

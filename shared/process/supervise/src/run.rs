@@ -103,8 +103,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried
-    /// again at the next wake-up.
+    /// Without room for a process it is tried again at the next wake-up.
     pub fn keep_guardian(&mut self, groups: impl Iterator<Item = u32>) {
         if self.guardian.has_ended()
             && let Ok(guardian) =

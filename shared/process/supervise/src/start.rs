@@ -81,8 +81,7 @@ impl<'a> Starter<'a> {
         }
     }
 
-    /// Returns the command of a process, which writes to `refusals` which key of its scheduling the
-    /// system refuses.
+    /// It writes to `refusals` which key of its scheduling the system refuses.
     fn command(
         &self,
         plan: &StagePlan,
@@ -125,8 +124,7 @@ impl<'a> Starter<'a> {
     }
 }
 
-/// Starts a process, and tries again while the system has no room for one. A request to stop ends
-/// the attempts.
+/// A request to stop ends the attempts.
 fn with_patience<T>(
     mut start: impl FnMut() -> io::Result<T>,
     mut pause: impl FnMut(Duration) -> Result<bool, StageError>,

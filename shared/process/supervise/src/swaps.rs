@@ -68,8 +68,6 @@ impl Swaps {
         }
     }
 
-    /// Starts a program that is to take the place of a process. The client has its answer when that
-    /// has done so, and has worked on a first pose.
     pub fn begin(
         &mut self,
         process: usize,
@@ -95,8 +93,7 @@ impl Swaps {
         Ok(())
     }
 
-    /// Looks after the program that stands by. `is_in_flight` returns whether a scan lacks its
-    /// pose.
+    /// `is_in_flight` returns whether a scan lacks its pose.
     pub fn step(&mut self, run: &Run<'_>, is_in_flight: impl FnOnce() -> bool) -> Step {
         let Some(mut standby) = self.standby.take() else {
             return Step::Wait;
@@ -147,8 +144,7 @@ impl Swaps {
         });
     }
 
-    /// Returns to the program before a swap, or to `begun`, the program of the run's begin, from
-    /// the next start on; false without such a program.
+    /// False without a program to go back to.
     pub fn go_back(
         &mut self,
         process: usize,
@@ -183,8 +179,7 @@ impl Standby {
         (self.child, self.client)
     }
 
-    /// Informs the client why the program cannot take over, and ends the program. Returns the
-    /// process that it was.
+    /// Returns the process that it was.
     pub fn give_up(self, reason: &str) -> u32 {
         let name = self.child.name();
         let command = self.child.plan.command.join(" ");

@@ -11,16 +11,13 @@ use crate::ProcessStat;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
     pub cpu_s: f64,
-    /// Memory that is the process's own, bytes: neither files nor memory that it shares with
-    /// others.
+    /// Neither files nor memory that it shares with others.
     pub own_bytes: u64,
     /// Memory that is mapped into the process and present, bytes, including shared memory.
     pub resident_bytes: u64,
-    /// Times that its threads have gone to sleep: each is a wake-up. A thread that has ended
-    /// takes its count with it.
+    /// Times that its threads have gone to sleep; counts of ended threads are gone.
     pub wake_ups: u64,
-    /// Times that its threads were taken off a processor while they had work; counts of ended
-    /// threads are gone.
+    /// Times that its threads were taken off a processor while they had work.
     pub preemptions: u64,
     pub threads: u64,
 }

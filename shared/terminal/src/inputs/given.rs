@@ -56,14 +56,12 @@ impl Inputs {
         }
     }
 
-    /// Reads the named configuration; without a name, the configuration of the recording, which is
-    /// then printed. The scans come from the recording, or from the configuration.
+    /// The scans come from the recording, or from the configuration.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
         self.configuration_of(&self.given_recording()?)
     }
 
-    /// As [`configuration`](Self::configuration), of another recording that is read in the same
-    /// way.
+    /// As [`configuration`](Self::configuration), of another recording.
     pub fn configuration_with(&self, data: &Path) -> Result<Configuration, Failure> {
         self.configuration_of(&Given {
             data: Some(data.to_owned()),
@@ -77,8 +75,7 @@ impl Inputs {
     }
 }
 
-/// Reads a configuration by its path or its name, and prints the place of its files if that is not
-/// clear.
+/// Prints the place of the files of a configuration if that is not clear.
 pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();

@@ -27,8 +27,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Determines the kind of a word: by existing files, then by the names in the program, then by
-    /// its form.
+    /// Existing files go before the names in the program, and those before the form.
     pub fn of(word: &Path) -> Self {
         let ending = word.extension().and_then(|ending| ending.to_str());
         let is_recording = ending.is_some_and(|ending| RECORDINGS.contains(&ending));
@@ -63,8 +62,7 @@ fn is_text(path: &Path) -> bool {
     path.is_file() && start().is_ok_and(|start| !start.contains(&0))
 }
 
-/// Returns whether a text is an address on the network: `192.168.0.1`, with or without a port, a
-/// group as `udp://239.192.43.78:4378`, or `HOST:PORT`.
+/// `192.168.0.1`, with or without a port, `udp://239.192.43.78:4378`, or `HOST:PORT`.
 fn is_address(text: &str) -> bool {
     let is_host = |host: &str| !host.is_empty() && !host.contains('/');
     let has_port = text

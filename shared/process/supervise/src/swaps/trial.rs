@@ -21,8 +21,7 @@ pub(super) struct Trial {
 }
 
 impl Swaps {
-    /// Lets the client of a swap wait. Poses do not show the work of a follower: so its swap is
-    /// done when it is started.
+    /// Poses do not show the work of a follower.
     pub fn await_trial(&mut self, process: usize, child: &Child, client: Client) {
         if child.stage().is_none() {
             client.answer(&Answer::Done);
@@ -69,8 +68,6 @@ impl Swaps {
         })
     }
 
-    /// Informs the client that the program has failed, and that the previous program is started
-    /// again.
     pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
         let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
