@@ -123,16 +123,17 @@ impl Swaps {
     }
 
     pub fn pending(&self, processes: &Processes, run: &Run<'_>) -> Option<PendingSwap> {
-        let Some(standby) = &self.standby else {
-            return self.pending_trial(processes);
+        let (child, since, limit) = match (&self.standby, &self.trial) {
+            (Some(standby), _) => (&standby.child, standby.since, run.plan.start_timeout),
+            (None, Some(trial)) => (&processes[trial.process], trial.since, Some(trial::LIMIT)),
+            (None, None) => return None,
         };
-        let plan = &standby.child.plan;
         Some(PendingSwap {
-            process: plan.name.clone(),
-            command: plan.command.clone(),
-            has_taken_over: false,
-            waited_s: standby.since.elapsed().as_secs_f64(),
-            limit_s: run.plan.start_timeout.map(|limit| limit.as_secs_f64()),
+            process: child.plan.name.clone(),
+            command: child.plan.command.clone(),
+            has_taken_over: self.standby.is_none(),
+            waited_s: since.elapsed().as_secs_f64(),
+            limit_s: limit.map(|limit| limit.as_secs_f64()),
         })
     }
 

@@ -3,21 +3,21 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::control::{Answer, PendingSwap};
+use gyre_stage::control::Answer;
 
 use super::Swaps;
 use crate::{child::Child, processes::Processes, run::Run, socket::Client};
 
 /// Time for which a client waits for the first pose, from when the program has opened its topics. A
 /// radar may be switched off.
-const LIMIT: Duration = Duration::from_secs(10);
+pub(super) const LIMIT: Duration = Duration::from_secs(10);
 
 pub(super) struct Trial {
     /// The index of the process on trial.
-    process: usize,
+    pub(super) process: usize,
     client: Client,
     /// When it was last seen without its topics.
-    since: Instant,
+    pub(super) since: Instant,
 }
 
 impl Swaps {
@@ -54,18 +54,6 @@ impl Swaps {
             () if trial.client.has_gone() => {}
             () => self.trial = Some(trial),
         }
-    }
-
-    pub(super) fn pending_trial(&self, processes: &Processes) -> Option<PendingSwap> {
-        let trial = self.trial.as_ref()?;
-        let plan = &processes[trial.process].plan;
-        Some(PendingSwap {
-            process: plan.name.clone(),
-            command: plan.command.clone(),
-            has_taken_over: true,
-            waited_s: trial.since.elapsed().as_secs_f64(),
-            limit_s: Some(LIMIT.as_secs_f64()),
-        })
     }
 
     pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
