@@ -30,10 +30,10 @@ use gyre_tools::operate::{
 use gyre_tools::radar_server::RadarServerArguments;
 use gyre_tools::report::ReportArguments;
 
-pub use batch::{BatchArguments, BatchDriveArguments};
+pub use batch::BatchArguments;
 pub use conformance::ConformanceArguments;
 pub use help::command;
-pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
+pub use link::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 pub use record::{RecordArguments, SplitArguments};
 pub use ros2::Ros2Arguments;
 pub use shadow::ShadowArguments;
@@ -69,7 +69,13 @@ pub enum Command {
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_tools::batch::COMMAND)]
-    BatchDrive(BatchDriveArguments),
+    BatchDrive {
+        /// The process that has started it, and whose end also ends it.
+        #[arg(long)]
+        parent: i32,
+        #[command(flatten)]
+        run: RunArguments,
+    },
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
     /// End a run in the background, and wait for its results.
@@ -121,7 +127,10 @@ pub enum Command {
     Record(RecordArguments),
     /// Take the topics of a running run to another machine. To split a run between two machines,
     /// see the section `[link]`.
-    Link(LinkArguments),
+    Link {
+        #[command(subcommand)]
+        end: LinkEnd,
+    },
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).

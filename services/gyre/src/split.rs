@@ -59,7 +59,7 @@ pub mod absent {
     use gyre_stage::{Launch, StageCounters, StageError};
     use gyre_terminal::Failure;
 
-    use crate::{cli::LinkArguments, features::Absent};
+    use crate::{cli::LinkEnd, features::Absent};
 
     pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
 
@@ -71,7 +71,7 @@ pub mod absent {
         Err(ABSENT.into())
     }
 
-    pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
+    pub fn link(_: &LinkEnd) -> Result<ExitCode, Failure> {
         Err(ABSENT.into())
     }
 }

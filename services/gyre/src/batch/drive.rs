@@ -16,7 +16,7 @@ use gyre_tools::batch::{End, Outcome};
 use rustix::process::Signal;
 
 use crate::{
-    cli::{BatchDriveArguments, RunArguments},
+    cli::RunArguments,
     earlier::{self, Earlier},
     program,
     run::{self, resolve},
@@ -28,11 +28,11 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans,
 /// and prints its end.
-pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
-    if !end_with(arguments.parent, Signal::TERM)? {
+pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !end_with(parent, Signal::TERM)? {
         return Ok(ExitCode::FAILURE);
     }
-    let end = computed(&arguments.run);
+    let end = computed(run);
     let end = end.unwrap_or_else(|error| End::of(Outcome::Failed, error.to_string()));
     print::line(serde_json::to_string(&end)?)?;
     Ok(ExitCode::SUCCESS)

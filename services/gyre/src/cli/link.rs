@@ -4,14 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-/// The arguments of `gyre link`.
-#[derive(Debug, Args)]
-pub struct LinkArguments {
-    /// The end.
-    #[command(subcommand)]
-    pub end: LinkEnd,
-}
-
 /// The ends of a link.
 #[derive(Debug, Subcommand)]
 pub enum LinkEnd {
