@@ -19,7 +19,7 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
         return Ok(());
     }
     #[cfg(not(feature = "link"))]
-    return Err(absent::ABSENT.into());
+    return Err(crate::features::absent(absent::PART).into());
     #[cfg(feature = "link")]
     gyre_link::Network::from(&configuration.link)
         .check()
@@ -59,19 +59,19 @@ pub mod absent {
     use gyre_stage::{Launch, StageCounters, StageError};
     use gyre_terminal::Failure;
 
-    use crate::{cli::LinkEnd, features::Absent};
+    use crate::{cli::LinkEnd, features};
 
-    pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
+    pub(super) const PART: &str = "zenoh, which links machines";
 
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
+        Err(StageError::Configuration(features::absent(PART)))
     }
 
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
+        Err(StageError::Configuration(features::absent(PART)))
     }
 
     pub fn link(_: &LinkEnd) -> Result<ExitCode, Failure> {
-        Err(ABSENT.into())
+        Err(features::absent(PART).into())
     }
 }
