@@ -59,6 +59,16 @@ impl Ended {
         self
     }
 
+    /// Asserts that it printed these words on standard error.
+    pub fn says(&self, words: &str) {
+        assert!(self.stderr.contains(words), "{}", self.stderr);
+    }
+
+    /// Asserts that it did not print these words there.
+    pub fn does_not_say(&self, words: &str) {
+        assert!(!self.stderr.contains(words), "{}", self.stderr);
+    }
+
     fn assert_calm(&self) {
         // A process without memory is aborted by Rust, and its last words, which are repeated, are
         // of a backtrace.

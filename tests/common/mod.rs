@@ -296,6 +296,15 @@ impl Run {
         self.start().finish()
     }
 
+    /// Starts it at a rate, and interrupts it after so many poses.
+    pub fn interrupt(&self, rate: &str, poses: usize) {
+        let mut running = self.clone().rate(rate).start();
+        running
+            .await_poses(poses)
+            .signal(rustix::process::Signal::INT);
+        assert_eq!(running.finish().code(), Some(130));
+    }
+
     /// Starts it, waits until it ends well, and returns its `odometry.csv`.
     pub fn complete(&self) -> String {
         self.finish().succeeded();

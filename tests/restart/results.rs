@@ -4,17 +4,13 @@
 use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 
 use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
-use rustix::process::Signal;
 
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
 fn interrupted() -> Run {
     let run = Run::of_recording();
-    let slow = run.clone().rate(MODERATE);
-    let mut running = slow.start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt(MODERATE, MIDDLE);
     run
 }
 
@@ -42,12 +38,8 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     fs::remove_dir(&csv).unwrap();
     let ended = run.finish();
     ended.succeeded();
-    assert!(ended.stderr.contains("all 24 poses"), "{}", ended.stderr);
-    assert!(
-        !ended.stderr.contains("pid"),
-        "no process is started: {}",
-        ended.stderr
-    );
+    ended.says("all 24 poses");
+    ended.does_not_say("pid");
     assert_eq!(run.odometry(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["ending"], "complete");
@@ -124,7 +116,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     let ended = futile(&run, "exit 7").finish();
     ended.failed_with(&["masking"]);
     let note = "has the results of the complete run before";
-    assert!(ended.stderr.contains(note), "{}", ended.stderr);
+    ended.says(note);
     is_there();
 
     // The supervisor is killed: the next command restores all results that are not yet replaced.
@@ -221,9 +213,7 @@ fn a_damaged_record_of_what_a_run_was_begun_with_is_named_and_not_discarded() {
 fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
     let run = Run::of_recording();
     // Two seconds, so that the first poses are known to be on the disk when later ones are written.
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2 * MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt("2", 2 * MIDDLE);
     let journal = run.out().join("journal/poses.journal");
     let mut bytes = fs::read(&journal).unwrap();
     bytes[1000] ^= 4;
@@ -324,9 +314,7 @@ fn a_file_that_gyre_did_not_write_into_a_recording_is_never_removed() {
 #[test]
 fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
     let run = stored();
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt("2", 2);
     let images = names(&run.out().join("recording/radar"));
     let other = run.clone().set("simulation.seed=4");
     other

@@ -183,7 +183,7 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest() {
     in_shared_memory_of(running.pid(), FILL);
     let ended = running.finish();
     ended.succeeded();
-    assert!(!ended.stderr.contains("died"), "{}", ended.stderr);
+    ended.does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 }
 
