@@ -2,8 +2,7 @@
 //! gyro beside it, and the clock and the scale of the wheels.
 
 mod check;
-mod gyro;
-mod wheels;
+mod sensors;
 
 use std::{
     path::Path,
@@ -21,8 +20,7 @@ use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
-use gyro::Gyro;
-use wheels::Wheels;
+use sensors::{Gyro, Wheels};
 
 const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
@@ -36,10 +34,10 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let drives = read_drives(arguments)?;
     let logs = drives.iter();
     let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
-    let gyro = gyro::section(&of_gyro.collect::<Vec<_>>())?;
+    let gyro = Gyro::section(&of_gyro.collect::<Vec<_>>())?;
     let logs = drives.iter();
     let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
-    let wheels = wheels::section(&of_wheels.collect::<Vec<_>>())?;
+    let wheels = Wheels::section(&of_wheels.collect::<Vec<_>>())?;
     let radar = found_by(drives, &arguments.out);
     let found = radar.as_ref().ok();
     let ates_m = found.and_then(|it| check::ates_m(arguments, it));
