@@ -39,10 +39,11 @@ macro_rules! sensor {
                 let configured_file = configured.file.as_deref();
                 let named = named.or(configured_file.filter(|_| configured.kind == $of_log));
                 let file = named.map(Path::to_owned);
-                let Some(file) = file.or_else(|| $beside(&configuration.source.data)) else {
+                let (beside, read) = ($beside, $read);
+                let Some(file) = file.or_else(|| beside(&configuration.source.data)) else {
                     return Ok(None);
                 };
-                match $read(&file, configured) {
+                match read(&file, configured) {
                     Ok(log) => Ok(Some(Self {
                         log,
                         configured: configured.clone(),
@@ -85,7 +86,8 @@ macro_rules! sensor {
                 let Some((one, others)) = told.split_first() else {
                     return Ok(Section::refused($is, refused, first.is_named));
                 };
-                let found: $found = $mean(one, others)?;
+                let (mean, toml) = ($mean, $toml);
+                let found: $found = mean(one, others)?;
                 if !others.is_empty() {
                     let (sensor, table) = (stringify!($section), found.table(&first.configured));
                     print::line(format_args!("{sensor}, all drives together\n{table}"))?;
@@ -93,11 +95,8 @@ macro_rules! sensor {
                 // A relative path is one of the file's folder.
                 let file = first.is_named.then(|| absolute(&first.log.path));
                 let file = file.transpose()?;
-                Ok(Section::told($toml(
-                    &found,
-                    file.as_deref(),
-                    &first.configured,
-                )))
+                let text = toml(&found, file.as_deref(), &first.configured);
+                Ok(Section::told(text))
             }
         }
     };
@@ -107,20 +106,20 @@ sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
     GyroLog, GyroConfig, GyroKind::Log, GyroCalibration, GyroError,
     beside: GyroLog::beside,
-    read: (|file: &Path, _: &GyroConfig| GyroLog::read(file)),
+    read: |file: &Path, _: &GyroConfig| GyroLog::read(file),
     mean: GyroCalibration::mean,
-    toml: (|found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file))
+    toml: |found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file)
 }
 
 sensor! {
     Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
     WheelLog, WheelsConfig, WheelsKind::Log, WheelCalibration, WheelError,
-    beside: (|folder: &Path| WheelLog::find(folder).ok()),
-    read: (|file: &Path, config: &WheelsConfig| WheelLog::read(file, config.m_per_tick)),
-    mean: (|one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {
+    beside: |folder: &Path| WheelLog::find(folder).ok(),
+    read: |file: &Path, config: &WheelsConfig| WheelLog::read(file, config.m_per_tick),
+    mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {
         Ok(one.mean(others))
-    }),
-    toml: (|found: &WheelCalibration, file: Option<&Path>, config: &WheelsConfig| {
+    },
+    toml: |found: &WheelCalibration, file: Option<&Path>, config: &WheelsConfig| {
         found.toml(file, config.m_per_tick)
-    })
+    }
 }
