@@ -22,29 +22,23 @@ use std::env;
 
 use configurations::Configuration;
 use scene::Scene;
-use tools::Need;
 
 /// Attempts at a fault that comes too late, because the run is over.
 const ATTEMPTS: usize = 20;
 
-#[derive(Clone, Copy)]
-struct Fault {
-    /// Runs a configuration, disturbs the run, and judges its results; `None` if the run ended
-    /// before the fault.
-    strike: fn(&mut Scene) -> Option<()>,
-    /// The requirements on the machine.
-    needs: &'static [Need],
-}
+/// A kind of faults: it runs a configuration, disturbs the run, and judges its results; `None` if
+/// the run ended before the fault.
+type Fault = fn(&mut Scene) -> Option<()>;
 
 /// Faults by name, as the rows have them.
 mod kinds {
     #![allow(non_upper_case_globals)]
 
-    use super::{Fault, Need, input, kills, limits, results};
+    use super::{Fault, input, kills, limits, results};
 
     macro_rules! kinds {
-        ($($name:ident: $strike:path $(, $need:ident)*;)*) => {
-            $(pub const $name: Fault = Fault { strike: $strike, needs: &[$(Need::$need),*] };)*
+        ($($name:ident: $strike:path;)*) => {
+            $(pub const $name: Fault = $strike;)*
         };
     }
 
@@ -59,9 +53,9 @@ mod kinds {
         the_supervisor_is_killed_as_it_writes_results: kills::at_the_results;
         the_run_is_interrupted: kills::interrupt;
         the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
-        the_disk_is_full: results::disk_full, Mounts;
+        the_disk_is_full: results::disk_full;
         files_may_not_grow: limits::file_sizes;
-        the_results_are_read_only: results::read_only, Mounts, OtherUser;
+        the_results_are_read_only: results::read_only;
         the_results_vanish: results::vanish;
         the_recording_has_gaps: input::gaps;
         the_recording_vanishes: input::vanishes;
@@ -85,7 +79,7 @@ macro_rules! row {
         $($attribute)*
         fn $fault() {
             use crate::restart::faults::{configurations, kinds, strike};
-            strike(&configurations::$configuration(), &kinds::$fault);
+            strike(&configurations::$configuration(), kinds::$fault);
         }
     };
 }
@@ -150,12 +144,8 @@ fn number(variable: &str) -> Option<u64> {
 }
 
 /// Strikes a run of the configuration, where the machine can do that.
-fn strike(configuration: &Configuration, fault: &Fault) {
+fn strike(configuration: &Configuration, fault: Fault) {
     if !configuration.is_possible() {
-        return;
-    }
-    if let Some(missing) = fault.needs.iter().find_map(|need| need.missing()) {
-        println!("skipped: {missing}");
         return;
     }
     let first = number("GYRE_FAULTS_SEED").unwrap_or_else(|| rand::random::<u16>().into());
@@ -163,7 +153,7 @@ fn strike(configuration: &Configuration, fault: &Fault) {
         println!("GYRE_FAULTS_SEED={seed}");
         let mut scene = Scene::new(configuration, seed);
         (0..ATTEMPTS)
-            .find_map(|_| (fault.strike)(&mut scene))
+            .find_map(|_| fault(&mut scene))
             .unwrap_or_else(|| panic!("{ATTEMPTS} runs ended before the fault"));
     }
 }

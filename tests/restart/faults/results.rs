@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, Permissions},
-    os::unix::fs::PermissionsExt,
+    os::unix::fs::{PermissionsExt, chown},
     path::Path,
 };
 
@@ -11,9 +11,9 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
-    tools::{AS_NOBODY, Mount, give_to_nobody},
+    tools::{Mount, can_mount},
 };
-use crate::common::{Run, assert_nothing_left_of, wrapped};
+use crate::common::{OtherUser, Run, assert_nothing_left_of};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
@@ -31,6 +31,9 @@ fn fill(place: &Path, leave: u64) {
 
 /// The disk is too small, or becomes full in the middle; then there is room again.
 pub fn disk_full(scene: &mut Scene) -> Option<()> {
+    if !can_mount() {
+        return Some(());
+    }
     let bytes = scene.configuration.undisturbed().bytes;
     let run = scene.run();
     let small = scene.one_in(2);
@@ -57,6 +60,9 @@ pub fn disk_full(scene: &mut Scene) -> Option<()> {
 /// The folder of the results is mounted read-only, or loses its permissions in the middle.
 pub fn read_only(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
+    if !can_mount() {
+        return Some(());
+    }
     if scene.one_in(3) {
         let mount = Mount::tmpfs(run.out(), PLENTY);
         mount.remount("ro");
@@ -66,9 +72,18 @@ pub fn read_only(scene: &mut Scene) -> Option<()> {
         scene.resumed(&run);
         return Some(());
     }
-    give_to_nobody(&run);
-    let as_nobody = || wrapped(&AS_NOBODY, &run.command());
-    let mut running = run.start_as(as_nobody());
+    let Some(user) = OtherUser::new(run.folder()) else {
+        return Some(());
+    };
+    let mut reads = user.command();
+    let reads = reads.args([crate::PROGRAM, "--version"]).output();
+    if !reads.is_ok_and(|output| output.status.success()) {
+        println!("skipped: the build folder is not for all users");
+        return Some(());
+    }
+    fs::create_dir_all(run.out()).unwrap();
+    chown(run.out(), Some(user.id), Some(user.id)).unwrap();
+    let mut running = run.start_as(user.command_of(&run));
     // Killed before it has a guardian, a run of another user would stay in shared memory.
     running.await_stages();
     scene.moment(&mut running)?;

@@ -1,58 +1,22 @@
 //! Programs of the system that make faults.
 
 use std::{
-    fs::{self, Permissions},
-    os::unix::fs::{PermissionsExt, chown},
+    fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use crate::common::{Pid, Run, processes::is_alive};
+use crate::common::{Pid, processes::is_alive};
 
-/// A user and group without rights: nobody.
-const NOBODY: u32 = 65534;
-
-/// A requirement of a kind of faults on the machine.
-#[derive(Clone, Copy)]
-pub enum Need {
-    /// Mounting, also in a namespace of its own.
-    Mounts,
-    /// Another user who can execute the program.
-    OtherUser,
-}
-
-impl Need {
-    /// Returns the name of the missing tool; `None` if nothing is.
-    pub fn missing(self) -> Option<&'static str> {
-        let (there, missing) = match self {
-            Self::Mounts => (
-                works(&[
-                    "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
-                ]),
-                "mounting needs root (CAP_SYS_ADMIN)",
-            ),
-            Self::OtherUser => (
-                works(&[&AS_NOBODY[..], &[crate::PROGRAM, "--version"]].concat()),
-                "another user cannot execute the program (needs root, and a build folder that all can read)",
-            ),
-        };
-        (!there).then_some(missing)
+/// Returns whether this user can mount; prints why a fault is skipped.
+pub fn can_mount() -> bool {
+    let can = works(&[
+        "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
+    ]);
+    if !can {
+        println!("skipped: mounting needs root (CAP_SYS_ADMIN)");
     }
-}
-
-/// Executes a command as nobody.
-pub const AS_NOBODY: [&str; 4] = [
-    "setpriv",
-    "--reuid=65534",
-    "--regid=65534",
-    "--clear-groups",
-];
-
-/// Lets nobody write the run's results.
-pub fn give_to_nobody(run: &Run) {
-    fs::set_permissions(run.folder(), Permissions::from_mode(0o755)).unwrap();
-    fs::create_dir_all(run.out()).unwrap();
-    chown(run.out(), Some(NOBODY), Some(NOBODY)).unwrap();
+    can
 }
 
 fn works(command: &[&str]) -> bool {
@@ -60,13 +24,11 @@ fn works(command: &[&str]) -> bool {
     output.is_ok_and(|output| output.status.success())
 }
 
-/// Limits a resource of a process of this user, or of nobody. That the process is gone already is
-/// no error.
+/// Limits a resource of a process. That the process is gone already is no error.
 pub fn limit(pid: Pid, resource: &str, value: u64) {
-    let (pid_option, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
-    let prlimit = ["prlimit", &pid_option, &limit];
+    let (of, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
     assert!(
-        works(&prlimit) || works(&[&AS_NOBODY[..], &prlimit].concat()) || !is_alive(pid),
+        works(&["prlimit", &of, &limit]) || !is_alive(pid),
         "cannot limit {resource} of {pid}"
     );
 }
