@@ -77,7 +77,7 @@ impl<'a> Starter<'a> {
                     "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
                 )))
             }
-            started => Ok(started.map_err(failed)?),
+            started => started.map_err(failed),
         }
     }
 
