@@ -246,7 +246,6 @@ impl RunArguments {
     }
 }
 
-/// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
     #[command(flatten)]
@@ -259,7 +258,6 @@ pub struct InspectArguments {
     pub json: bool,
 }
 
-/// The arguments of `gyre calibrate`.
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
     #[command(flatten)]
@@ -288,7 +286,6 @@ pub struct CalibrateArguments {
     pub scans: usize,
 }
 
-/// The arguments of `gyre simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
     /// The configuration, a TOML file or a name that `gyre config` lists: its section

@@ -321,7 +321,6 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     Ok(Out::lock(path)?)
 }
 
-/// Advises how to repair damaged keyframes.
 fn damaged(error: KeyframesError) -> Failure {
     match error {
         KeyframesError::Log(LogError::Damaged { .. }) => format!(

@@ -365,7 +365,6 @@ fn keep_fixes(configuration: &Configuration, out: &Out) {
     }
 }
 
-/// The message of a run that failed.
 fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>) -> Failure {
     let out = out.path().display();
     match written {

@@ -44,8 +44,6 @@ pub struct Configuration {
     pub poses: usize,
     /// The poses between which faults strike.
     pub moments: Option<(usize, usize)>,
-    /// The interval of the scans, s.
-    pub period_s: f64,
     rate: &'static str,
     /// The processes of a run beside its stages.
     followers: &'static [&'static str],
@@ -71,7 +69,6 @@ pub struct Undisturbed {
     pub processes: BTreeSet<String>,
 }
 
-/// The results that must be the same, by name.
 #[derive(PartialEq, Eq)]
 pub struct Results(BTreeMap<&'static str, Vec<u8>>);
 
@@ -176,7 +173,6 @@ const SMALL: Configuration = Configuration {
     run: |recording| Run::small().data(recording),
     poses: recording::SCANS,
     moments: None,
-    period_s: 0.25,
     rate: "6",
     followers: &[],
     stateful: "rotation-search",
@@ -221,7 +217,6 @@ fn around_a_block() -> Run {
     Run::small().data(recording::around_a_block())
 }
 
-/// Once around a block, with loops.
 pub fn loops() -> Configuration {
     Configuration {
         name: "loops",
@@ -282,7 +277,6 @@ pub fn gap() -> Configuration {
 /// The image that cannot be read.
 const UNREADABLE: usize = 6;
 
-/// A scan that cannot be read.
 pub fn unreadable() -> Configuration {
     Configuration {
         name: "unreadable",
@@ -486,7 +480,6 @@ pub fn replayed() -> Configuration {
     }
 }
 
-/// The masking stage in Python.
 pub fn python() -> Configuration {
     Configuration {
         name: "python",

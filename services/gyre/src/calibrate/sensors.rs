@@ -57,7 +57,6 @@ macro_rules! sensor {
                 }
             }
 
-            /// Calibrates by a drive, and prints the findings.
             fn calibrate(&self, drive: &Drive) -> Result<Result<$found, $error>, Failure> {
                 let track = drive.mean_track()?;
                 let log = self.log.path.display();
