@@ -46,7 +46,7 @@ impl Config {
         resolve(&mut table).map_err(errors::config)?;
         let method = MethodConfig::take(&mut table).map_err(errors::config)?;
         if let Some(key) = table.keys().next() {
-            let unknown = strict::unknown("the configuration", key, &MethodConfig::SECTIONS);
+            let unknown = strict::unknown("the configuration", key, MethodConfig::SECTIONS);
             return Err(errors::config(unknown));
         }
         method.validate().map_err(errors::config)?;
@@ -81,7 +81,7 @@ impl Config {
         Self::from_table(table, note)
     }
 
-    /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the
+    /// Finds the settings of a recording, as `gyre run RECORDING` does without a configuration: the
     /// radar's constants come from its format or its `dataset.toml`, and eight of its scans give
     /// the threshold and the sizes of cells and beams. `note` receives a sentence with the
     /// findings. `overrides` replaces keys.

@@ -68,7 +68,7 @@ pub fn automatic(error: AutomaticError) -> PyErr {
     match error {
         AutomaticError::Open(error) => open(error),
         AutomaticError::Read(_) | AutomaticError::Empty => read(error),
-        AutomaticError::Configuration(_) | AutomaticError::Recorded(_) => config(error),
+        AutomaticError::Configuration(_) => config(error),
     }
 }
 

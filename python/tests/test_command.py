@@ -38,7 +38,7 @@ def test_the_command_writes_draws_and_evaluates(recording: Path, tmp_path: Path)
 
 
 def test_its_motions_are_rows_of_those_of_a_run(recording: Path, tmp_path: Path) -> None:
-    gyre_program("run", "--data", recording, "--out", tmp_path / "run")
+    gyre_program("run", recording, "--out", tmp_path / "run")
     assert command(recording, "--out", tmp_path / "python") == 0
     of_run, mine = rows(tmp_path / "run/odometry.csv"), rows(tmp_path / "python/odometry.csv")
     assert len(mine) == 23
@@ -50,7 +50,7 @@ def test_its_rows_are_those_of_a_run_behind_a_gap_too(around: Path, tmp_path: Pa
     shutil.copytree(around, data)
     for file in gyre.open(data).files[8:56]:
         file.unlink()
-    gyre_program("run", "--data", data, "--out", tmp_path / "run")
+    gyre_program("run", data, "--out", tmp_path / "run")
     assert command(data, "--out", tmp_path / "python") == 0
     of_run, mine = rows(tmp_path / "run/odometry.csv"), rows(tmp_path / "python/odometry.csv")
     assert [int(row["seq"]) for row in mine] == [*range(1, 8), *range(9, 16)]
@@ -58,7 +58,7 @@ def test_its_rows_are_those_of_a_run_behind_a_gap_too(around: Path, tmp_path: Pa
 
 
 def test_loops_are_closed_where_the_configuration_says_so(around: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    gyre_program("run", "--data", around, "--out", tmp_path / "run", "--set", "slam.kind=graph")
+    gyre_program("run", around, "--out", tmp_path / "run", "--set", "slam.kind=graph")
     assert command(around, "--out", tmp_path / "python", "--set", "slam.kind=graph") == 0
     assert re.search(r"\n[1-9]\d* loops, and the trajectory corrected by them", capsys.readouterr().out)
     for name in ("trajectory.tum", "trajectory_slam.tum"):

@@ -23,7 +23,7 @@ def test_the_guide_runs_and_its_motions_are_those_of_a_run(around: Path, tmp_pat
     assert done.returncode == 0, done.stderr
     assert "64 of 64 scans" in done.stdout and "with loops" in done.stdout
     assert (tmp_path / "scan.png").stat().st_size > 10_000
-    gyre_program("run", "--data", around, "--out", tmp_path / "run")
+    gyre_program("run", around, "--out", tmp_path / "run")
     of_run = [row.split(",") for row in (tmp_path / "run/odometry.csv").read_text().splitlines()[1:]]
     columns = [*range(3, 14), 24]
     expected = [",".join(row[column] for column in columns) for row in of_run]

@@ -44,19 +44,19 @@ def assert_same(config: gyre.Config, data: Path, out: Path, scans: int) -> None:
 
 
 def test_motions_of_a_simulated_recording_are_those_of_a_run(recording: Path, tmp_path: Path) -> None:
-    gyre_program("run", "--data", recording, "--out", tmp_path)
+    gyre_program("run", recording, "--out", tmp_path)
     assert_same(gyre.Config.of(recording), recording, tmp_path, 24)
 
 
 def test_motions_of_real_scans_are_those_of_a_run(radiate: Path, tmp_path: Path) -> None:
-    gyre_program("run", "--data", radiate, "--out", tmp_path, "--set", "source.scans=100")
+    gyre_program("run", radiate, "--out", tmp_path, "--set", "source.scans=100")
     assert_same(gyre.Config.of(radiate), radiate, tmp_path, 100)
 
 
 def test_motions_with_a_gyro_are_those_of_a_run(radiate: Path, tmp_path: Path) -> None:
     gyro = {"gyro.kind": "auto", "gyro.delay_s": 1.58, "gyro.up": "-z"}
     given = [argument for key, value in gyro.items() for argument in ("--set", f"{key}={value}")]
-    gyre_program("run", "--data", radiate, "--out", tmp_path, "--set", "source.scans=40", *given)
+    gyre_program("run", radiate, "--out", tmp_path, "--set", "source.scans=40", *given)
     config = gyre.Config.read(tmp_path / "config.toml")
     assert_same(config, radiate, tmp_path, 40)
     for scan in gyre.open(radiate, config).scans(4, 8):
@@ -68,13 +68,13 @@ def test_motions_with_a_gyro_are_those_of_a_run(radiate: Path, tmp_path: Path) -
 def test_a_learned_mask_is_that_of_a_run(recording: Path, tmp_path: Path) -> None:
     overrides: dict[str, object] = {"masking.kind": "learned", "masking.model": ROOT / "models/gyre-255.toml", "masking.backend": "rten"}
     given = [argument for key, value in overrides.items() for argument in ("--set", f"{key}={value}")]
-    gyre_program("run", "configs/demo.toml", "--data", recording, "--out", tmp_path, "--set", "source.scans=4", *given)
+    gyre_program("run", "configs/demo.toml", recording, "--out", tmp_path, "--set", "source.scans=4", *given)
     config = gyre.Config.read(ROOT / "configs/demo.toml", overrides)
     assert_same(config, recording, tmp_path, 4)
 
 
 def test_the_configuration_is_that_of_a_run(recording: Path, tmp_path: Path) -> None:
-    gyre_program("run", "--data", recording, "--out", tmp_path, "--set", "source.scans=2")
+    gyre_program("run", recording, "--out", tmp_path, "--set", "source.scans=2")
     assert gyre.Config.read(tmp_path / "config.toml") == gyre.Config.of(recording)
 
 

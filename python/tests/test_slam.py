@@ -11,7 +11,7 @@ from conftest import gyre_program
 
 def test_loops_and_correction_are_those_of_a_run(around: Path, tmp_path: Path) -> None:
     data, out = around, tmp_path / "run"
-    gyre_program("run", "--data", data, "--out", out, "--set", "slam.kind=graph")
+    gyre_program("run", data, "--out", out, "--set", "slam.kind=graph")
     config = gyre.Config.of(data, {"slam.kind": "graph"})
     odometry, slam = gyre.Odometry(config), gyre.Slam(config)
     for scan in gyre.open(data, config):

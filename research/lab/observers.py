@@ -133,7 +133,7 @@ def main():
     arguments.add_argument("--set", action="append", default=[])
     given = arguments.parse_args()
     command = [given.gyre, "run", given.configuration, "--rate", given.rate]
-    command += ["--data", given.data] if given.data else []
+    command += [given.data] if given.data else []
     command += [word for key in given.set for word in ("--set", key)]
     kinds = [given.only] if given.only else KINDS
     without, with_observers, results = [], [], set()

@@ -134,7 +134,7 @@ class Recording:
             row = next(row for row in rows["row"] if row["name"] == name)
             changes = [change for group in row["groups"] for change in rows["groups"][group]] + row.get("set", [])
             folder = out / self.role / "-".join(re.findall("[a-z0-9]+", name.lower()))
-            command = [program, "run", self.file, "--data", self.data, "--out", folder, "--rate", "max", "--fresh"]
+            command = [program, "run", self.file, self.data, "--out", folder, "--rate", "max", "--fresh"]
             command += itertools.chain(*(["--set", change] for change in [*changes, f"source.scans={scans}"]))
             if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
                 raise Failure(f"`{shlex.join(map(str, command))}` did not succeed")

@@ -82,7 +82,6 @@ impl Browser {
         }
     }
 
-    /// Goes to an address.
     pub fn go_to(&mut self, address: &str) -> &mut Self {
         self.ask("Page.navigate", json!({ "url": address }));
         self.until("location.href !== 'about:blank' && document.readyState === 'complete'")
@@ -96,7 +95,6 @@ impl Browser {
         self
     }
 
-    /// Returns the value of an expression on the page.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let request =
             json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
@@ -105,7 +103,6 @@ impl Browser {
         evaluated["result"]["value"].take()
     }
 
-    /// Returns the text of an element.
     pub fn text(&mut self, id: &str) -> String {
         let text = self.evaluate(&format!(
             "document.getElementById('{id}')?.textContent ?? ''"

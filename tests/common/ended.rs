@@ -6,14 +6,11 @@ use std::process::{Command, ExitStatus};
 #[derive(Clone, Debug)]
 pub struct Ended {
     pub status: ExitStatus,
-    /// The standard output.
     pub stdout: String,
-    /// The standard error.
     pub stderr: String,
 }
 
 impl Ended {
-    /// Runs a command to its end.
     pub fn of(mut command: Command) -> Self {
         let output = command.env("RUST_BACKTRACE", "1").output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
@@ -24,12 +21,10 @@ impl Ended {
         }
     }
 
-    /// Returns its exit code; `None` when a signal ended it.
     pub fn code(&self) -> Option<i32> {
         self.status.code()
     }
 
-    /// Asserts that it succeeded without a panic.
     pub fn succeeded(&self) -> &Self {
         assert!(self.status.success(), "{}\n{}", self.status, self.stderr);
         self.assert_calm();
@@ -62,6 +57,16 @@ impl Ended {
             assert!(sentence.contains(word), "`{word}` is not in: {sentence}");
         }
         self
+    }
+
+    /// Asserts that it printed these words on standard error.
+    pub fn says(&self, words: &str) {
+        assert!(self.stderr.contains(words), "{}", self.stderr);
+    }
+
+    /// Asserts that it did not print these words there.
+    pub fn does_not_say(&self, words: &str) {
+        assert!(!self.stderr.contains(words), "{}", self.stderr);
     }
 
     fn assert_calm(&self) {

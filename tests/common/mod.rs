@@ -15,6 +15,7 @@ pub mod recording;
 mod running;
 mod server;
 mod shared;
+mod spawned;
 mod watch;
 
 use std::{
@@ -68,7 +69,6 @@ pub fn python() -> String {
     env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
-/// The program under test.
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
 }
@@ -91,7 +91,6 @@ pub fn install(program: &Path, content: impl AsRef<[u8]>) {
     assert!(writer.wait().unwrap().success());
 }
 
-/// Copies the program under test.
 pub fn copy_program(to: &Path) {
     install(to, fs::read(crate::PROGRAM).unwrap());
 }
@@ -145,7 +144,7 @@ impl Run {
 
     /// The same where the recording goes by another name.
     pub fn of_recording_named(name: &str) -> Self {
-        Self::small().argument("--data", name)
+        Self::small().option(name)
     }
 
     /// A run of small rasters whose recording is still to be named.
@@ -153,12 +152,8 @@ impl Run {
         Self::configured(CONFIGURATION)
     }
 
-    /// A run of this configuration text.
     pub fn configured(text: &str) -> Self {
-        let folder = tempfile::Builder::new()
-            .prefix("gyre-test-")
-            .tempdir()
-            .unwrap();
+        let folder = folder();
         let configuration = folder.path().join("test.toml");
         fs::write(&configuration, text).unwrap();
         let out = folder.path().join("out");
@@ -170,7 +165,11 @@ impl Run {
         }
     }
 
-    /// A run of this configuration file.
+    /// A run of a simulation of so many scans on small rasters.
+    pub fn simulated(scans: usize) -> Self {
+        Self::configured(&format!("{CONFIGURATION}[simulation]\nscans = {scans}\n"))
+    }
+
     pub fn of_file(configuration: &Path) -> Self {
         Self {
             configuration: configuration.to_owned(),
@@ -186,27 +185,23 @@ impl Run {
             .set(&format!("masking.model='{}'", model.display()))
     }
 
-    /// The same, of the demo's drive as a recording.
     pub fn of_recorded_demo() -> Self {
         Self::of_demo().data(recording::demo())
     }
 
-    /// The same with `--data`.
+    /// The same of this recording.
     pub fn data(self, folder: &Path) -> Self {
-        self.argument("--data", folder.to_str().unwrap())
+        self.option(folder.to_str().unwrap())
     }
 
-    /// The same with `--rate`.
     pub fn rate(self, rate: &str) -> Self {
         self.argument("--rate", rate)
     }
 
-    /// The same with `--set`.
     pub fn set(self, sentence: &str) -> Self {
         self.argument("--set", sentence)
     }
 
-    /// Masks with the network of this card.
     pub fn masked_by(self, card: &Path) -> Self {
         self.set("masking.kind=learned")
             .set(&format!("masking.model='{}'", card.display()))
@@ -224,9 +219,8 @@ impl Run {
         self
     }
 
-    /// The same with an option that has no value.
-    pub fn option(mut self, option: &str) -> Self {
-        self.arguments.push(option.to_owned());
+    pub fn option(mut self, word: &str) -> Self {
+        self.arguments.push(word.to_owned());
         self
     }
 
@@ -247,12 +241,10 @@ impl Run {
         self.folder.path()
     }
 
-    /// The folder of its results.
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// The command line.
     pub fn command(&self) -> Command {
         let mut command = gyre();
         command
@@ -284,7 +276,6 @@ impl Run {
         Some(command)
     }
 
-    /// Starts it.
     pub fn start(&self) -> Running {
         self.start_as(self.command())
     }
@@ -301,9 +292,17 @@ impl Run {
         Running::new(self.clone(), command.spawn().unwrap())
     }
 
-    /// Starts it and waits until it ends.
     pub fn finish(&self) -> Ended {
         self.start().finish()
+    }
+
+    /// Starts it at a rate, and interrupts it after so many poses.
+    pub fn interrupt(&self, rate: &str, poses: usize) {
+        let mut running = self.clone().rate(rate).start();
+        running
+            .await_poses(poses)
+            .signal(rustix::process::Signal::INT);
+        assert_eq!(running.finish().code(), Some(130));
     }
 
     /// Starts it, waits until it ends well, and returns its `odometry.csv`.
@@ -312,17 +311,14 @@ impl Run {
         self.odometry()
     }
 
-    /// Returns its `odometry.csv`.
     pub fn odometry(&self) -> String {
         self.result("odometry.csv")
     }
 
-    /// Returns its `summary.json`.
     pub fn summary(&self) -> Value {
         serde_json::from_str(&self.result("summary.json")).unwrap()
     }
 
-    /// A file of its results.
     pub fn result(&self, name: impl AsRef<Path>) -> String {
         let path = self.out.join(name);
         fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

@@ -1,12 +1,10 @@
 //! Reading `odometry.csv`.
 
-/// The place of a row in the chain of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChainRow {
     /// Number in the chain.
     pub seq: u64,
     pub scan: u64,
-    /// The scan that it was compared with.
     pub previous_scan: u64,
 }
 
@@ -26,7 +24,6 @@ pub fn rows(csv: &str) -> Vec<ChainRow> {
     csv.lines().skip(1).map(row).collect()
 }
 
-/// Columns of an `odometry.csv`, by their names.
 pub fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
     let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     let places: Vec<usize> = names

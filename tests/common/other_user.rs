@@ -14,7 +14,6 @@ use super::{Run, copy_program};
 
 /// Another user with a copy of the program in a folder that is open to all.
 pub struct OtherUser {
-    /// The number of the user.
     pub id: u32,
     program: PathBuf,
 }
@@ -43,14 +42,12 @@ impl OtherUser {
         command
     }
 
-    /// The program, as this user.
     pub fn gyre(&self) -> Command {
         let mut command = self.command();
         command.arg(&self.program);
         command
     }
 
-    /// The command of a run, as this user.
     pub fn command_of(&self, run: &Run) -> Command {
         let mut command = self.gyre();
         command.args(run.command().get_args());

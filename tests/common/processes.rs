@@ -12,7 +12,6 @@ use std::{
 use gyre_messages::{FollowerId, StageId};
 use rustix::process::{Signal, kill_process};
 
-/// A process id.
 pub type Pid = u32;
 
 /// Sends a signal. That the process is gone already is no error.
@@ -24,33 +23,17 @@ pub fn send(pid: Pid, signal: Signal) {
 
 /// The time that a process has spent computing.
 pub fn cpu_time(pid: Pid) -> Duration {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    // After the name in brackets: state, ppid, ...; utime and stime are the 14th and 15th of all,
-    // in hundredths of a second.
-    let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
-    let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
+    let fields = stat(pid).unwrap();
+    // utime and stime, in hundredths of a second.
+    let ticks = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
     Duration::from_millis(ticks * 10)
 }
 
 /// The living stages and followers among a supervisor's children, by name.
 pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
-    let ours = |pid: &Pid| {
-        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
-    };
-    pids()
-        .filter(ours)
+    children_of(supervisor)
         .filter_map(|pid| Some((stage_name(pid)?, pid)))
         .collect()
-}
-
-/// The guardian among a supervisor's children.
-pub fn guardian_of(supervisor: Pid) -> Option<Pid> {
-    let is_guardian = |pid: &Pid| {
-        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
-            && line.ends_with(b"\0guard\0")
-    };
-    pids().find(is_guardian)
 }
 
 /// Processes whose environment names the run at `root`.
@@ -68,16 +51,21 @@ pub fn run_of(pid: Pid) -> Option<PathBuf> {
     Some(PathBuf::from(OsStr::from_bytes(run)))
 }
 
-/// A living child of a supervisor with this word in its command.
 pub fn child_with(supervisor: Pid, word: &str) -> Option<Pid> {
-    let is_it = |pid: &Pid| {
-        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
-            && line
-                .split(|byte| *byte == 0)
-                .any(|part| part == word.as_bytes())
-    };
-    pids().find(is_it)
+    children_of(supervisor).find(|pid| words(*pid).iter().any(|it| it == word))
+}
+
+/// Returns whether a process has not ended.
+pub fn is_alive(pid: Pid) -> bool {
+    stat(pid).is_some_and(|fields| !["Z", "X"].contains(&fields[0].as_str()))
+}
+
+pub fn parent_of(pid: Pid) -> Option<Pid> {
+    stat(pid)?[1].parse().ok()
+}
+
+fn children_of(supervisor: Pid) -> impl Iterator<Item = Pid> {
+    pids().filter(move |pid| parent_of(*pid) == Some(supervisor) && is_alive(*pid))
 }
 
 fn pids() -> impl Iterator<Item = Pid> {
@@ -85,26 +73,24 @@ fn pids() -> impl Iterator<Item = Pid> {
     entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())
 }
 
-/// The parent of a process.
-pub fn parent_of(pid: Pid) -> Option<Pid> {
-    parent_and_state(pid).map(|(parent, _)| parent)
+/// The fields of a process behind its name: state, parent and others.
+fn stat(pid: Pid) -> Option<Vec<String>> {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let (_, fields) = stat.rsplit_once(") ")?;
+    Some(fields.split(' ').map(str::to_owned).collect())
 }
 
-fn parent_and_state(pid: Pid) -> Option<(Pid, char)> {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    let mut fields = stat.rsplit_once(") ")?.1.split(' ');
-    let state = fields.next()?.chars().next()?;
-    Some((fields.next()?.parse().ok()?, state))
+fn words(pid: Pid) -> Vec<String> {
+    let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+    let line = String::from_utf8_lossy(&line);
+    let words = line.split('\0').filter(|word| !word.is_empty());
+    words.map(str::to_owned).collect()
 }
 
 /// `gyre stage NAME`, or a script that is named after the stage.
 fn stage_name(pid: Pid) -> Option<String> {
-    let line = fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-    let last = line
-        .split(|byte| *byte == 0)
-        .rfind(|word| !word.is_empty())?;
-    let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
-    let name = path.file_stem()?.to_string_lossy().into_owned();
+    let last = words(pid).pop()?;
+    let name = Path::new(&last).file_stem()?.to_str()?.to_owned();
     let is_known = StageId::by_name(&name).is_some() || FollowerId::by_name(&name).is_some();
     is_known.then_some(name)
 }

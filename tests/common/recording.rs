@@ -15,14 +15,12 @@ use tempfile::TempDir;
 
 use super::Run;
 
-/// Scans of the small recording.
 pub const SCANS: usize = 24;
 
 /// The radar of the small recordings in a section `[simulation]`. It has a sixth of the default
 /// one's bins: what happens between processes does not depend on them.
 pub const SENSOR: &str = "sensor.profile = 'cts350x-radiate'\noutput.format = 'oxford'\n";
 
-/// The small recording.
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| of_a_block(SCANS))
@@ -55,7 +53,7 @@ pub fn demo() -> &'static Path {
 
 /// The recording of a drive with this section `[simulation]`.
 pub fn configured(name: &str, settings: &str) -> PathBuf {
-    simulated(name, &toml::from_str(settings).unwrap())
+    of(name, &toml::from_str(settings).unwrap())
 }
 
 /// The recording of a drive along a trajectory in the format TUM.
@@ -66,12 +64,7 @@ pub fn along(name: &str, trajectory: &str) -> PathBuf {
         drive: DriveConfig::along_file(file.path().to_owned()),
         ..SimulationConfig::default()
     };
-    simulated(name, &config)
-}
-
-/// The recording of a simulated drive.
-pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
-    simulated(name, config)
+    of(name, &config)
 }
 
 fn of_a_block(scans: usize) -> PathBuf {
@@ -88,7 +81,7 @@ pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
     config.sensor.lost_azimuths = loses_azimuths;
-    simulated(&format!("radiate-{loses_azimuths}"), &config)
+    of(&format!("radiate-{loses_azimuths}"), &config)
 }
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links:
@@ -161,7 +154,6 @@ pub fn images(recording: &Path) -> Vec<PathBuf> {
     images
 }
 
-/// The files in a folder; none if it is a file.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten();
     entries.map(|entry| entry.unwrap().path()).collect()
@@ -205,7 +197,6 @@ pub fn complete(image: &Path) {
     rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
 }
 
-/// Edits the rows of an image: `edit` is given their numbers from 0.
 fn rewrite(image: &Path, edit: impl Fn(usize, &mut [u8])) {
     let bytes = fs::read(image).unwrap();
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
@@ -235,7 +226,8 @@ fn replace(image: &Path, bytes: &[u8]) {
     fs::write(image, bytes).unwrap();
 }
 
-fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
+/// The recording of a simulated drive.
+pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
     prepared(name, |recording| {
         write_dataset(config, recording, &mut |_, _| ()).unwrap();
     })

@@ -18,7 +18,6 @@ use super::{
 
 /// A run of the small recording takes a second or two, far more only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(90);
-/// Time between two polls.
 const LOOK: Duration = Duration::from_millis(2);
 
 /// A running command. Dropped before its end, it is killed.
@@ -32,12 +31,10 @@ impl Running {
         Self { run, child }
     }
 
-    /// The supervisor.
     pub fn pid(&self) -> Pid {
         self.child.id()
     }
 
-    /// The living stages by name.
     pub fn stages(&self) -> BTreeMap<String, Pid> {
         processes::stages_of(self.pid())
     }
@@ -53,7 +50,6 @@ impl Running {
         })
     }
 
-    /// Waits until a stage lives, and returns at once.
     pub fn await_stage(&mut self, name: &str) -> Pid {
         self.until(name, |running| running.stages().get(name).copied())
     }
@@ -72,7 +68,7 @@ impl Running {
     /// Waits until there is a guardian other than `not`.
     pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
         self.until("a guardian", |running| {
-            processes::guardian_of(running.pid()).filter(|pid| Some(*pid) != not)
+            processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
         })
     }
 
@@ -89,18 +85,15 @@ impl Running {
         }
     }
 
-    /// Returns whether the run has ended.
     pub fn is_over(&mut self) -> bool {
         self.child.try_wait().unwrap().is_some()
     }
 
-    /// Poses in the journal.
     pub fn poses(&self) -> usize {
         let records = journal::records(&journal::path(self.run.out()));
         records.map_or(0, |records| records.into_iter().flatten().count())
     }
 
-    /// The shared memory of the run.
     pub fn shared_memory_bytes(&self) -> u64 {
         leftovers::bytes(self.run.out())
     }
@@ -112,7 +105,6 @@ impl Running {
         self
     }
 
-    /// A signal to the supervisor alone.
     pub fn signal(&self, signal: Signal) -> &Self {
         send(self.pid(), signal);
         self

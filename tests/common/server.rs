@@ -1,55 +1,35 @@
 //! A `gyre watch` process: a server that shows a run.
 
 use std::{
-    fs::{self, File},
     io::{Read, Write},
     net::TcpStream,
-    path::PathBuf,
-    process::{Child, Stdio},
-    thread,
-    time::{Duration, Instant},
 };
 
 use rustix::process::Signal;
 
-use super::{Pid, Run, gyre, send};
+use super::{Pid, Run, gyre, spawned::Spawned};
 
-const LIMIT: Duration = Duration::from_secs(60);
-const LOOK: Duration = Duration::from_millis(5);
-
-/// A running server. Dropped, it is killed.
 pub struct Server {
-    child: Child,
-    said: PathBuf,
-    /// The address that it has printed.
+    process: Spawned,
     pub address: String,
 }
 
 impl Server {
     /// Starts one at a free port of an address, and waits until it serves.
     pub fn start(run: &Run, ip: &str, options: &[&str]) -> Self {
-        let said = run.folder().join("server.txt");
         let mut command = gyre();
-        let command = command.arg("watch").arg(run.out()).args(options);
+        command.arg("watch").arg(run.out()).args(options);
         command.args(["--listen", &format!("{ip}:0")]);
-        command.stdin(Stdio::null()).stdout(Stdio::null());
-        let child = command.stderr(File::create(&said).unwrap()).spawn();
         let mut server = Self {
-            child: child.unwrap(),
-            said,
+            process: Spawned::new(command, run.folder().join("server.txt")),
             address: String::new(),
         };
         server.address = server.line(" is shown at ");
         server
     }
 
-    fn said(&self) -> String {
-        fs::read_to_string(&self.said).unwrap()
-    }
-
-    /// Returns its process.
     pub fn pid(&self) -> Pid {
-        self.child.id()
+        self.process.pid()
     }
 
     /// The address that Foxglove connects to.
@@ -59,20 +39,13 @@ impl Server {
 
     /// Waits for a line with these words, and returns the text after them.
     pub fn line(&self, words: &str) -> String {
-        let since = Instant::now();
-        loop {
-            let said = self.said();
-            let whole = said.rsplit_once('\n').map_or("", |(whole, _)| whole);
-            let mut found = whole.lines().filter_map(|line| line.split_once(words));
-            if let Some((_, rest)) = found.next() {
-                return rest.to_owned();
-            }
-            assert!(since.elapsed() < LIMIT, "{said}");
-            thread::sleep(LOOK);
-        }
+        self.process.until(|said| {
+            let (whole, _) = said.rsplit_once('\n')?;
+            let (_, rest) = whole.lines().find_map(|line| line.split_once(words))?;
+            Some(rest.to_owned())
+        })
     }
 
-    /// The token in its address.
     pub fn token(&self) -> Option<&str> {
         self.address.split_once("?token=").map(|(_, token)| token)
     }
@@ -106,22 +79,8 @@ impl Server {
 
     /// Ends it as Ctrl-C does, and asserts that it ends well.
     pub fn interrupt(mut self) {
-        send(self.child.id(), Signal::INT);
-        let since = Instant::now();
-        loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                assert!(status.success(), "{status}: {}", self.said());
-                return;
-            }
-            assert!(since.elapsed() < LIMIT, "it does not end: {}", self.said());
-            thread::sleep(LOOK);
-        }
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.process.signal(Signal::INT);
+        let status = self.process.wait();
+        assert!(status.success(), "{status}: {}", self.process.said());
     }
 }

@@ -1,24 +1,14 @@
 //! A `gyre echo` process: an observer of a run.
 
-use std::{
-    fs::{self, File},
-    path::PathBuf,
-    process::{Child, Command, Stdio},
-    thread,
-    time::{Duration, Instant},
-};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rustix::process::Signal;
 
-use super::{Pid, Run, gyre, send};
+use super::{Run, gyre, spawned::Spawned};
 
-const LIMIT: Duration = Duration::from_secs(60);
-const LOOK: Duration = Duration::from_millis(2);
-
-/// A running observer. Dropped, it is killed.
+/// A running observer.
 pub struct Watch {
-    child: Child,
-    output: PathBuf,
+    process: Spawned,
     topic: &'static str,
 }
 
@@ -34,62 +24,42 @@ pub struct Watched {
 }
 
 impl Watch {
-    /// Starts one that watches a topic of a run.
     pub fn start(run: &Run, topic: &'static str) -> Self {
+        static STARTED: AtomicUsize = AtomicUsize::new(0);
+        let number = STARTED.fetch_add(1, Ordering::Relaxed);
         let mut command = gyre();
         command.arg("echo").arg(run.out()).arg(topic);
-        let (output, file) = output(run);
-        let child = spawn(&mut command, file);
-        Self {
-            child,
-            output,
-            topic,
-        }
+        let said = run.folder().join(format!("watch-{number}.txt"));
+        let process = Spawned::new(command, said);
+        Self { process, topic }
     }
 
     /// Waits until it has printed a message.
     pub fn await_message(self) -> Self {
-        let since = Instant::now();
-        while self.read().seqs.is_empty() {
-            assert!(since.elapsed() < LIMIT, "{}", self.text());
-            assert!(!self.text().contains("gyre: "), "{}", self.text());
-            thread::sleep(LOOK);
-        }
+        self.process.until(|said| {
+            assert!(!said.contains("gyre: "), "{said}");
+            (!self.read(said).seqs.is_empty()).then_some(())
+        });
         self
     }
 
-    /// Sends it a signal.
     pub fn signal(&self, signal: Signal) {
-        send(self.pid(), signal);
+        self.process.signal(signal);
     }
 
     /// Kills the process and returns its output.
     pub fn kill(mut self) -> Watched {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        self.read()
+        self.process.kill();
+        self.read(&self.process.said())
     }
 
     /// Waits until the process ends, and returns its output.
     pub fn finish(mut self) -> Watched {
-        let since = Instant::now();
-        while self.child.try_wait().unwrap().is_none() {
-            assert!(since.elapsed() < LIMIT, "it goes on: {}", self.text());
-            thread::sleep(LOOK);
-        }
-        self.read()
+        self.process.wait();
+        self.read(&self.process.said())
     }
 
-    fn pid(&self) -> Pid {
-        self.child.id()
-    }
-
-    fn text(&self) -> String {
-        fs::read_to_string(&self.output).unwrap()
-    }
-
-    fn read(&self) -> Watched {
-        let text = self.text();
+    fn read(&self, text: &str) -> Watched {
         // The last line may be incomplete.
         let lines: Vec<&str> = text
             .split_inclusive('\n')
@@ -110,13 +80,6 @@ impl Watch {
     }
 }
 
-impl Drop for Watch {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 impl Watched {
     /// Asserts that each message came once and in order, and that all that is missing is counted.
     /// `items` is the number of items of a run whose end it has seen.
@@ -134,18 +97,4 @@ impl Watched {
         }
         self
     }
-}
-
-fn output(run: &Run) -> (PathBuf, File) {
-    let free = |i: &usize| !run.folder().join(format!("watch-{i}.txt")).exists();
-    let number = (0..).find(free).unwrap_or_default();
-    let path = run.folder().join(format!("watch-{number}.txt"));
-    let file = File::create(&path).unwrap();
-    (path, file)
-}
-
-fn spawn(command: &mut Command, output: File) -> Child {
-    let errors = output.try_clone().unwrap();
-    let command = command.stdin(Stdio::null()).stdout(output).stderr(errors);
-    command.spawn().unwrap()
 }

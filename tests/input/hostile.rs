@@ -86,7 +86,7 @@ fn files_without_end_are_refused_whatever_reads_them() {
         let words = settings
             .iter()
             .flat_map(|it| ["--set".to_owned(), (*it).to_owned()]);
-        let run = ["run", "--data", small, "--out", path(&out)].map(str::to_owned);
+        let run = ["run", small, "--out", path(&out)].map(str::to_owned);
         run.into_iter().chain(words).collect::<Vec<_>>()
     };
     let words = |words: &[&str]| words.iter().map(|it| (*it).to_owned()).collect::<Vec<_>>();
@@ -166,7 +166,7 @@ fn a_pipe_in_place_of_a_file_is_refused_at_once() {
     }
     for data in [options.path(), &recorded] {
         let out = folder.path().join("out");
-        let ended = at_once(&["run", "--data", path(data), "--out", path(&out)]);
+        let ended = at_once(&["run", path(data), "--out", path(&out)]);
         ended.refused_with(&[is_pipe]);
     }
 }

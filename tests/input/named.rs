@@ -19,7 +19,7 @@ fn unprintable(folder: &Path) -> PathBuf {
 
 fn run_of(data: impl AsRef<OsStr>, out: impl AsRef<OsStr>) -> Ended {
     let mut command = gyre();
-    command.arg("run").arg("--data").arg(data);
+    command.arg("run").arg(data);
     command.arg("--out").arg(out);
     Ended::of(command)
 }
@@ -41,7 +41,7 @@ fn a_recording_or_results_whose_name_is_not_utf_8_are_refused_as_that() {
     let configuration = named.with_extension("toml");
     fs::write(&configuration, "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
     let mut command = gyre();
-    command.arg("run").arg(configuration).arg("--data");
+    command.arg("run").arg(configuration);
     command.arg(recording::small()).arg("--out").arg(&out);
     Ended::of(command).succeeded();
 }
@@ -51,13 +51,11 @@ fn a_folder_in_place_of_a_configuration_is_refused_with_what_to_name() {
     let folder = folder();
     let run = |named: &Path| {
         let mut command = gyre();
-        command.args(["run", "--config"]).arg(named);
+        command.arg("simulate").arg(named);
+        command.arg("--out").arg(folder.path().join("drive"));
         Ended::of(command)
     };
-    run(recording::small()).refused_with(&[
-        "the configuration ",
-        " is a folder: name a TOML file; a recording is named by --data ",
-    ]);
+    run(recording::small()).refused_with(&["the configuration ", " is a folder: name a TOML file"]);
     fs::write(folder.path().join("config.toml"), "").unwrap();
     let own = folder.path().join("config.toml");
     run(folder.path()).refused_with(&[

@@ -31,14 +31,15 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
             .iter()
             .fold(Run::of_recording(), |run, it| run.set(it))
     };
+    let data = format!("source.data={}", file.display());
     let slam = "slam.kind=graph";
     for (run, words) in [
-        (Run::configured(""), &["--data", "source.data"][..]),
+        (Run::configured(""), &["no dataset", "source.data"][..]),
         (
             run_of(Path::new("/nowhere/at/all")),
-            &["/nowhere/at/all", "no such folder"],
+            &["/nowhere/at/all", "is no file or folder"],
         ),
-        (run_of(&file), &["scan.txt is a file", "folder"]),
+        (set(&[&data]), &["scan.txt is a file", "folder"]),
         (
             run_of(folder.path()),
             &["not a known dataset", "no PNG images"],

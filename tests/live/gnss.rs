@@ -124,7 +124,7 @@ pub fn assert_replays(run: &Run) {
 fn replayed(run: &Run) -> Run {
     let again = Run::configured("");
     let mut replay = gyre();
-    replay.arg("run").arg("--data").arg(file(run));
+    replay.arg("run").arg(file(run));
     replay.arg("--out").arg(again.out());
     Ended::of(replay);
     again

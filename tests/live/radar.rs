@@ -44,7 +44,7 @@ impl Radar {
         if !arguments.contains(&"--rate") {
             command.args(["--rate", RATE]);
         }
-        command.arg("--data").arg(recording).args(arguments);
+        command.arg(recording).args(arguments);
         let mut server = command
             .stderr(Stdio::piped())
             .stdout(Stdio::piped())
@@ -99,7 +99,7 @@ pub(crate) struct Played {
 pub(crate) fn run_at(address: &str) -> Run {
     let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
     let settings: toml::Table = settings.parse().unwrap();
-    let run = Run::small().argument("--radar", address);
+    let run = Run::small().option(address);
     let known = settings.iter().filter(|(key, _)| *key != "format");
     known
         .fold(run, |run, (key, value)| {
@@ -205,7 +205,7 @@ fn lost_doubled_and_swapped_datagrams_are_lost_azimuths_at_most() {
 fn datagrams_without_scans_are_named_in_a_sentence() {
     let to = group(3);
     let run = Run::small()
-        .argument("--radar", &format!("udp://{to}"))
+        .option(&format!("udp://{to}"))
         .set("source.interface='127.0.0.1'");
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
     let (stop, stopped) = mpsc::channel::<()>();
@@ -258,7 +258,7 @@ fn a_capture_of_a_radar_is_played_as_that_radar() {
     again.arg(&file);
     Ended::of(again).failed_with(&["File exists"]);
     let mut datagrams = gyre();
-    datagrams.args(["radar-server", "--udp", "239.192.43.9:4378", "--data"]);
+    datagrams.args(["radar-server", "--udp", "239.192.43.9:4378"]);
     datagrams.arg(&file);
     Ended::of(datagrams).failed_with(&["was captured by TCP", "leave out --udp"]);
 }

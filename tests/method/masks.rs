@@ -27,7 +27,7 @@ fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
     command
         .current_dir(folder)
-        .args(["masks", "small.toml", "--out", "out", "--data"])
+        .args(["masks", "small.toml", "--out", "out"])
         .arg(data)
         .args(arguments);
     Ended::of(command)

@@ -85,7 +85,7 @@ fn can_view() -> bool {
 /// A drive of 120 scans, half a minute at rate 1.
 fn driving(rate: &str) -> Run {
     let data = recording::around_a_block().to_str().unwrap();
-    Run::small().argument("--data", data).rate(rate)
+    Run::small().option(data).rate(rate)
 }
 
 fn started(run: &Run) -> (Running, Server) {

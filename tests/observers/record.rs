@@ -47,7 +47,7 @@ pub fn recorded(run: &Run) -> Run {
 pub fn replay(recording: &Path, arguments: &[&str]) -> String {
     let run = Run::configured("");
     let mut command = gyre();
-    command.arg("run").arg("--data").arg(recording);
+    command.arg("run").arg(recording);
     command.args(arguments).arg("--out").arg(run.out());
     Ended::of(command).succeeded();
     run.odometry()

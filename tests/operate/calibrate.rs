@@ -168,7 +168,7 @@ fn turning() -> Option<TempDir> {
 fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
     let Some(recording) = turning() else { return };
     let (recording, out) = (recording.path(), TempDir::new().unwrap());
-    let ended = calibrate(recording, out.path(), &[], &["--config", "radiate"]);
+    let ended = calibrate(recording, out.path(), &[], &["radiate"]);
     let said = ended.succeeded().stdout.clone();
     assert!(said.contains("gyro, axis up         -z\n"), "{said}");
     let file = out.path().join("calibration.toml");
@@ -199,7 +199,7 @@ fn the_log_of_another_drive_is_refused() {
     let other = out.path().join("log.csv");
     let text = format!("{header}\n{}", backwards.collect::<String>());
     fs::write(&other, text).unwrap();
-    let words = ["--config", "radiate", "--gyro", other.to_str().unwrap()];
+    let words = ["radiate", "--gyro", other.to_str().unwrap()];
     let ended = calibrate(recording, out.path(), &[], &words);
     assert!(
         ended.stdout.contains("the log is of another drive"),

@@ -194,7 +194,7 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
 #[test]
 fn a_test_that_cannot_be_carried_out_is_no_verdict() {
     let stress = Stress::new();
-    let output = stress.run(&["--data", "nowhere", "--scenario", "steady"]);
+    let output = stress.run(&["nowhere", "--scenario", "steady"]);
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(

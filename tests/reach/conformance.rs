@@ -31,7 +31,7 @@ fn tested(stage: &str, more: &[&str]) -> (Value, Ended) {
             .args(["--set", "simulation.sensor.profile='cts350x-radiate'"])
             .args(["--set", "simulation.output.format='oxford'"]);
     } else {
-        command.arg("--data").arg(recording::small());
+        command.arg(recording::small());
     }
     if !more.contains(&"--stop-timeout-s") {
         command.args(["--stop-timeout-s", "30"]);
@@ -304,5 +304,5 @@ fn a_command_that_cannot_be_tested_is_refused_in_a_sentence() {
         &["masking", "--patience-s", "nan"],
         &["--patience-s", "0 or more"],
     );
-    refused(&["masking", "--config", "no.toml"], &["no.toml"]);
+    refused(&["masking", "no.toml"], &["no.toml"]);
 }

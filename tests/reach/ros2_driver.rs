@@ -45,7 +45,7 @@ impl Driver {
         logs: &[PathBuf],
     ) -> Self {
         let mut command = gyre();
-        command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
+        command.args(["radar-server", "--listen", "127.0.0.1:0"]);
         let mut server = command
             .arg(recording)
             .args(options)

@@ -11,7 +11,6 @@ use crate::{
     method::learned_masks::card,
     operate::commands::ask,
 };
-use rustix::process::Signal;
 use tempfile::TempDir;
 
 const MODERATE: &str = "6";
@@ -62,11 +61,7 @@ fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun
     running.kill("masking").kill("pose-integration");
     let ended = running.finish();
     ended.succeeded();
-    assert!(
-        !ended.stderr.contains("another program"),
-        "{}",
-        ended.stderr
-    );
+    ended.does_not_say("another program");
     assert_eq!(run.odometry(), undisturbed());
 }
 
@@ -91,9 +86,7 @@ fn unfinished_and_complete_runs_are_kept_until_they_are_replaced_on_purpose() {
         if state.starts_with("complete") {
             run.complete();
         } else {
-            let mut running = run.clone().rate(MODERATE).start();
-            running.await_poses(MIDDLE).signal(Signal::INT);
-            assert_eq!(running.finish().code(), Some(130));
+            run.interrupt(MODERATE, MIDDLE);
         }
         let refused = |run: &Run, words: &[&str]| {
             let ended = run.finish();

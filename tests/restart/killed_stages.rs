@@ -30,22 +30,10 @@ fn a_stage_that_hangs_without_a_heartbeat_is_noticed_and_started_again() {
         stop_without_a_heartbeat(&run, stage, pid);
         let ended = running.finish();
         ended.succeeded();
-        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        ended.says(words);
         assert_eq!(run.odometry(), undisturbed());
         assert_eq!(run.summary()["restarts"][stage], 1);
     }
-}
-
-#[test]
-fn slow_playback_is_no_stall() {
-    // 2.5 s from scan to scan.
-    let run = Run::of_recording()
-        .rate("0.1")
-        .set("source.scans=4")
-        .set("run.stall_timeout_s=1.5");
-    let ended = run.finish();
-    ended.succeeded();
-    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
 }
 
 #[test]
@@ -55,7 +43,7 @@ fn a_stage_that_takes_long_to_start_is_no_stall() {
         .set("run.stall_timeout_s=1");
     let ended = run.finish();
     ended.succeeded();
-    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+    ended.does_not_say("restarted");
     assert_eq!(run.odometry(), undisturbed());
 }
 
@@ -90,7 +78,7 @@ fn a_stage_that_would_fail_the_same_way_again_is_given_up_at_once() {
     let run = Run::of_recording().stage_script("masking", "echo 'masking: no licence' >&2; exit 2");
     let ended = run.finish();
     ended.failed_with(&["masking: no licence"]);
-    assert!(!ended.stderr.contains("restarted "), "{}", ended.stderr);
+    ended.does_not_say("restarted ");
 }
 
 #[test]

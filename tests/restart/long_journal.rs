@@ -35,16 +35,9 @@ fn poses() -> u64 {
 /// The largest resident memory of this process so far, MB.
 fn peak_mb() -> f64 {
     let status = fs::read_to_string("/proc/self/status").unwrap();
-    let line = status
-        .lines()
-        .find(|line| line.starts_with("VmHWM"))
-        .unwrap();
-    line.split_whitespace()
-        .nth(1)
-        .unwrap()
-        .parse::<f64>()
-        .unwrap()
-        / 1024.0
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kilobytes = peak.and_then(|it| it.trim().strip_suffix(" kB")).unwrap();
+    kilobytes.parse::<f64>().unwrap() / 1024.0
 }
 
 fn folder() -> TempDir {
@@ -131,7 +124,7 @@ fn a_restart_reads_the_end_alone() {
 }
 
 #[test]
-fn a_check_takes_bounded_memory() {
+fn a_check_and_results_take_bounded_memory() {
     let (folder, poses) = (folder(), poses());
     forge(folder.path(), poses);
     let since = Instant::now();
@@ -140,15 +133,7 @@ fn a_check_takes_bounded_memory() {
         (content.poses, content.ended, content.torn),
         (poses, true, 0)
     );
-    let (took, peak) = (since.elapsed(), peak_mb());
-    println!("{poses} poses: checked in {took:?}, peak {peak:.1} MB");
-    assert!(peak < MAX_PEAK_MB);
-}
-
-#[test]
-fn results_take_bounded_memory() {
-    let (folder, poses) = (folder(), poses());
-    forge(folder.path(), poses);
+    println!("{poses} poses: checked in {:?}", since.elapsed());
     let configuration = Configuration::of_overrides(&[]).unwrap();
     let out = Out::lock(folder.path()).unwrap();
     let session = Session {

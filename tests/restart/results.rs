@@ -4,18 +4,13 @@
 use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 
 use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
-use rustix::process::Signal;
 
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
-/// A run that was interrupted in its middle.
 fn interrupted() -> Run {
     let run = Run::of_recording();
-    let slow = run.clone().rate(MODERATE);
-    let mut running = slow.start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt(MODERATE, MIDDLE);
     run
 }
 
@@ -43,12 +38,8 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     fs::remove_dir(&csv).unwrap();
     let ended = run.finish();
     ended.succeeded();
-    assert!(ended.stderr.contains("all 24 poses"), "{}", ended.stderr);
-    assert!(
-        !ended.stderr.contains("pid"),
-        "no process is started: {}",
-        ended.stderr
-    );
+    ended.says("all 24 poses");
+    ended.does_not_say("pid");
     assert_eq!(run.odometry(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["ending"], "complete");
@@ -57,34 +48,24 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     assert!(summary["evaluation"]["rpe"].is_object());
 }
 
-#[test]
-fn a_run_whose_results_are_written_is_begun_anew() {
-    let run = Run::of_recording();
-    run.complete();
-    run.complete();
-    assert_eq!(run.summary()["resumed_after"], 0);
+/// Makes the journal one of another version.
+fn age(journal: &Path) {
+    let mut bytes = fs::read(journal).unwrap();
+    bytes[..16].copy_from_slice(b"gyre journal v9 ");
+    fs::write(journal, bytes).unwrap();
 }
 
 #[test]
-fn results_without_a_journal_are_replaced_only_if_that_is_asked_for() {
+fn results_without_a_journal_or_of_another_version_are_replaced_only_if_that_is_asked_for() {
     let run = Run::of_recording();
     run.complete();
+    age(&run.out().join("journal/poses.journal"));
+    run.finish()
+        .refused_with(&["poses.journal", "another version", "--fresh"]);
+    assert_eq!(run.clone().option("--fresh").complete(), undisturbed());
     fs::remove_dir_all(run.out().join("journal")).unwrap();
     run.finish()
         .refused_with(&["summary.json", "journal is missing", "--fresh"]);
-}
-
-#[test]
-fn a_journal_of_another_version_is_replaced_only_if_that_is_asked_for() {
-    let run = Run::of_recording();
-    run.complete();
-    let path = run.out().join("journal/poses.journal");
-    let mut bytes = fs::read(&path).unwrap();
-    bytes[..16].copy_from_slice(b"gyre journal v9 ");
-    fs::write(&path, bytes).unwrap();
-    run.finish()
-        .refused_with(&["poses.journal", "another version", "--fresh"]);
-    assert_eq!(run.option("--fresh").complete(), undisturbed());
 }
 
 #[test]
@@ -99,9 +80,7 @@ fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
     let journal = run.out().join("journal/poses.journal");
     for (number, run) in [run.clone(), other.clone(), other].iter().enumerate() {
         if number == 2 {
-            let mut bytes = fs::read(&journal).unwrap();
-            bytes[..16].copy_from_slice(b"gyre journal v9 ");
-            fs::write(&journal, bytes).unwrap();
+            age(&journal);
         }
         let odometry = run.odometry();
         let out = run.out().canonicalize().unwrap();
@@ -137,7 +116,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     let ended = futile(&run, "exit 7").finish();
     ended.failed_with(&["masking"]);
     let note = "has the results of the complete run before";
-    assert!(ended.stderr.contains(note), "{}", ended.stderr);
+    ended.says(note);
     is_there();
 
     // The supervisor is killed: the next command restores all results that are not yet replaced.
@@ -153,6 +132,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     is_there();
     run.complete();
     is_there();
+    assert_eq!(run.summary()["resumed_after"], 0, "it is begun anew");
 }
 
 #[test]
@@ -184,19 +164,6 @@ fn results_of_a_run_are_not_taken_for_those_of_an_unknown_one_while_another_begi
 }
 
 #[test]
-fn no_draft_of_a_result_is_left() {
-    let run = interrupted();
-    run.complete();
-    for folder in [run.out().to_owned(), run.out().join("journal")] {
-        let names = names(&folder);
-        assert!(
-            !names.iter().any(|name| name.ends_with(".tmp")),
-            "{names:?}"
-        );
-    }
-}
-
-#[test]
 fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
     for damage in [
         |path: &Path| fs::write(path, ""),
@@ -206,6 +173,11 @@ fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
         let config = run.out().join("config.toml");
         damage(&config).unwrap();
         assert_eq!(run.complete(), undisturbed());
+        for folder in [run.out().to_owned(), run.out().join("journal")] {
+            let names = names(&folder);
+            let has_draft = names.iter().any(|name| name.ends_with(".tmp"));
+            assert!(!has_draft, "{names:?}");
+        }
         assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
         assert_eq!(Run::of_file(&config).complete(), undisturbed());
     }
@@ -241,9 +213,7 @@ fn a_damaged_record_of_what_a_run_was_begun_with_is_named_and_not_discarded() {
 fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
     let run = Run::of_recording();
     // Two seconds, so that the first poses are known to be on the disk when later ones are written.
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2 * MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt("2", 2 * MIDDLE);
     let journal = run.out().join("journal/poses.journal");
     let mut bytes = fs::read(&journal).unwrap();
     bytes[1000] ^= 4;
@@ -317,24 +287,19 @@ fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
 }
 
 fn stored() -> Run {
-    Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 6\n")
-        .set("simulation.output.store=true")
+    Run::simulated(6).set("simulation.output.store=true")
 }
 
 #[test]
-fn a_recording_that_gyre_did_not_write_is_never_removed() {
+fn a_file_that_gyre_did_not_write_into_a_recording_is_never_removed() {
     let run = stored();
-    let theirs = run.out().join("recording");
-    fs::create_dir_all(theirs.join("radar")).unwrap();
-    fs::write(theirs.join("radar/1.png"), "theirs").unwrap();
+    let theirs = run.out().join("recording/radar/1.png");
+    fs::create_dir_all(theirs.parent().unwrap()).unwrap();
+    fs::write(&theirs, "theirs").unwrap();
     run.finish()
         .failed_with(&["recording", "1.png", "no file of this dataset", "--out"]);
-    assert_eq!(fs::read(theirs.join("radar/1.png")).unwrap(), b"theirs");
-}
-
-#[test]
-fn a_file_that_was_added_to_a_recording_is_never_removed() {
-    let run = stored();
+    assert_eq!(fs::read(&theirs).unwrap(), b"theirs");
+    fs::remove_dir_all(run.out().join("recording")).unwrap();
     run.complete();
     let notes = run.out().join("recording/notes.txt");
     fs::write(&notes, "rain").unwrap();
@@ -349,9 +314,7 @@ fn a_file_that_was_added_to_a_recording_is_never_removed() {
 #[test]
 fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
     let run = stored();
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
+    run.interrupt("2", 2);
     let images = names(&run.out().join("recording/radar"));
     let other = run.clone().set("simulation.seed=4");
     other
@@ -359,16 +322,4 @@ fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
         .refused_with(&["another configuration", "simulation.seed"]);
     assert_eq!(names(&run.out().join("recording/radar")), images);
     assert_eq!(run.complete(), stored().complete());
-}
-
-#[test]
-fn a_recording_is_not_replaced_while_another_run_plays_it() {
-    let run = stored();
-    let mut running = run.clone().rate("2").start();
-    running.await_poses(2);
-    let images = names(&run.out().join("recording/radar"));
-    let other = run.clone().set("simulation.seed=4").option("--fresh");
-    Ended::of(other.command()).refused_with(&["another command is writing to"]);
-    assert_eq!(names(&run.out().join("recording/radar")), images);
-    running.finish().succeeded();
 }

@@ -2,48 +2,24 @@
 //! and leaves their files alone.
 
 use std::{
-    fs,
+    fs::{self, File},
     os::unix::fs::{MetadataExt, PermissionsExt, symlink},
     path::{Path, PathBuf},
-    process::{Child, Command},
+    process::Command,
     thread,
     time::Duration,
 };
 
 use gyre_stage::run::SHARED_MEMORY;
-use rustix::thread::Pid;
 use tempfile::TempDir;
 
 use crate::common::{Ended, OtherUser, Run, leftovers, undisturbed};
 
-/// Holds the lock of a file, as another program does.
-struct Lock(Child);
-
-impl Lock {
-    fn of(path: &Path) -> Self {
-        let mut flock = Command::new("flock");
-        let lock = flock.arg(path).args(["sleep", "60"]).spawn().unwrap();
-        let inode = format!(":{} ", fs::metadata(path).unwrap().ino());
-        let is_held = || {
-            let locks = fs::read_to_string("/proc/locks").unwrap();
-            locks.lines().any(|line| line.contains(&inode))
-        };
-        while !is_held() {
-            thread::sleep(Duration::from_millis(2));
-        }
-        Self(lock)
-    }
-}
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // Its child holds the lock too.
-        let pid = Pid::from_child(&self.0);
-        let children = format!("/proc/{pid}/task/{pid}/children");
-        let child = fs::read_to_string(children).unwrap().trim().parse();
-        crate::common::send(child.unwrap(), rustix::process::Signal::KILL);
-        self.0.wait().unwrap();
-    }
+/// Holds the lock of a file or folder, as another program does, until it is dropped.
+fn locked(path: &Path) -> File {
+    let file = File::open(path).unwrap();
+    file.lock().unwrap();
+    file
 }
 
 /// A run of a short simulation by another user, with a program and results of its own.
@@ -77,7 +53,7 @@ impl Other {
 
 #[test]
 fn a_lock_that_another_program_holds_on_shared_memory_does_not_delay_a_run() {
-    let _lock = Lock::of(Path::new(SHARED_MEMORY));
+    let _lock = locked(Path::new(SHARED_MEMORY));
     Run::of_recording().complete();
 }
 
@@ -95,10 +71,11 @@ fn a_lock_of_the_run_that_does_not_become_free_ends_it_with_the_name_of_its_hold
     // Under its name only once it is held: a free one is removed by any run that starts.
     let held = path.with_extension("held");
     fs::write(&held, b"").unwrap();
-    let lock = Lock::of(&held);
+    let lock = locked(&held);
     fs::rename(&held, &path).unwrap();
     let ended = Ended::of(run.command());
-    ended.refused_with(&["another run is writing to", "process ", "flock"]);
+    let holder = format!("process {}", std::process::id());
+    ended.refused_with(&["another run is writing to", &holder]);
     drop(lock);
     running.finish().succeeded();
     run.complete();
@@ -183,7 +160,7 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest() {
     in_shared_memory_of(running.pid(), FILL);
     let ended = running.finish();
     ended.succeeded();
-    assert!(!ended.stderr.contains("died"), "{}", ended.stderr);
+    ended.does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 }
 

@@ -80,8 +80,7 @@ fn a_stage_that_prints_without_end_does_not_fill_the_disk() {
 /// The limits of the system's processes do not hold for root, so the run is another user's.
 #[test]
 fn a_stage_for_which_there_is_no_process_is_started_when_there_is_one() {
-    let run =
-        Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n").rate("6");
+    let run = Run::simulated(24).rate("6");
     let Some(user) = OtherUser::new(run.folder()) else {
         return;
     };

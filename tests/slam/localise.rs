@@ -78,8 +78,7 @@ fn localising(map: &Path, town: u64, out: &Path) -> Command {
     let configuration = out.with_extension("toml");
     fs::write(&configuration, CONFIGURATION).unwrap();
     let mut command = gyre();
-    command.arg("localise").arg(configuration);
-    command.arg("--data").arg(drive);
+    command.arg("localise").arg(configuration).arg(drive);
     command.arg("--map").arg(map).arg("--out").arg(out);
     command
 }

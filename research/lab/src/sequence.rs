@@ -161,7 +161,7 @@ impl Sequence {
     fn run_arguments(&self, changes: &[String], out: &Path) -> Vec<String> {
         let paths = [&self.file, &self.data, out];
         let [file, data, out] = paths.map(|path| path.display().to_string());
-        let run = ["run", &file, "--data", &data, "--out", &out];
+        let run = ["run", &file, &data, "--out", &out];
         let run = run.into_iter().chain(["--rate", "max", "--fresh"]);
         let sets = changes.iter().flat_map(|set| ["--set", set]);
         run.chain(sets).map(str::to_owned).collect()
@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(sequence.name, "oxford-monday");
         let arguments =
             sequence.run_arguments(&["search.kind=exhaustive".to_owned()], Path::new("out/raw"));
-        let expected = "gyre run configs/oxford.toml --data recordings/monday --out out/raw --rate max --fresh \
+        let expected = "gyre run configs/oxford.toml recordings/monday --out out/raw --rate max --fresh \
                         --set search.kind=exhaustive";
         assert_eq!(command("gyre", arguments), expected);
         assert_eq!(folder("f-raw, Eq. 7"), "f-raw-eq-7");

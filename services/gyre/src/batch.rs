@@ -89,7 +89,6 @@ fn processors() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Prints the number of drives by outcome, and the place of the table.
 fn concluded(ended: &Ended, table: Option<&Path>) -> Result<ExitCode, Failure> {
     print::line(sentence(&ended.counts, ended.earlier))?;
     if let Some(out) = table {
@@ -105,7 +104,6 @@ fn concluded(ended: &Ended, table: Option<&Path>) -> Result<ExitCode, Failure> {
     })
 }
 
-/// The number of drives by outcome, in a sentence.
 fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
     let drives: usize = counts.values().sum();
     let each = counts.iter();

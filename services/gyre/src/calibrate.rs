@@ -2,8 +2,7 @@
 //! gyro beside it, and the clock and the scale of the wheels.
 
 mod check;
-mod gyro;
-mod wheels;
+mod sensors;
 
 use std::{
     path::Path,
@@ -21,14 +20,10 @@ use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
-use gyro::Gyro;
-use wheels::Wheels;
+use sensors::{Gyro, Wheels};
 
-/// The section for the configuration.
 const SECTION: &str = "calibration.toml";
-/// The picture of the first drive.
 const PICTURE: &str = "calibration.svg";
-/// Time between two lines of progress.
 const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
@@ -39,10 +34,10 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let drives = read_drives(arguments)?;
     let logs = drives.iter();
     let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
-    let gyro = gyro::section(&of_gyro.collect::<Vec<_>>())?;
+    let gyro = Gyro::section(&of_gyro.collect::<Vec<_>>())?;
     let logs = drives.iter();
     let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
-    let wheels = wheels::section(&of_wheels.collect::<Vec<_>>())?;
+    let wheels = Wheels::section(&of_wheels.collect::<Vec<_>>())?;
     let radar = found_by(drives, &arguments.out);
     let found = radar.as_ref().ok();
     let ates_m = found.and_then(|it| check::ates_m(arguments, it));
@@ -151,7 +146,6 @@ fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// A drive as it was read.
 struct Recorded {
     name: String,
     drive: Drive,
@@ -188,8 +182,7 @@ impl Recorded {
         })
     }
 
-    /// Refuses another drive that was read with different constants, since its findings are changes
-    /// to those constants.
+    /// The findings are changes to the constants that a drive was read with.
     fn require_same_constants(&self, other: &Self) -> Result<(), Failure> {
         let constants = [self, other].map(|it| {
             let geometry = &it.configured.geometry;

@@ -16,7 +16,8 @@ use clap::{Args, Parser, Subcommand};
 use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
-use gyre_terminal::inputs::{ConfigArguments, Given, InputError, Inputs};
+use gyre_terminal::Failure;
+use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
 use gyre_tools::doctor::DoctorArguments;
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
@@ -29,10 +30,10 @@ use gyre_tools::operate::{
 use gyre_tools::radar_server::RadarServerArguments;
 use gyre_tools::report::ReportArguments;
 
-pub use batch::{BatchArguments, BatchDriveArguments};
+pub use batch::BatchArguments;
 pub use conformance::ConformanceArguments;
 pub use help::command;
-pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
+pub use link::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 pub use record::{RecordArguments, SplitArguments};
 pub use ros2::Ros2Arguments;
 pub use shadow::ShadowArguments;
@@ -56,13 +57,25 @@ pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
     /// Run a simulated drive around a block, which needs no data: `gyre run demo`.
-    Demo(DemoArguments),
+    Demo {
+        /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        #[command(flatten)]
+        options: RunOptions,
+    },
     /// Run the pipeline on many drives, and write a table of their results. The same command
     /// continues after an interruption.
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_tools::batch::COMMAND)]
-    BatchDrive(BatchDriveArguments),
+    BatchDrive {
+        /// The process that has started it, and whose end also ends it.
+        #[arg(long)]
+        parent: i32,
+        #[command(flatten)]
+        run: RunArguments,
+    },
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
     /// End a run in the background, and wait for its results.
@@ -114,7 +127,10 @@ pub enum Command {
     Record(RecordArguments),
     /// Take the topics of a running run to another machine. To split a run between two machines,
     /// see the section `[link]`.
-    Link(LinkArguments),
+    Link {
+        #[command(subcommand)]
+        end: LinkEnd,
+    },
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).
@@ -145,7 +161,11 @@ pub enum Command {
     /// List the configurations in the program, or print one of them to edit it.
     Config(ConfigArguments),
     /// Print the JSON schema of configurations, for editors.
-    Schema(SchemaArguments),
+    Schema {
+        /// Print the reference of the configuration in Markdown instead.
+        #[arg(long)]
+        markdown: bool,
+    },
     /// Print the completions of a shell.
     Completions {
         /// The shell.
@@ -161,35 +181,19 @@ pub enum Command {
 /// The arguments of `gyre run`.
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
-    /// The recording or the radar, and the configuration.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Play a recording from this topic on, without the stages before it: masked, rotation, motion
     /// or refined (source.from).
     #[arg(long, value_name = "TOPIC")]
     pub from: Option<String>,
-    /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
-    #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
-    pub radar: Option<String>,
     /// The topic of ROS 2 on which Navtech's driver publishes azimuths, as in /radar_data/fft_data:
     /// run live (source.kind, source.topic, run.mode).
-    #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
+    #[arg(long, value_name = "TOPIC")]
     pub ros2: Option<String>,
     /// The constants of the radar, of `gyre calibrate`, which override the configuration.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-    /// The results and the pace.
-    #[command(flatten)]
-    pub options: RunOptions,
-}
-
-/// The arguments of `gyre demo`.
-#[derive(Debug, Args)]
-pub struct DemoArguments {
-    /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// The results and the pace.
     #[command(flatten)]
     pub options: RunOptions,
 }
@@ -219,20 +223,6 @@ pub struct RunOptions {
     pub fresh: bool,
 }
 
-impl From<DemoArguments> for RunArguments {
-    fn from(demo: DemoArguments) -> Self {
-        Self {
-            inputs: Inputs {
-                config: Some("gyre:configs/demo.toml".into()),
-                set: demo.set,
-                ..Inputs::default()
-            },
-            options: demo.options,
-            ..Self::default()
-        }
-    }
-}
-
 impl RunOptions {
     /// Returns the form of the figures at the end.
     pub fn form(&self) -> Form {
@@ -246,18 +236,18 @@ impl RunOptions {
 
 impl RunArguments {
     /// Returns the inputs to run.
-    pub fn given(&self) -> Result<Given, InputError> {
-        let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
-        // A topic of ROS 2 is a radar too.
-        given.clone().with_radar(self.ros2.as_ref())?;
-        Ok(given)
+    pub fn given(&self) -> Result<Given, Failure> {
+        let given = self.inputs.given()?;
+        let has_source = given.data.is_some() || given.radar.is_some();
+        match self.ros2.is_some() && has_source {
+            true => Err("--ros2 names a radar, and another source is named too: name one".into()),
+            false => Ok(given),
+        }
     }
 }
 
-/// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// The recording; a configuration determines how it is read.
     #[command(flatten)]
     pub inputs: Inputs,
     /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
@@ -268,10 +258,8 @@ pub struct InspectArguments {
     pub json: bool,
 }
 
-/// The arguments of `gyre calibrate`.
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
-    /// The recording, and the configuration whose constants are checked.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Another drive of the same radar, read in the same way: the file has the constants from all
@@ -298,15 +286,6 @@ pub struct CalibrateArguments {
     pub scans: usize,
 }
 
-/// The arguments of `gyre schema`.
-#[derive(Debug, Args)]
-pub struct SchemaArguments {
-    /// Print the reference of the configuration in Markdown instead.
-    #[arg(long)]
-    pub markdown: bool,
-}
-
-/// The arguments of `gyre simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
     /// The configuration, a TOML file or a name that `gyre config` lists: its section

@@ -1,26 +1,24 @@
 //! `gyre conformance`: tests whether a program keeps the contract of a stage.
 
-use std::{path::Path, process::ExitCode};
+use std::process::ExitCode;
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
-use gyre_stage::{Manifest, wake::Signals};
+use gyre_stage::wake::Signals;
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 use gyre_tools::conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
-    preflight::{self, Preflight},
-    program,
+    preflight, program,
     run::resolve,
 };
 
-/// The configuration of a test without `--config` and `--data`: the shape of the program's messages
-/// matters, not the accuracy.
+/// The shape of the program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
 /// Places for observers in addition to the places of a run; the test uses some.
 const OBSERVERS: usize = 4;
@@ -28,8 +26,7 @@ const OBSERVERS: usize = 4;
 /// The exit code if some rules could not be tested, which is no evidence against the program.
 const NOT_TESTED: u8 = 2;
 
-/// Tests a program, and prints the rules that it breaks. The exit code is 0 if it keeps the
-/// contract, 1 if it breaks a rule, and 2 if not all could be tested.
+/// The exit code is 0 if it keeps the contract, 1 if not, and 2 if not all could be tested.
 pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
     match examine(arguments) {
         Ok(Some(report)) => print(&report, arguments.json),
@@ -41,7 +38,6 @@ pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure
     }
 }
 
-/// Tests a program; `None` on an interrupt.
 fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> {
     let stage = StageId::by_name(&arguments.stage).ok_or("there is no such stage")?;
     let demands = demands(arguments)?;
@@ -65,14 +61,14 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             command,
             scheduling: Scheduling::default(),
             gyre: own().to_string_lossy().into_owned(),
-            manifest: manifest(&configuration, &checked, folder.path())?,
+            manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
         stages: StageId::ALL
             .into_iter()
             .filter(|stage| configuration.has(*stage))
             .collect(),
-        prepare: Box::new(move |root| match &checked.recording {
+        prepare: Box::new(move |root| match &checked.scans.recording {
             Some(recording) => recording.listing.write(root),
             None => Ok(()),
         }),
@@ -119,8 +115,6 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
     })
 }
 
-/// The configuration of the runs that the program is tested in: lossless, with the stage, of some
-/// scans.
 fn configuration(
     arguments: &ConformanceArguments,
     stage: StageId,
@@ -143,7 +137,7 @@ fn configuration(
                 .chain(python)
                 .chain(lossless)
                 .collect(),
-            ..arguments.inputs.clone()
+            what: arguments.inputs.what.clone(),
         },
         ..RunArguments::default()
     })?;
@@ -178,22 +172,4 @@ fn command(
             Ok(configured.unwrap_or_default().command(&gyre, name))
         }
     }
-}
-
-fn manifest(
-    configuration: &Configuration,
-    checked: &Preflight,
-    out: &Path,
-) -> Result<Manifest, Failure> {
-    Ok(Manifest {
-        prefix: String::new(),
-        root: Path::new("").to_owned(),
-        out: out.to_owned(),
-        window: checked.window,
-        limits: checked.limits,
-        live: false,
-        refines: configuration.has(StageId::Refinement),
-        rate: None,
-        build: program::digest(&own())?,
-    })
 }

@@ -27,15 +27,13 @@ use gyre_stage::Generation;
 use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_terminal::{Failure, print};
 
-pub use replaced::{is_untouched, settle};
+pub use replaced::settle;
 
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 
-/// The state of an earlier run.
 #[derive(Debug)]
 pub enum Earlier {
-    /// Nothing to continue from.
     Nothing,
     /// The same run, begun and ended without a pose to continue from. Only its recording continues.
     WithoutPoses(Identity),
@@ -49,14 +47,12 @@ pub enum Earlier {
     Foreign(Failure),
 }
 
-/// A run that was begun.
 #[derive(Debug)]
 pub struct Begun {
     /// Poses in its journal to continue from.
     pub poses: u64,
     /// Records behind them, which a power failure has left in part: they are to be cut off.
     pub lost: u64,
-    /// The identity that it was begun with.
     pub identity: Identity,
 }
 
@@ -114,8 +110,10 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed = (!configuration.slam.is_on() || queries(out)?.has_ended())
-            && (!configuration.objects.is_on() || has_all_objects(out)?);
+        let is_followed = (!configuration.slam.is_on()
+            || has_ended::<Query>(out, "finds the loops")?)
+            && (!configuration.objects.is_on()
+                || has_ended::<LoggedObjects>(out, "tracks the objects")?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -157,8 +155,7 @@ impl Earlier {
     }
 }
 
-/// Returns the state of a folder without poses: anything begun there may begin again, and the same
-/// run may continue its recording.
+/// Anything begun there may begin again, and the same run may continue its recording.
 fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
     let holds = Holds::Unfinished(0);
     let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
@@ -168,8 +165,7 @@ fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) 
     }
 }
 
-/// Checks that a complete run may be replaced by this one without being asked for it: by the same
-/// results.
+/// A complete run may be replaced by the same results without being asked for it.
 fn complete(
     out: &Out,
     configuration: &Configuration,
@@ -207,27 +203,15 @@ pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
 
-/// Opens the candidates of the keyframes so far.
-fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
-    RecordReader::open(out.path()).map_err(|error| match error {
-        LogError::Damaged { .. } => {
-            format!("{error}: remove it, and the same command finds the loops anew").into()
+/// A damaged log may be removed, and is then computed again in these words.
+fn has_ended<R: gyre_slam::Record>(out: &Out, again: &str) -> Result<bool, Failure> {
+    match RecordReader::<R>::open(out.path()) {
+        Ok(records) => Ok(records.has_ended()),
+        Err(error @ LogError::Damaged { .. }) => {
+            Err(format!("{error}: remove it, and the same command {again} anew").into())
         }
-        _ => error.into(),
-    })
-}
-
-/// Returns whether the objects of all scans are known.
-fn has_all_objects(out: &Out) -> Result<bool, Failure> {
-    let opened = RecordReader::<LoggedObjects>::open(out.path());
-    opened
-        .map(|objects| objects.has_ended())
-        .map_err(|error| match error {
-            LogError::Damaged { .. } => {
-                format!("{error}: remove it, and the same command tracks the objects anew").into()
-            }
-            _ => error.into(),
-        })
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.
@@ -337,7 +321,6 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     Ok(Out::lock(path)?)
 }
 
-/// Advises how to repair damaged keyframes.
 fn damaged(error: KeyframesError) -> Failure {
     match error {
         KeyframesError::Log(LogError::Damaged { .. }) => format!(
@@ -348,7 +331,6 @@ fn damaged(error: KeyframesError) -> Failure {
     }
 }
 
-/// The files of a run's state.
 fn state(out: &Path) -> [PathBuf; 12] {
     let [ledger, generations] = state_of_recording(out);
     [
@@ -409,8 +391,7 @@ pub fn begin(
     Ok(storage::write(&out.join(CONFIGURATION), resolved)?)
 }
 
-/// Returns whether results of so many poses may take the place of those in the folder: a run
-/// without a motion does not replace a complete one.
+/// A run without a motion does not replace a complete one.
 pub fn replaces(out: &Out, poses: usize) -> bool {
     poses >= replaced::WITH_MOTION || !replaced::is_kept(out)
 }
@@ -425,8 +406,7 @@ pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
     Ok(replaces)
 }
 
-/// Ends a run whose results are in place, and survive a power failure by now. A complete run is
-/// marked as complete.
+/// Ends a run whose results are in place, and survive a power failure by now.
 pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     if !replaces(out, poses) {
         return Ok(replaced::give_back(out)?);

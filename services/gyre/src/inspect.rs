@@ -9,13 +9,9 @@ use gyre_terminal::{Failure, print};
 
 use crate::cli::InspectArguments;
 
-/// Prints the contents of a dataset and its apparent faults.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
-    let trajectory = arguments
-        .trajectory
-        .as_deref()
-        .map(read_trajectory)
-        .transpose()?;
+    let trajectory = arguments.trajectory.as_deref().map(read_trajectory);
+    let trajectory = trajectory.transpose()?;
     let Inputs { set, .. } = &arguments.inputs;
     let given = arguments.inputs.given_recording()?;
     let configuration = match &given.configuration {

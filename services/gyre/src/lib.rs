@@ -31,14 +31,13 @@ pub mod watch;
 use std::{path::PathBuf, process::ExitCode};
 
 use gyre_configuration::{Configuration, schema};
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 use gyre_tools::doctor::DoctorArguments;
 
-use cli::{Command, SchemaArguments};
+use cli::{Command, RunArguments};
 #[cfg(not(feature = "link"))]
 use split::absent as link;
 
-/// Executes a command of `gyre`.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
     if is_private(&command) {
@@ -53,7 +52,14 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Run(arguments) => run::run(&arguments),
-        Command::Demo(arguments) => run::run(&arguments.into()),
+        Command::Demo { set, options } => {
+            let what = vec!["gyre:configs/demo.toml".into()];
+            run::run(&RunArguments {
+                inputs: Inputs { what, set },
+                options,
+                ..RunArguments::default()
+            })
+        }
         Command::Up(arguments) => gyre_tools::operate::up(&run::results_folder(&arguments)?),
         Command::Down(run) => gyre_tools::operate::down(&run),
         Command::Ps(arguments) => gyre_tools::operate::ps(&arguments),
@@ -66,11 +72,11 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Ros2(arguments) => ros2::publish(&arguments),
         Command::Shadow(arguments) => shadow::shadow(&arguments),
         Command::Batch(arguments) => batch::batch(&arguments),
-        Command::BatchDrive(arguments) => batch::drive(&arguments),
+        Command::BatchDrive { parent, run } => batch::drive(parent, &run),
         Command::Stress(arguments) => stress::stress(&arguments),
         Command::StressHelper { words } => stress::help(&words),
         Command::Record(arguments) => record::record(&arguments),
-        Command::Link(arguments) => link::link(&arguments),
+        Command::Link { end } => link::link(&end),
         Command::Doctor(arguments) => doctor(&arguments),
         Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
@@ -84,7 +90,13 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
         Command::Config(arguments) => gyre_terminal::inputs::config(&arguments),
-        Command::Schema(arguments) => print_schema(&arguments),
+        Command::Schema { markdown } => {
+            print::line(match markdown {
+                true => schema::reference(),
+                false => schema::json(),
+            })?;
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut cli::command(), "gyre", &mut text);
@@ -111,13 +123,4 @@ fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
 /// umask of a child process may be the one that the transport sets for a moment.
 fn is_private(command: &Command) -> bool {
     !matches!(command, Command::Simulate(_))
-}
-
-/// Prints the schema of configurations, or their reference.
-fn print_schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
-    print::line(match arguments.markdown {
-        true => schema::reference(),
-        false => schema::json(),
-    })?;
-    Ok(ExitCode::SUCCESS)
 }

@@ -9,14 +9,13 @@ use gyre_stage::{run::sweep, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds};
 
 use crate::{
-    cli::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
+    cli::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
     preflight, split,
 };
 
-/// Runs one end of a link.
-pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+pub fn link(end: &LinkEnd) -> Result<ExitCode, Failure> {
     split::set_environment()?;
-    match &arguments.end {
+    match end {
         LinkEnd::Send(arguments) => send(arguments),
         LinkEnd::Receive(arguments) => receive(arguments),
     }

@@ -11,10 +11,8 @@ use gyre_supervise::Event;
 use gyre_terminal::print;
 use sd_notify::NotifyState;
 
-/// Time between two lines of status.
 const STATUS_EVERY: Duration = Duration::from_secs(5);
 
-/// Notifies systemd; does nothing where nobody listens.
 pub struct Notifier {
     listens: bool,
     /// systemd takes keep-alives from the start of the service on.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Mode, RecordConfig, RestartPolicy, Scheduling, Side, StageConfig};
+use gyre_run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
@@ -29,10 +29,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             None => own.scheduling.or(&configuration.run.scheduling),
         };
         StagePlan {
-            name: name.to_owned(),
-            command,
             programs,
-            directory: None,
             scheduling,
             restart: own.restart,
             outlives_restarts: live
@@ -46,6 +43,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
                 true => LinkConfig::END_TIMEOUT + END_TIMEOUT,
                 false => END_TIMEOUT,
             },
+            ..StagePlan::new(name, command)
         }
     };
     let stages = StageId::ALL
@@ -70,34 +68,18 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
     if !record.is_on() {
         return None;
     }
-    let text = |path: &Path| path.to_string_lossy().into_owned();
-    let mut command = vec![text(gyre), "record".to_owned(), text(out)];
-    command.extend([
-        "--continues".to_owned(),
-        "--to".to_owned(),
-        text(&record.file),
-    ]);
-    for (option, value) in [
-        ("--split-mb", record.split_mb.to_string()),
-        ("--split-s", record.split_s.to_string()),
-    ] {
-        if value != "0" {
-            command.extend([option.to_owned(), value]);
-        }
+    let [gyre, out, file] = [gyre, out, record.file.as_path()].map(Path::to_string_lossy);
+    let (split_mb, split_s) = (record.split_mb.to_string(), record.split_s.to_string());
+    let topics = record.topics.join(",");
+    let mut command = vec![&*gyre, "record", &*out, "--continues", "--to", &*file];
+    command.extend(["--split-mb", &split_mb, "--split-s", &split_s]);
+    if !topics.is_empty() {
+        command.extend(["--topics", &topics]);
     }
-    if !record.topics.is_empty() {
-        command.extend(["--topics".to_owned(), record.topics.join(",")]);
-    }
+    let command = command.into_iter().map(str::to_owned).collect();
     Some(StagePlan {
-        name: "recorder".to_owned(),
-        command,
-        programs: Vec::new(),
-        directory: None,
-        scheduling: Scheduling::default(),
-        restart: RestartPolicy::default(),
         outlives_restarts: true,
-        restarts_all: false,
-        end_timeout: END_TIMEOUT,
+        ..StagePlan::new("recorder", command)
     })
 }
 
@@ -130,25 +112,20 @@ mod tests {
                 .map(|plan| plan.name)
                 .collect()
         };
-        let (source, halves) = (
-            ["radar-replay", "masking"],
-            ["rotation-search", "translation-search"],
-        );
-        let (joint, refined, searched) = (
-            ["joint-search"],
-            ["refinement", "pose-integration"],
-            ["pose-integration"],
-        );
-        assert_eq!(names(""), [&source[..], &halves, &refined].concat());
-        assert_eq!(
-            names("[refinement]\nkind = 'none'"),
-            [&source[..], &halves, &searched].concat()
-        );
-        let exhaustive = "[search]\nkind = 'exhaustive'\n";
-        assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
-        assert_eq!(
-            names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
-            [&source[..], &joint, &searched].concat()
-        );
+        for (text, expected) in [
+            ("", "rotation-search translation-search refinement"),
+            (
+                "[refinement]\nkind = 'none'",
+                "rotation-search translation-search",
+            ),
+            ("[search]\nkind = 'exhaustive'", "joint-search refinement"),
+            (
+                "[search]\nkind = 'exhaustive'\n[refinement]\nkind = 'none'",
+                "joint-search",
+            ),
+        ] {
+            let expected = format!("radar-replay masking {expected} pose-integration");
+            assert_eq!(names(text).join(" "), expected);
+        }
     }
 }

@@ -1,92 +1,56 @@
 //! Checks before the first process is started.
 
-use std::{io, net::UdpSocket, path::Path, time::Duration};
+use std::{
+    net::UdpSocket,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
+use gyre_run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
-use gyre_stage::run::free_shared_memory;
+use gyre_stage::{Manifest, run::free_shared_memory};
 use gyre_stages::live_radar::{Settings, Sizes};
 use gyre_stages::radar_replay::{Listing, Player};
 use gyre_terminal::{Failure, print};
 use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
-use thiserror::Error;
 
 use crate::{ros2, split};
 
-/// Why a run cannot start.
-#[derive(Debug, Error)]
-pub enum PreflightError {
-    #[error(
-        "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
-    )]
-    NoRecording {
-        from: &'static str,
-        /// The source that was named.
-        data: String,
-    },
-    #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
-    TooFew { path: String, scans: usize },
-    /// A log beside a live radar, or a topic beside one that is not in ROS 2.
-    #[error(
-        "{0}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
-    )]
-    LiveLog(&'static str),
-    #[error("cannot receive the fixes of GNSS at {address} (gnss.listen): {source}")]
-    LiveGnss {
-        address: String,
-        /// The system's reason.
-        source: io::Error,
-    },
-    #[error(
-        "doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`"
-    )]
-    LiveDoppler,
-    #[error(
-        "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
-         or lower run.window or raster.n"
-    )]
-    SharedMemory { free_mb: f64, footprint: Footprint },
-    #[error(
-        "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
-    )]
-    OpenFiles { limit: u64 },
-    #[error("cannot use shared memory at /dev/shm: {0}")]
-    NoSharedMemory(rustix::io::Errno),
-}
-
 /// The limits of a run that follow from its dataset and configuration.
 pub struct Preflight {
-    /// Scans to play; `None`: without end.
-    pub scans: Option<usize>,
-    /// Limits on scans in flight.
+    pub scans: Scans,
     pub window: Window,
-    /// The largest payloads.
     pub limits: Limits,
-    /// Shared memory that the run takes.
     pub footprint: Footprint,
-    /// `ground_truth.tum` of a simulation that is played without being stored.
-    pub truth: Option<Vec<u8>>,
-    /// The recording, if it is on the disk.
-    pub recording: Option<Recording>,
-    /// See [`Session::damage`](gyre_results::Session).
-    pub damage: Option<String>,
-    /// See [`Session::needs_all`](gyre_results::Session).
-    pub needs_all: bool,
 }
 
-/// A recording on the disk.
+impl Preflight {
+    /// Returns the manifest of a run, without its place in shared memory.
+    pub fn manifest(&self, configuration: &Configuration, out: &Path, build: String) -> Manifest {
+        Manifest {
+            prefix: String::new(),
+            root: PathBuf::new(),
+            out: out.to_owned(),
+            window: self.window,
+            limits: self.limits,
+            live: configuration.run.mode == Mode::Live,
+            refines: configuration.has(StageId::Refinement),
+            rate: configuration.run.rate.factor(),
+            build,
+        }
+    }
+}
+
 pub struct Recording {
-    /// The identity of the recording.
     pub fingerprint: Fingerprint,
     pub listing: Listing,
 }
 
-/// Asks a radar for the sizes of its scans.
 pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
@@ -127,29 +91,27 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
     };
     let footprint = Footprint::new(&window, &limits);
     Ok(Preflight {
-        recording: scans.recording,
-        damage: scans.damage,
-        needs_all: scans.needs_all,
-        scans: scans.count,
+        scans,
         window,
         limits,
         footprint,
-        truth: scans.truth,
     })
 }
 
 /// The properties of the scans that the source knows before the run.
 #[derive(Default)]
-pub(crate) struct Scans {
+pub struct Scans {
     /// `None`: without end.
     pub count: Option<usize>,
-    pub period_ns: i64,
-    /// The largest scan.
-    pub bytes: usize,
+    period_ns: i64,
+    bytes: usize,
+    /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
     pub recording: Option<Recording>,
-    damage: Option<String>,
-    needs_all: bool,
+    /// See [`Session::damage`](gyre_results::Session).
+    pub damage: Option<String>,
+    /// See [`Session::needs_all`](gyre_results::Session).
+    pub needs_all: bool,
 }
 
 impl Scans {
@@ -165,10 +127,10 @@ impl Scans {
         }
         let count = configuration.source.stream_len(dataset.scans());
         if let Some(scans @ 0..2) = count {
-            return Err(PreflightError::TooFew {
-                path: configuration.data(),
-                scans,
-            }
+            let (path, plural) = (configuration.data(), if scans == 1 { "" } else { "s" });
+            return Err(format!(
+                "{path} has {scans} scan{plural}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there"
+            )
             .into());
         }
         let recording = match truth {
@@ -193,10 +155,10 @@ impl Scans {
     fn of_messages(configuration: &Configuration) -> Result<Self, Failure> {
         let source = &configuration.source;
         if !gyre_recording::is_recording(&source.data) {
-            return Err(PreflightError::NoRecording {
-                from: source.from.name(),
-                data: configuration.data(),
-            }
+            let (from, data) = (source.from.name(), configuration.data());
+            return Err(format!(
+                "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
+            )
             .into());
         }
         let refines = configuration.has(StageId::Refinement);
@@ -225,24 +187,26 @@ impl Scans {
 
     fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
-        let can_come = match configuration.odometry.gyro.kind {
+        let gyro_comes = match configuration.odometry.gyro.kind {
             GyroKind::None | GyroKind::Udp => true,
             GyroKind::Ros2 => is_in_ros2,
             GyroKind::Auto | GyroKind::Log => false,
         };
-        if !can_come {
-            return Err(PreflightError::LiveLog("gyro").into());
-        }
-        let can_come = match configuration.odometry.wheels.kind {
+        let wheels_come = match configuration.odometry.wheels.kind {
             WheelsKind::None | WheelsKind::Udp => true,
             WheelsKind::Ros2 => is_in_ros2,
             WheelsKind::Auto | WheelsKind::Log => false,
         };
-        if !can_come {
-            return Err(PreflightError::LiveLog("wheels").into());
+        for (sensor, comes) in [("gyro", gyro_comes), ("wheels", wheels_come)] {
+            if !comes {
+                return Err(format!(
+                    "{sensor}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
+                )
+                .into());
+            }
         }
         if configuration.odometry.doppler.is_used() {
-            return Err(PreflightError::LiveDoppler.into());
+            return Err("doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`".into());
         }
         configuration.dataset.check()?;
         let radar = ask(configuration)?;
@@ -265,8 +229,7 @@ pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     }
 }
 
-/// Returns whether each scan that cannot be read is a problem: see
-/// [`Session::needs_all`](gyre_results::Session).
+/// See [`Session::needs_all`](gyre_results::Session).
 pub(crate) fn needs_all(dataset: &dyn Dataset) -> bool {
     matches!(dataset.format(), Format::Mcap | Format::Ros2Bag)
 }
@@ -278,31 +241,34 @@ fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
         // Where the results lie does not matter to a log.
         return Ok(gnss_log(configuration, Path::new("")).map(drop)?);
     }
-    let opened = UdpSocket::bind(&config.listen).map(drop);
-    Ok(opened.map_err(|source| PreflightError::LiveGnss {
-        address: config.listen.clone(),
-        source,
-    })?)
+    let address = &config.listen;
+    let opened = UdpSocket::bind(address).map(drop);
+    opened.map_err(|error| {
+        format!("cannot receive the fixes of GNSS at {address} (gnss.listen): {error}").into()
+    })
 }
 
-/// Checks that a process may open as many files as it needs. The transport's own errors would not
-/// name the missing limit.
-pub fn check_open_files() -> Result<(), PreflightError> {
+/// The transport's own errors would not name the missing limit.
+pub fn check_open_files() -> Result<(), Failure> {
     match getrlimit(Resource::Nofile).current {
-        Some(limit) if limit < MOST_OPEN_FILES => Err(PreflightError::OpenFiles { limit }),
+        Some(limit) if limit < MOST_OPEN_FILES => Err(format!(
+            "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
+        )
+        .into()),
         _ => Ok(()),
     }
 }
 
-/// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire
-/// the run's root first, which removes them.
-pub fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
-    let free = free_shared_memory().map_err(PreflightError::NoSharedMemory)?;
+/// Acquire the run's root first, which removes the memory of killed runs.
+pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
+    let free = free_shared_memory();
+    let free = free.map_err(|error| format!("cannot use shared memory at /dev/shm: {error}"))?;
     match free {
-        Some(free) if free < footprint.total() as u64 => Err(PreflightError::SharedMemory {
-            free_mb: free as f64 / 1e6,
-            footprint: footprint.clone(),
-        }),
+        Some(free) if free < footprint.total() as u64 => Err(format!(
+            "shared memory at /dev/shm has {:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), or lower run.window or raster.n",
+            free as f64 / 1e6
+        )
+        .into()),
         _ => Ok(()),
     }
 }

@@ -41,7 +41,6 @@ pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, St
     replaced.map(of).collect()
 }
 
-/// Returns the programs of a run that is started now.
 pub fn now(configuration: &Configuration) -> io::Result<Programs> {
     Ok(Programs::new(digest(&own())?, replaced(configuration)?))
 }

@@ -16,10 +16,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use silence::Silence;
 
-/// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// Shows the progress of a run.
 pub struct Progress {
     bar: Option<ProgressBar>,
     /// `/100`, or nothing without an end.
@@ -67,33 +65,12 @@ impl Progress {
 
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
-            Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
             Event::Pose(pose) => self.pose(pose),
-            Event::Died { stage, death } => {
-                let output = death
-                    .last_output
-                    .as_ref()
-                    .map_or(String::new(), |line| format!(" ({line})"));
-                self.say(&format!("{stage} died by {}{output}", death.cause));
-            }
-            Event::Restarted { only: Some(name) } => self.say(&format!("restarted {name}")),
-            Event::Restarted { only: None } => self.say("restarted the stages from the journal"),
-            Event::GaveUp { follower, error } => {
-                self.say(&format!("{error}: odometry goes on without {follower}"));
-            }
-            Event::Note { sentence } => self.say(sentence),
+            Event::Note(sentence) => self.say(sentence),
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => {
                 self.radar = None;
                 self.following(follower, *progress);
-            }
-            Event::Swapped { stage, command } => {
-                self.say(&format!("{stage} is `{}` from here on", command.join(" ")));
-            }
-            Event::WentBack { stage, reason } => {
-                self.say(&format!(
-                    "{stage} goes back to the program before: {reason}"
-                ));
             }
             Event::Watched => self.silence(),
             Event::Stopping => self.radar = None,
@@ -108,15 +85,21 @@ impl Progress {
     }
 
     fn pose(&mut self, pose: &PoseHeader) {
-        let message = self.message(&pose.item);
+        let mut message = self.message(&pose.item);
         match &self.bar {
-            Some(bar) => {
-                bar.set_position(self.done.saturating_add(pose.item.dropped()));
-                bar.set_message(message);
-            }
+            Some(bar) => bar.set_position(self.done.saturating_add(pose.item.dropped())),
+            None => message = format!("{}{} scans  {message}", self.done, self.of),
+        }
+        self.show_message(message);
+    }
+
+    /// Shows a message in the bar, or now and then in a line.
+    fn show_message(&mut self, message: String) {
+        match &self.bar {
+            Some(bar) => bar.set_message(message),
             None if self.last_line.elapsed() >= EVERY => {
                 self.last_line = Instant::now();
-                print::note(format_args!("{}{} scans  {message}", self.done, self.of));
+                print::note(message);
             }
             None => {}
         }
@@ -144,25 +127,15 @@ impl Progress {
 
     /// Reports the progress of a follower if the run has to wait for it.
     fn following(&mut self, follower: &str, progress: Following) {
-        let work = match FollowerId::by_name(follower) {
-            Some(FollowerId::LoopClosure) => "loop closing",
-            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => follower,
-            Some(FollowerId::Objects) => "objects",
-        };
-        let records = match FollowerId::by_name(follower) {
-            Some(FollowerId::Objects) => "scans",
-            _ => "keyframes",
+        let (work, records) = match FollowerId::by_name(follower) {
+            Some(FollowerId::LoopClosure) => ("loop closing", "keyframes"),
+            Some(FollowerId::Objects) => ("objects", "scans"),
+            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => {
+                (follower, "keyframes")
+            }
         };
         let Following { done, total } = progress;
-        let message = format!("{work}: {done} of {total} {records}");
-        match &self.bar {
-            Some(bar) => bar.set_message(message),
-            None if self.last_line.elapsed() >= EVERY => {
-                self.last_line = Instant::now();
-                print::note(message);
-            }
-            None => {}
-        }
+        self.show_message(format!("{work}: {done} of {total} {records}"));
     }
 
     /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen

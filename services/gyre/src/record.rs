@@ -7,8 +7,6 @@ use gyre_terminal::{Failure, print, seconds};
 
 use crate::cli::{RecordArguments, SplitArguments};
 
-/// Records a run until its end or an interrupt, and reports the numbers of recorded and missed
-/// messages.
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     let span = seconds("--split-s", arguments.split.split_s)?;
     let options = Options {
@@ -34,7 +32,6 @@ pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-/// Returns the limits of a file; 0 is unlimited.
 fn split(arguments: &SplitArguments, span: Duration) -> Split {
     let span_ns = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
     Split {

@@ -4,19 +4,16 @@ mod resolve;
 
 use std::{
     env,
-    ffi::OsString,
-    os::unix::process::CommandExt,
     path::{Path, PathBuf},
-    process::{Command, ExitCode},
+    process::ExitCode,
     time::{Duration, Instant},
 };
 
 use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
 use gyre_datasets::GnssLog;
-use gyre_messages::StageId;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
-use gyre_run::{Ending, Mode};
+use gyre_run::Ending;
 use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest,
@@ -26,7 +23,7 @@ use gyre_stage::{
 };
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_tools::operate::detach_if_asked;
 
 use crate::{
@@ -62,8 +59,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     )
 }
 
-/// Runs a resolved configuration, and prints its figures in a form. A `fresh` run starts from
-/// nothing.
+/// A `fresh` run starts from nothing.
 pub(crate) fn compute(
     mut configuration: Configuration,
     out: Out,
@@ -89,7 +85,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     }
 }
 
-/// Returns the folder of the results that the arguments name.
 pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     if let Some(out) = &arguments.options.out {
         return Ok(out.clone());
@@ -141,8 +136,8 @@ fn make_ready(
         configuration,
         programs,
         resolved.dataset,
-        checked.scans,
-        checked.recording.as_ref().map(|it| &it.fingerprint),
+        checked.scans.count,
+        checked.scans.recording.as_ref().map(|it| &it.fingerprint),
     )?;
     if let Some((begun_with, holds)) = earlier.identity() {
         begun_with.require_recording(&identity, out.path(), holds)?;
@@ -195,9 +190,14 @@ fn play(
     };
     preflight::check_shared_memory(&checked.footprint)?;
     prepare(configuration, &ready, &out, unfinished)?;
-    let plan = plan_of(resolved, manifest(resolved, programs, &out, checked, &root));
+    let manifest = Manifest {
+        prefix: root.prefix(),
+        root: root.path().to_owned(),
+        ..checked.manifest(resolved, out.path(), programs.build.clone())
+    };
+    let plan = plan_of(resolved, manifest);
     plan.manifest.write(&resolved.to_toml()?)?;
-    if let Some(recording) = &checked.recording {
+    if let Some(recording) = &checked.scans.recording {
         let path = root.path().display();
         let failed = |error| format!("cannot write to {path}: {error}");
         recording.listing.write(root.path()).map_err(failed)?;
@@ -207,7 +207,7 @@ fn play(
     describe_objects(resolved)?.iter().for_each(print::note);
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
-    let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
+    let mut progress = Progress::new(checked.scans.count, resumed, &checked.footprint);
     if resolved.is_radar() {
         progress.watch_radar(resolved.data(), plan.manifest.clone());
     }
@@ -226,15 +226,14 @@ fn play(
     progress.finish();
     notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
-        let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
-        return start_over(resumed, begins_anew);
+        return start_over(resumed);
     }
     let session = Session {
-        scans: checked.scans,
+        scans: checked.scans.count,
         resumed,
-        damage: checked.damage.as_deref(),
-        needs_all: checked.needs_all,
+        damage: checked.scans.damage.as_deref(),
+        needs_all: checked.scans.needs_all,
         wall: started.elapsed(),
         footprint: Some(&checked.footprint),
         ending: report.as_ref().ok().map(|report| report.ending),
@@ -263,7 +262,7 @@ fn prepare(
             earlier::begin(out, &ready.identity, &resolved, ready.recording_goes_on)?;
         }
     }
-    if let Some(truth) = &ready.checked.truth {
+    if let Some(truth) = &ready.checked.scans.truth {
         storage::write(&out.join(SIMULATED_TRUTH), truth)?;
     }
     Ok(storage::create_folder(&out.join("log"))?)
@@ -279,26 +278,6 @@ fn plan_of(configuration: &Configuration, manifest: Manifest) -> Plan {
         start_timeout: limit(configuration.run.start_timeout_s),
         cpu_wake_us: configuration.run.cpu_wake_us,
         manifest,
-    }
-}
-
-fn manifest(
-    configuration: &Configuration,
-    programs: &Programs,
-    out: &Out,
-    checked: &Preflight,
-    root: &RunRoot,
-) -> Manifest {
-    Manifest {
-        prefix: root.prefix(),
-        root: root.path().to_owned(),
-        out: out.path().to_owned(),
-        window: checked.window,
-        limits: checked.limits,
-        live: configuration.run.mode == Mode::Live,
-        refines: configuration.has(StageId::Refinement),
-        rate: configuration.run.rate.factor(),
-        build: programs.build.clone(),
     }
 }
 
@@ -364,8 +343,7 @@ fn finish(
     Ok(written)
 }
 
-/// Puts the fixes that the run has used beside its recording, for its replays. The run has its
-/// results without, as it has without the recording.
+/// Puts the fixes that the run has used beside its recording, for its replays.
 fn keep_fixes(configuration: &Configuration, out: &Out) {
     let (record, gnss) = (&configuration.record, &configuration.gnss);
     let received = received_fixes(out.path());
@@ -387,7 +365,6 @@ fn keep_fixes(configuration: &Configuration, out: &Out) {
     }
 }
 
-/// The message of a run that failed.
 fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>) -> Failure {
     let out = out.path().display();
     match written {
@@ -402,7 +379,6 @@ fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>
     .into()
 }
 
-/// Prints the summary and returns the exit code.
 fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<ExitCode, Failure> {
     let problem = written.summary.problem();
     let is_printed = problem.is_none() || written.poses >= 2;
@@ -427,46 +403,19 @@ fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<Exit
 /// The environment variable of a run that has started over: the poses that it resumed after before.
 const STARTED_OVER: &str = "GYRE_STARTED_OVER";
 
-/// Returns whether the run has started over since it resumed after so many poses: once more would
-/// not help.
+/// Once more would not help.
 fn has_started_over_at(poses: usize) -> bool {
     env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
 }
 
 /// Executes the same command again. The transport hung on the remains of a dead process, which are
-/// removed now. The run resumes from the journal; if it was replacing a complete run and has
-/// computed nothing, it begins again as requested.
-fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
+/// removed now: it cannot be used again in this process. The run resumes from the journal.
+fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over",
     );
-    let failed = Command::new(own())
-        .args(again(env::args_os(), begins_anew))
-        .env(STARTED_OVER, resumed.to_string())
-        .exec();
+    // Computed poses are not discarded.
+    let arguments = env::args_os().filter(|argument| argument != "--fresh");
+    let failed = execute_again(arguments, STARTED_OVER, &resumed.to_string());
     Err(format!("cannot start over: {failed}").into())
-}
-
-/// Returns the arguments of a run that starts over. Computed poses are not discarded.
-fn again(
-    arguments: impl Iterator<Item = OsString>,
-    begins_anew: bool,
-) -> impl Iterator<Item = OsString> {
-    arguments
-        .skip(1)
-        .filter(move |argument| begins_anew || argument != "--fresh")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_a_run_that_has_computed_nothing_begins_anew_again() {
-        let given = || ["gyre", "run", "--fresh", "a.toml"].map(OsString::from);
-        let resumed: Vec<_> = again(given().into_iter(), false).collect();
-        assert_eq!(resumed, ["run", "a.toml"]);
-        let begun: Vec<_> = again(given().into_iter(), true).collect();
-        assert_eq!(begun, ["run", "--fresh", "a.toml"]);
-    }
 }

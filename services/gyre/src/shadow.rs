@@ -13,8 +13,7 @@ use gyre_tools::operate::chosen;
 
 use crate::{cli::ShadowArguments, preflight};
 
-/// Compares until the run ends or the given time is over, and prints the report. The exit code is 1
-/// if nothing was compared, or the program died, hung or broke the contract.
+/// The exit code is 1 if nothing was compared, or the program died, hung or broke the contract.
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;
@@ -65,14 +64,11 @@ fn stage(name: &str) -> Result<StageId, Failure> {
 /// Requires that the run has the stage: joint-search stands in the place of the other two searches.
 fn require_stage(control: &Control, stage: StageId) -> Result<(), Failure> {
     let processes = control.status()?.processes;
-    let mut names = processes.iter().map(|process| process.name.as_str());
-    match names.any(|name| name == stage.name()) {
+    let names: Vec<_> = processes.iter().map(|it| it.name.as_str()).collect();
+    let (stage, list) = (stage.name(), names.join(", "));
+    match names.contains(&stage) {
         true => Ok(()),
-        false => {
-            let names: Vec<_> = processes.iter().map(|it| it.name.as_str()).collect();
-            let (stage, names) = (stage.name(), names.join(", "));
-            Err(format!("the run has no {stage}; it has {names}").into())
-        }
+        false => Err(format!("the run has no {stage}; it has {list}").into()),
     }
 }
 

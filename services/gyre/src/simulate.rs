@@ -13,7 +13,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::SimulateArguments;
 
-/// Writes a simulated recording, or completes one.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
@@ -35,10 +34,9 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
         summary.scans - summary.kept,
         started.elapsed().as_secs_f64(),
     );
-    let kept = if summary.kept > 0 {
-        format!(", {} were there already", summary.kept)
-    } else {
-        String::new()
+    let kept = match summary.kept {
+        0 => String::new(),
+        kept => format!(", {kept} were there already"),
     };
     print::line(format_args!(
         "wrote {written} scans to {} in {wall_s:.1} s ({:.1} scans/s{kept}): {} scans, {:.0} m, {:.0} s",
@@ -53,25 +51,21 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
 
 /// Returns the options of the command line as overrides `section.key=value`.
 fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
-    let scans = arguments
-        .scans
-        .map(|scans| format!("simulation.scans={scans}"));
-    let seed = arguments.seed.map(|seed| format!("simulation.seed={seed}"));
-    let format = arguments
-        .format
-        .map(|format| format!("simulation.output.format={format}"));
-    let file = arguments
-        .trajectory
-        .as_deref()
-        .map(path_value)
-        .transpose()?;
-    let file = file.map(|file| format!("simulation.drive.file={file}"));
-    let options = [scans, seed, format, file].into_iter().flatten();
-    Ok(arguments.set.iter().cloned().chain(options).collect())
+    let file = arguments.trajectory.as_deref().map(path_value);
+    let options = [
+        ("scans", arguments.scans.map(|it| it.to_string())),
+        ("seed", arguments.seed.map(|it| it.to_string())),
+        ("output.format", arguments.format.map(|it| it.to_string())),
+        ("drive.file", file.transpose()?.map(|it| it.to_string())),
+    ];
+    let given = options.into_iter().filter_map(|(key, value)| {
+        let value = value?;
+        Some(format!("simulation.{key}={value}"))
+    });
+    Ok(arguments.set.iter().cloned().chain(given).collect())
 }
 
-/// Writes the recording of a run to `out`, or completes it. If `replace`, it replaces the recording
-/// of an earlier run.
+/// If `replace`, it replaces the recording of an earlier run.
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     match write(threads, simulation, out) {
@@ -96,10 +90,9 @@ fn write(
     simulation: &SimulationConfig,
     out: &Path,
 ) -> Result<Summary, SimulatorError> {
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(0)
-    } else {
-        ProgressBar::hidden()
+    let bar = match std::io::stderr().is_terminal() {
+        true => ProgressBar::new(0),
+        false => ProgressBar::hidden(),
     };
     if let Ok(style) = ProgressStyle::with_template(
         "simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",

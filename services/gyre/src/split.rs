@@ -1,11 +1,11 @@
 //! The link of a run that is split between two machines.
 
-use std::{env, os::unix::process::CommandExt, process::Command};
+use std::env;
 
 use gyre_configuration::Configuration;
 use gyre_link::ONE_THREAD;
 use gyre_run::LinkConfig;
-use gyre_terminal::{Failure, own};
+use gyre_terminal::{Failure, execute_again};
 
 #[cfg(feature = "link")]
 pub use gyre_link::{run_base, run_robot};
@@ -19,24 +19,20 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
         return Ok(());
     }
     #[cfg(not(feature = "link"))]
-    return Err(absent::ABSENT.into());
+    return Err(crate::features::absent(absent::PART).into());
     #[cfg(feature = "link")]
     gyre_link::Network::from(&configuration.link)
         .check()
         .map_err(|error| format!("[link]: {error}").into())
 }
 
-/// Executes the same command again with the environment that the network layer needs, unless it has
-/// that already.
+/// Executes the same command again with the environment that the network layer needs.
 pub fn set_environment() -> Result<(), Failure> {
     let (name, value) = ONE_THREAD;
     if env::var_os(name).is_some_and(|set| set == value) {
         return Ok(());
     }
-    let failed = Command::new(own())
-        .args(env::args_os().skip(1))
-        .env(name, value)
-        .exec();
+    let failed = execute_again(env::args_os(), name, value);
     Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 
@@ -63,19 +59,19 @@ pub mod absent {
     use gyre_stage::{Launch, StageCounters, StageError};
     use gyre_terminal::Failure;
 
-    use crate::{cli::LinkArguments, features::Absent};
+    use crate::{cli::LinkEnd, features};
 
-    pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
+    pub(super) const PART: &str = "zenoh, which links machines";
 
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
+        Err(StageError::Configuration(features::absent(PART)))
     }
 
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
+        Err(StageError::Configuration(features::absent(PART)))
     }
 
-    pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
-        Err(ABSENT.into())
+    pub fn link(_: &LinkEnd) -> Result<ExitCode, Failure> {
+        Err(features::absent(PART).into())
     }
 }

@@ -24,7 +24,6 @@ use rustix::{
 
 use crate::{program, ros2, split};
 
-/// The work of a process.
 type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
 
 /// Runs a stage or a follower by its name, with a function of Python if one is given.
@@ -82,8 +81,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
     })
 }
 
-/// Checks that this is the supervisor's build. A command of the configuration may name a different
-/// build.
+/// A command of the configuration may name a different build.
 fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     let path = own();
     let supervisor = PathBuf::from(format!(
@@ -112,8 +110,6 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     }
 }
 
-/// Receives from a radar or from the other side of a link, or plays a recording, or a simulation as
-/// it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {

@@ -22,8 +22,7 @@ use crate::{
     simulate,
 };
 
-/// The exit code of a stress test that could not be carried out, which is no verdict on the
-/// pipeline.
+/// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
 /// Duration of a scenario with `--quick`, s.
 const QUICK_S: f64 = 10.0;
@@ -31,8 +30,7 @@ const QUICK_S: f64 = 10.0;
 /// played again and again.
 const RENDERED: usize = 240;
 
-/// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget
-/// are kept, 1 if not, and 2 if the test could not be carried out.
+/// The exit code is 0 if all limits are kept, 1 if not, and 2 without a verdict.
 pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         for scenario in Scenario::ALL {
@@ -51,7 +49,6 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-/// Does the work of a helper process.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
     gyre_tools::stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
@@ -119,8 +116,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline. An unchanged stored
-/// simulation is kept.
+/// Stores a simulation, so that rendering does not bound the pipeline.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());

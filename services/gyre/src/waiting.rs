@@ -33,8 +33,7 @@ fn notice(error: &Failure) -> String {
     format!("waits for its radar: {error}")
 }
 
-/// Asks the radar, until it answers. Meanwhile `gyre ps` shows the run, and `signals` are
-/// installed.
+/// Meanwhile `gyre ps` shows the run, and `signals` are installed.
 pub fn for_radar(
     configuration: &Configuration,
     out: &Out,

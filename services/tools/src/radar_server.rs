@@ -21,7 +21,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
         return record(file, radar, arguments);
     }
-    if let Some(data) = &arguments.inputs.data
+    if let [data] = arguments.inputs.what.as_slice()
         && let Some(capture) = Capture::open(data)?
     {
         return play(data, capture, arguments);

@@ -12,12 +12,10 @@ use toml::{Table, Value};
 
 use crate::{ConfigurationError, MethodConfig, paths::Named, strict};
 
-/// Scans that are measured, evenly spread over the recording.
 const SCANS: usize = 8;
 /// The threshold above the noise floor, steps of half a decibel. Chosen on RADIATE and Oxford,
 /// whose floors are 17 steps apart.
 const ABOVE_NOISE: u8 = 36;
-/// Cells on a side of the rasters.
 const CELLS: f32 = 255.0;
 /// The largest cell, m: with it the rasters reach 102 m.
 const MAX_CELL_M: f32 = 0.8;
@@ -46,8 +44,6 @@ pub enum AutomaticError {
     /// The configuration of a recorded run, or constants of a radar that TOML cannot hold.
     #[error(transparent)]
     Configuration(#[from] ConfigurationError),
-    #[error("the recording's configuration: {0}")]
-    Recorded(String),
 }
 
 /// Returns the settings of a recording from its format, its `dataset.toml` and its scans; for a
@@ -78,8 +74,7 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
-/// Returns the format of a recording and the constants of its radar: from its `dataset.toml`, then
-/// from its format. A recorded run has its own.
+/// The constants of a `dataset.toml` go before those of its format. A recorded run has its own.
 pub fn radar_constants(
     data: &Path,
     wished: &DatasetOptions,
@@ -98,7 +93,8 @@ pub fn radar_constants(
 fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let recording = gyre_recording::open_recording(data)?;
     let parsed: Result<Table, toml::de::Error> = recording.head().configuration.parse();
-    let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
+    let mut table = parsed
+        .map_err(|error| ConfigurationError(format!("the recording's configuration: {error}")))?;
     // The recording itself describes its scans.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
     let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);
@@ -117,8 +113,6 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     })
 }
 
-/// Returns the constants of the radar of a dataset, from its configuration in the
-/// program.
 fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     let name = match format {
         Format::Oxford => "oxford",
@@ -135,10 +129,8 @@ fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     strict::section(&mut table, "dataset")
 }
 
-/// Properties of a radar that its scans show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Measured {
-    /// Median of all powers, steps of half a decibel.
     noise: u8,
     /// Depth of a range bin, m.
     range_resolution_m: f32,

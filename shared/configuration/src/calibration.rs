@@ -1,21 +1,12 @@
 //! The constants that `gyre calibrate` has found, as overrides of a configuration.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use gyre_datasets::DatasetOptions;
 use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_storage as storage;
-use thiserror::Error;
 
-use crate::strict::{self, syntax};
-
-/// Why a file is no calibration.
-#[derive(Debug, Error)]
-#[error("{}: {reason}", file.display())]
-pub struct CalibrationError {
-    file: PathBuf,
-    reason: String,
-}
+use crate::{ConfigurationError, strict};
 
 /// The sections where a calibration may have any key: radar, gyro and wheels.
 const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
@@ -23,16 +14,11 @@ const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
 const RANGES: [&str; 2] = ["points", "raster"];
 
 /// Returns the constants in a file of `gyre calibrate` as overrides, as `dataset.key=value`.
-pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
-    let unusable = |reason: String| CalibrationError {
-        file: file.to_owned(),
-        reason,
-    };
+pub fn overrides(file: &Path) -> Result<Vec<String>, ConfigurationError> {
+    let unusable = |reason: &str| ConfigurationError(format!("{}: {reason}", file.display()));
     let text = storage::read_text(file, storage::SETTINGS)
-        .map_err(|error| unusable(format!("cannot be read: {error}")))?;
-    let table: toml::Table = text
-        .parse()
-        .map_err(|error: toml::de::Error| unusable(syntax(&text, &error)))?;
+        .map_err(|error| unusable(&format!("cannot be read: {error}")))?;
+    let table = strict::parse(file, &text)?;
     let is_known = |(section, value): (&String, &toml::Value)| match value {
         toml::Value::Table(_) if WHOLE.contains(&section.as_str()) => true,
         toml::Value::Table(keys) => {
@@ -42,16 +28,17 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     };
     if !WHOLE.iter().any(|section| table.contains_key(*section)) || !table.iter().all(is_known) {
         return Err(unusable(
-            "a calibration has the sections [dataset], [gyro] and [wheels], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
+            "a calibration has the sections [dataset], [gyro] and [wheels], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`",
         ));
     }
     let mut sections = table.clone();
-    strict::section::<DatasetOptions>(&mut sections, "dataset")
-        .map_err(|error| unusable(error.to_string()))?;
-    strict::section::<GyroConfig>(&mut sections, "gyro")
-        .map_err(|error| unusable(error.to_string()))?;
-    strict::section::<WheelsConfig>(&mut sections, "wheels")
-        .map_err(|error| unusable(error.to_string()))?;
+    let dataset = strict::section::<DatasetOptions>(&mut sections, "dataset").map(drop);
+    let gyro = strict::section::<GyroConfig>(&mut sections, "gyro").map(drop);
+    let wheels = strict::section::<WheelsConfig>(&mut sections, "wheels").map(drop);
+    dataset
+        .and(gyro)
+        .and(wheels)
+        .map_err(|error| unusable(&error.to_string()))?;
     let sections = table
         .iter()
         .filter_map(|(name, section)| Some((name, section.as_table()?)));

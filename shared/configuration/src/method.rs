@@ -30,25 +30,41 @@ pub struct MethodConfig {
     pub objects: ObjectsConfig,
 }
 
+/// Defines the names of the sections, how they are taken out of a table, and how their values are
+/// checked.
+macro_rules! sections {
+    (checked: $($checked:ident)*; unchecked: $($unchecked:ident)*; others: $($other:ident)*) => {
+        /// The names of the sections.
+        pub const SECTIONS: &[&str] = &[
+            $(stringify!($checked),)* $(stringify!($unchecked),)* $(stringify!($other),)*
+        ];
+
+        /// Takes the sections out of a configuration; those that are missing have their defaults.
+        pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
+            Ok(Self {
+                odometry: OdometryConfig {
+                    $($checked: section(table, stringify!($checked))?,)*
+                    $($unchecked: section(table, stringify!($unchecked))?,)*
+                },
+                $($other: section(table, stringify!($other))?,)*
+            })
+        }
+
+        /// Checks the ranges of all values.
+        pub fn validate(&self) -> Result<(), ConfigurationError> {
+            $(within(stringify!($checked), self.odometry.$checked.validate())?;)*
+            within("gnss", self.gnss.validate())?;
+            within("objects", self.objects.validate())
+        }
+    };
+}
+
 impl MethodConfig {
-    /// The names of the sections.
-    pub const SECTIONS: [&str; 15] = [
-        "dataset",
-        "raster",
-        "points",
-        "masking",
-        "search",
-        "rotation",
-        "translation",
-        "exhaustive",
-        "refinement",
-        "gyro",
-        "wheels",
-        "doppler",
-        "slam",
-        "gnss",
-        "objects",
-    ];
+    sections! {
+        checked: raster points masking rotation translation exhaustive refinement gyro wheels doppler;
+        unchecked: search;
+        others: dataset slam gnss objects
+    }
 
     /// The names of the other sections of a configuration, which are for a run of processes.
     pub const SECTIONS_OF_A_RUN: [&str; 7] = [
@@ -60,44 +76,4 @@ impl MethodConfig {
         "link",
         "stages",
     ];
-
-    /// Takes the sections out of a configuration; those that are missing have their defaults.
-    pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
-        Ok(Self {
-            dataset: section(table, "dataset")?,
-            odometry: OdometryConfig {
-                raster: section(table, "raster")?,
-                points: section(table, "points")?,
-                masking: section(table, "masking")?,
-                search: section(table, "search")?,
-                rotation: section(table, "rotation")?,
-                translation: section(table, "translation")?,
-                exhaustive: section(table, "exhaustive")?,
-                refinement: section(table, "refinement")?,
-                gyro: section(table, "gyro")?,
-                wheels: section(table, "wheels")?,
-                doppler: section(table, "doppler")?,
-            },
-            slam: section(table, "slam")?,
-            gnss: section(table, "gnss")?,
-            objects: section(table, "objects")?,
-        })
-    }
-
-    /// Checks the ranges of all values.
-    pub fn validate(&self) -> Result<(), ConfigurationError> {
-        let odometry = &self.odometry;
-        within("raster", odometry.raster.validate())?;
-        within("points", odometry.points.validate())?;
-        within("masking", odometry.masking.validate())?;
-        within("rotation", odometry.rotation.validate())?;
-        within("translation", odometry.translation.validate())?;
-        within("exhaustive", odometry.exhaustive.validate())?;
-        within("refinement", odometry.refinement.validate())?;
-        within("gyro", odometry.gyro.validate())?;
-        within("wheels", odometry.wheels.validate())?;
-        within("doppler", odometry.doppler.validate())?;
-        within("gnss", self.gnss.validate())?;
-        within("objects", self.objects.validate())
-    }
 }

@@ -9,7 +9,6 @@ use toml::{Table, Value};
 
 use crate::{ConfigurationError, strict};
 
-/// The keys that name files or folders.
 const KEYS: [&str; 13] = [
     "run.ground_truth",
     "source.data",
@@ -25,22 +24,17 @@ const KEYS: [&str; 13] = [
     "link.certificate",
     "link.key",
 ];
-/// The key of the only file that is written.
 const RECORDING: &str = "record.file";
 
 /// A configuration as its file has it, but with each path absolute, or a file of the program.
 #[derive(Clone, Debug)]
 pub struct Named {
     pub table: Table,
-    notes: Vec<Note>,
+    notes: Notes,
 }
 
-/// A sentence about a path, for as long as no other takes its place.
-#[derive(Clone, Debug)]
-struct Note {
-    key: String,
-    sentence: String,
-}
+/// Keys, and sentences about their paths, for as long as no others take their places.
+type Notes = Vec<(String, String)>;
 
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
@@ -54,7 +48,8 @@ impl Named {
         let own = shipped(named);
         let mut table = match own.as_deref().and_then(gyre_shipped::text) {
             Some(text) => strict::parse(named, text)?,
-            None => strict::read_table(named).map_err(|error| unknown(named, error))?,
+            None if is_name(named) && !named.exists() => return Err(unknown(named)),
+            None => strict::read_table(named)?,
         };
         let file = match &own {
             Some(_) => named.to_owned(),
@@ -73,9 +68,9 @@ impl Named {
 
     /// Returns sentences about the paths which `changed`, with overrides, still has.
     pub fn notes(&self, changed: &Table) -> Vec<String> {
-        let is_same = |note: &&Note| value(&self.table, &note.key) == value(changed, &note.key);
-        let notes = self.notes.iter().filter(is_same);
-        notes.map(|note| note.sentence.clone()).collect()
+        let notes = self.notes.iter();
+        let notes = notes.filter(|(key, _)| value(&self.table, key) == value(changed, key));
+        notes.map(|(_, sentence)| sentence.clone()).collect()
     }
 }
 
@@ -100,8 +95,7 @@ pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
 }
 
 fn put(path: &mut String, found: PathBuf) -> Result<(), ConfigurationError> {
-    let text = found.to_str().map(str::to_owned);
-    *path = text.ok_or(ConfigurationError::Name(found))?;
+    *path = strict::text_of(&found)?.to_owned();
     Ok(())
 }
 
@@ -162,25 +156,23 @@ pub fn suggestion(named: &Path) -> String {
     strict::suggestion(&named.display().to_string(), &known)
 }
 
-/// Returns the error for a name that is neither a file nor known.
-fn unknown(named: &Path, error: ConfigurationError) -> ConfigurationError {
-    let is_name = named.extension().is_none() && named.file_name() == Some(named.as_os_str());
-    match is_name && !named.exists() {
-        true => {
-            let suggestion = suggestion(named);
-            let name = named.display().to_string();
-            ConfigurationError::Unknown { name, suggestion }
-        }
-        false => error,
-    }
+/// Returns the error for a name that neither a file nor a configuration of the program has.
+pub fn unknown(named: &Path) -> ConfigurationError {
+    let (name, suggestion) = (named.display(), suggestion(named));
+    ConfigurationError(format!(
+        "`{name}` is neither a file nor a configuration of the program, which `gyre config` lists{suggestion}"
+    ))
 }
 
-/// The places where the files of a configuration are looked for.
+fn is_name(named: &Path) -> bool {
+    named.extension().is_none() && named.file_name() == Some(named.as_os_str())
+}
+
 struct Places<'a> {
     file: &'a Path,
     folder: Option<&'a Path>,
     here: Option<PathBuf>,
-    notes: Vec<Note>,
+    notes: Notes,
 }
 
 impl Places<'_> {
@@ -222,13 +214,11 @@ impl Places<'_> {
             put(path, found)?;
         }
         let key = key.to_owned();
-        self.notes
-            .extend(sentence.map(|sentence| Note { key, sentence }));
+        self.notes.extend(sentence.map(|sentence| (key, sentence)));
         Ok(())
     }
 }
 
-/// Returns whether a file differs from the program's file.
 fn differs(own: &Path, file: &Path) -> bool {
     let own = gyre_shipped::bytes(own);
     own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))
@@ -236,18 +226,14 @@ fn differs(own: &Path, file: &Path) -> bool {
 
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let (first, rest) = key.split_once('.')?;
-    let parts = rest.split('.');
-    parts
-        .into_iter()
-        .try_fold(table.get(first)?, |value, part| value.get(part))
+    let mut parts = rest.split('.');
+    parts.try_fold(table.get(first)?, |value, part| value.get(part))
 }
 
 fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
     let (first, rest) = key.split_once('.')?;
-    let parts = rest.split('.');
-    parts
-        .into_iter()
-        .try_fold(table.get_mut(first)?, |value, part| value.get_mut(part))
+    let mut parts = rest.split('.');
+    parts.try_fold(table.get_mut(first)?, |value, part| value.get_mut(part))
 }
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
 //! The scans that a configuration names: a recording, or a simulation that is rendered while it is
 //! read.
 
-use std::{ops::Range, path::Path};
+use std::path::Path;
 
 use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
     check_first_scan,
 };
-use gyre_radar::NoDoppler;
 use gyre_run::PlayedFrom;
 use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_simulator::{SimulatedDrive, SimulatorError};
@@ -18,55 +17,36 @@ use crate::configuration::Configuration;
 /// Why the scans of a configuration cannot be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
-    #[error(
-        "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
-    )]
-    NoData,
-    #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
-    Radar { radar: String },
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
     #[error(transparent)]
     Open(#[from] OpenError),
-    #[error("source.first is {0}, but {1} has {n} scans, from {start} to {last}: give a smaller one", n = .2.len(), start = .2.start, last = .2.end - 1)]
-    BeyondEnd(usize, String, Range<usize>),
     /// The log of the gyro, of the wheels or of the GNSS receiver cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Scans that lie in no folder, as those of a simulation.
-    #[error(
-        "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
-    )]
-    NoGnss,
-    #[error(
-        "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
-    )]
-    NoGyro,
-    #[error(
-        "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\""
-    )]
-    NoWheels,
-    #[error("doppler.kind is `auto`, but {0}; with doppler.kind = \"none\" it is not used")]
-    NoDoppler(NoDoppler),
+    #[error("{0}")]
+    Configuration(String),
 }
 
-/// An open recording or simulation.
+fn refused<T>(reason: &str) -> Result<T, SourceError> {
+    Err(SourceError::Configuration(reason.to_owned()))
+}
+
 pub struct Played {
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
-    /// The samples of a gyro and of wheels.
     pub samples: ScanSamples,
 }
 
-/// Opens the recording or the simulation that is to be played.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;
     if configuration.is_radar() {
-        return Err(SourceError::Radar {
-            radar: configuration.data(),
-        });
+        let radar = configuration.data();
+        return refused(&format!(
+            "the configuration is of {radar}, but this needs a recording: name one"
+        ));
     }
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
@@ -80,7 +60,9 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
         });
     }
     if data.as_os_str().is_empty() {
-        return Err(SourceError::NoData);
+        return refused(
+            "no dataset is named: name its folder, or source.data in the configuration, or add a section [simulation]",
+        );
     }
     let mut dataset = gyre_recording::open(data, options)?;
     check_first(configuration, dataset.as_ref())?;
@@ -96,16 +78,24 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
 fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), SourceError> {
     let (first, scans) = (configuration.source.first, dataset.scans());
     match first >= scans.end && !scans.is_empty() {
-        true => Err(SourceError::BeyondEnd(first, configuration.data(), scans)),
+        true => refused(&format!(
+            "source.first is {first}, but {} has {} scans, from {} to {}: give a smaller one",
+            configuration.data(),
+            scans.len(),
+            scans.start,
+            scans.end - 1
+        )),
         false => Ok(()),
     }
 }
 
 /// Checks that the radar reports its velocity by Doppler, if Doppler is used.
 fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
-    match doppler.is_used() {
-        true => check_first_scan(dataset).map_err(SourceError::NoDoppler),
-        false => Ok(()),
+    match doppler.is_used().then(|| check_first_scan(dataset)) {
+        Some(Err(reason)) => refused(&format!(
+            "doppler.kind is `auto`, but {reason}; with doppler.kind = \"none\" it is not used"
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -119,14 +109,22 @@ pub fn simulated_samples(
     let path = Path::new("simulation");
     let turns = match gyro.kind {
         GyroKind::Auto => {
-            let samples = drive.gyro_samples().ok_or(SourceError::NoGyro)?;
+            let Some(samples) = drive.gyro_samples() else {
+                return refused(
+                    "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\"",
+                );
+            };
             ScanSamples::of_gyro(&GyroLog::of(samples, path)?, gyro, dataset)?
         }
         _ => ScanSamples::open(gyro, &WheelsConfig::default(), Path::new(""), dataset)?,
     };
     let speeds = match wheels.kind {
         WheelsKind::Auto => {
-            let samples = drive.wheel_samples().ok_or(SourceError::NoWheels)?;
+            let Some(samples) = drive.wheel_samples() else {
+                return refused(
+                    "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\"",
+                );
+            };
             ScanSamples::of_wheels(&WheelLog::of(samples, path)?, wheels, dataset)?
         }
         _ => ScanSamples::open(&GyroConfig::default(), wheels, Path::new(""), dataset)?,
@@ -140,7 +138,9 @@ pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<Gnss
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
     match config.kind == GnssKind::Auto && !is_in_folder {
-        true => Err(SourceError::NoGnss),
+        true => refused(
+            "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\"",
+        ),
         false => Ok(gyre_recording::gnss_log(config, data, out)?),
     }
 }

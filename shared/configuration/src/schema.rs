@@ -14,7 +14,6 @@ pub fn reference() -> String {
     markdown::reference(&generate())
 }
 
-/// Returns the schema as JSON.
 pub fn json() -> String {
     format!("{:#}", generate().as_value())
 }

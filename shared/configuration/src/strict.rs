@@ -14,23 +14,22 @@ const ALIKE: f64 = 0.75;
 /// Reads a file.
 /// An error names the place of the mistake and quotes nothing of the file, which may hold anything.
 pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
-    let unreadable = |source| ConfigurationError::Unreadable {
-        path: path.to_owned(),
-        source,
-    };
     if path.is_dir() {
         return Err(folder(path));
     }
-    let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
+    let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(|error| {
+        let path = path.display();
+        ConfigurationError(format!("cannot read the configuration {path}: {error}"))
+    })?;
     parse(path, &text)
 }
 
 /// Parses a text; `path` is its name in errors.
 pub fn parse(path: &Path, text: &str) -> Result<Table, ConfigurationError> {
     let parsed: Result<Table, _> = text.parse();
-    parsed.map_err(|error| ConfigurationError::Syntax {
-        path: path.to_owned(),
-        reason: syntax(text, &error),
+    parsed.map_err(|error| {
+        let reason = syntax(text, &error);
+        ConfigurationError(format!("{}: {reason}", path.display()))
     })
 }
 
@@ -40,19 +39,14 @@ fn folder(path: &Path) -> ConfigurationError {
     let own = path.join("config.toml");
     let remedy = match own.is_file() {
         true => format!("name the configuration in it, {}", own.display()),
-        false => format!(
-            "name a TOML file; a recording is named by --data {}",
-            path.display()
-        ),
+        false => "name a TOML file".to_owned(),
     };
-    ConfigurationError::Folder {
-        path: path.to_owned(),
-        remedy,
-    }
+    let path = path.display();
+    ConfigurationError(format!("the configuration {path} is a folder: {remedy}"))
 }
 
 /// Names the place of a mistake in a text, without the line itself.
-pub fn syntax(text: &str, error: &toml::de::Error) -> String {
+fn syntax(text: &str, error: &toml::de::Error) -> String {
     let start = error.span().map_or(0, |span| span.start);
     let before = text.get(..start).unwrap_or_default();
     let (line, column) = match before.rsplit_once('\n') {
@@ -63,19 +57,20 @@ pub fn syntax(text: &str, error: &toml::de::Error) -> String {
     format!("TOML parse error at line {line}, column {column}: {reason}")
 }
 
-/// Returns a path as the value of a key.
 pub fn path_value(path: &Path) -> Result<Value, ConfigurationError> {
-    let text = path.to_str();
-    let text = text.ok_or_else(|| ConfigurationError::Name(path.to_owned()))?;
-    Ok(text.into())
+    text_of(path).map(Value::from)
 }
 
-/// Returns the error of a value that a section cannot have.
+pub(crate) fn text_of(path: &Path) -> Result<&str, ConfigurationError> {
+    path.to_str().ok_or_else(|| {
+        ConfigurationError(format!(
+            "{path:?} has a name that is not UTF-8, which a configuration cannot hold: rename it, or name a link to it"
+        ))
+    })
+}
+
 pub fn value(section: &str, reason: impl Display) -> ConfigurationError {
-    ConfigurationError::Value {
-        section: section.to_owned(),
-        reason: reason.to_string(),
-    }
+    ConfigurationError(format!("[{section}]: {reason}"))
 }
 
 /// Names the section of a value that is out of its bounds.
@@ -95,7 +90,6 @@ pub fn section<T: DeserializeOwned>(
     read(name, value)
 }
 
-/// Takes a section of sections out of the table, each with one of the names in `known`.
 pub fn sections<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -112,14 +106,11 @@ pub fn sections<T: DeserializeOwned>(
 }
 
 pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
-    ConfigurationError::UnknownKey {
-        section: section.to_owned(),
-        key: key.to_owned(),
-        suggestion: match suggestion(key, known) {
-            nearest if nearest.is_empty() => format!("; it knows {}", known.join(", ")),
-            nearest => nearest,
-        },
-    }
+    let suggestion = match suggestion(key, known) {
+        nearest if nearest.is_empty() => format!("; it knows {}", known.join(", ")),
+        nearest => nearest,
+    };
+    ConfigurationError(format!("[{section}] has no key `{key}`{suggestion}"))
 }
 
 /// Returns a question for the nearest known name; empty without a similar name.
@@ -132,7 +123,11 @@ pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
 
 /// Sets a key by an override `section.key=value`; the value is TOML, or else a plain string.
 pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> {
-    let refused = || ConfigurationError::Override(sentence.to_owned());
+    let refused = || {
+        ConfigurationError(format!(
+            "--set {sentence}: expected section.key=value, as in masking.kind=none"
+        ))
+    };
     let (path, value) = sentence.split_once('=').ok_or_else(refused)?;
     let value = value_of(value.trim());
     let mut keys: Vec<&str> = path.trim().split('.').collect();

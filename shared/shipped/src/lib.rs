@@ -9,9 +9,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-/// The start of the path of a file in the program.
 const PREFIX: &str = "gyre:";
-/// The folder of the configurations.
 const CONFIGURATIONS: &str = "configs";
 /// The folder of other files, relative to the program's folder.
 const SHARE: &str = "../share/gyre";
@@ -49,7 +47,6 @@ const FILES: &[(&str, &[u8])] = files![
     "models/objects.onnx"
 ];
 
-/// Returns whether a path begins with `gyre:`.
 pub fn is_own(path: &Path) -> bool {
     path.to_str().is_some_and(|path| path.starts_with(PREFIX))
 }
@@ -91,7 +88,6 @@ fn installed(relative: &Path) -> Option<PathBuf> {
     Some(share.join(relative)).filter(|path| path.is_file())
 }
 
-/// Returns the path of a configuration by its name, `oxford` or `oxford.toml`.
 pub fn configuration(name: &Path) -> Option<PathBuf> {
     let name = name.to_str().filter(|name| !name.contains('/'))?;
     let name = name.strip_suffix(".toml").unwrap_or(name);

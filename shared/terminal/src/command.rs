@@ -1,13 +1,30 @@
 //! Programs and times as they are given on a command line.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    ffi::OsString,
+    io,
+    os::unix::process::CommandExt,
+    path::PathBuf,
+    process::{self, Command},
+    time::Duration,
+};
 
 use crate::failure::Failure;
 
-/// Returns a path that leads to the program that this process executes, for this process and its
-/// children.
+/// Returns a path of the program that this process executes, for its children too.
 pub fn own() -> PathBuf {
-    PathBuf::from(format!("/proc/{}/exe", std::process::id()))
+    PathBuf::from(format!("/proc/{}/exe", process::id()))
+}
+
+/// Executes this program again, with its name and these arguments and a variable in its
+/// environment. Returns why that has failed.
+pub fn execute_again(
+    arguments: impl Iterator<Item = OsString>,
+    variable: &str,
+    value: &str,
+) -> io::Error {
+    let mut command = Command::new(own());
+    command.args(arguments.skip(1)).env(variable, value).exec()
 }
 
 /// Returns the program and the arguments of a `--command`, as a shell would part them.
@@ -18,7 +35,6 @@ pub fn words(command: &str) -> Result<Vec<String>, Failure> {
     }
 }
 
-/// Returns the time that an option gives in seconds.
 pub fn seconds(option: &str, seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds)
         .map_err(|_| format!("{option} is {seconds}, but must be 0 or more").into())

@@ -11,5 +11,5 @@ mod given;
 mod kind;
 
 pub use config::{ConfigArguments, config};
-pub use given::{Given, InputError, Inputs, configuration};
+pub use given::{Given, Inputs, configuration};
 pub use kind::Kind;

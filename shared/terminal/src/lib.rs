@@ -7,7 +7,7 @@ pub mod print;
 mod program;
 mod wrap;
 
-pub use command::{own, seconds, words};
+pub use command::{execute_again, own, seconds, words};
 pub use failure::Failure;
 pub use program::{INTERRUPTED, parse, parse_as, report};
 pub use wrap::{WIDTH, wrap};

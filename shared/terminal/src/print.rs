@@ -43,8 +43,7 @@ pub fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// Replaces characters that a terminal would execute as commands: names and words of files are
-/// quoted unchanged.
+/// Names and words of files are quoted unchanged but for what a terminal would execute.
 fn printable(text: &str) -> String {
     let plain = |c: char| {
         if c.is_control() && c != '\n' {

@@ -6,7 +6,6 @@ use clap::Parser;
 
 use crate::{WIDTH, failure::Failure, print};
 
-/// The exit code after wrong arguments.
 const WRONG_ARGUMENTS: u8 = 2;
 
 /// The exit code of an interrupted program, as shells have it.
@@ -18,7 +17,6 @@ pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
     parse_as(P::command(), program)
 }
 
-/// As [`parse`], by this command, whose arguments are `P`'s.
 pub fn parse_as<P: Parser>(command: clap::Command, program: &str) -> Result<P, ExitCode> {
     let matches = command.max_term_width(WIDTH).try_get_matches();
     let parsed = matches.and_then(|matches| P::from_arg_matches(&matches));
@@ -28,7 +26,6 @@ pub fn parse_as<P: Parser>(command: clap::Command, program: &str) -> Result<P, E
     })
 }
 
-/// The exit code of a command; a failure is printed as `program: sentence`.
 pub fn report(program: &str, result: Result<ExitCode, Failure>) -> ExitCode {
     result.unwrap_or_else(|error| {
         print::note(format_args!("{program}: {error}"));

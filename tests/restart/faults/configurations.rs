@@ -41,12 +41,9 @@ pub struct Configuration {
     can: fn() -> bool,
     recording: fn() -> PathBuf,
     run: fn(&Path) -> Run,
-    /// Poses of a run.
     pub poses: usize,
     /// The poses between which faults strike.
     pub moments: Option<(usize, usize)>,
-    /// The interval of the scans, s.
-    pub period_s: f64,
     rate: &'static str,
     /// The processes of a run beside its stages.
     followers: &'static [&'static str],
@@ -60,7 +57,6 @@ pub struct Configuration {
     shows: &'static [(&'static str, f64)],
     /// A run whose motions are the same: followers change no byte of odometry.
     same_as: Option<fn() -> Run>,
-    /// A run whose motions are different.
     differs_from: Option<fn() -> Run>,
 }
 
@@ -73,7 +69,6 @@ pub struct Undisturbed {
     pub processes: BTreeSet<String>,
 }
 
-/// The results that must be the same, by name.
 #[derive(PartialEq, Eq)]
 pub struct Results(BTreeMap<&'static str, Vec<u8>>);
 
@@ -103,7 +98,6 @@ impl Configuration {
         (self.run)(recording).rate(rate)
     }
 
-    /// The rate of its runs.
     pub fn rate(&self) -> &str {
         self.rate
     }
@@ -119,7 +113,6 @@ impl Configuration {
         recording::linked(&(self.recording)(), keep)
     }
 
-    /// The results of a run that is complete.
     pub fn results(&self, run: &Run) -> Results {
         let names = ["odometry.csv", "trajectory.tum"].iter();
         let files = names.chain(self.results);
@@ -180,7 +173,6 @@ const SMALL: Configuration = Configuration {
     run: |recording| Run::small().data(recording),
     poses: recording::SCANS,
     moments: None,
-    period_s: 0.25,
     rate: "6",
     followers: &[],
     stateful: "rotation-search",
@@ -191,7 +183,6 @@ const SMALL: Configuration = Configuration {
     differs_from: None,
 };
 
-/// The small recording.
 pub fn plain() -> Configuration {
     SMALL
 }
@@ -226,7 +217,6 @@ fn around_a_block() -> Run {
     Run::small().data(recording::around_a_block())
 }
 
-/// Once around a block, with loops.
 pub fn loops() -> Configuration {
     Configuration {
         name: "loops",
@@ -287,7 +277,6 @@ pub fn gap() -> Configuration {
 /// The image that cannot be read.
 const UNREADABLE: usize = 6;
 
-/// A scan that cannot be read.
 pub fn unreadable() -> Configuration {
     Configuration {
         name: "unreadable",
@@ -374,7 +363,6 @@ fn with_logs() -> PathBuf {
     recording::of("gyro-and-wheels", &config)
 }
 
-/// The run of the same recording with its gyro, without its wheels.
 pub fn with_gyro() -> Run {
     let run = Run::small().data(&with_logs()).set("gyro.kind=auto");
     run.set(&format!("gyro.delay_s={LATE_S}"))
@@ -429,24 +417,15 @@ pub fn doppler() -> Configuration {
     }
 }
 
-/// A network that masks each scan for itself.
-pub fn network_of_one_scan() -> Configuration {
-    Configuration {
-        name: "network_of_one_scan",
-        can: runtime_is_installed,
-        run: |recording| Run::small().data(recording).masked_by(&card("single-127")),
-        stateful: "masking",
-        differs_from: Some(Run::of_recording),
-        ..SMALL
-    }
-}
-
 /// A network that takes the scan before, too.
 pub fn network_of_two_scans() -> Configuration {
     Configuration {
         name: "network_of_two_scans",
+        can: runtime_is_installed,
         run: |recording| Run::small().data(recording).masked_by(&card("pair-127")),
-        ..network_of_one_scan()
+        stateful: "masking",
+        differs_from: Some(Run::of_recording),
+        ..SMALL
     }
 }
 
@@ -455,11 +434,8 @@ pub fn network_in_rten() -> Configuration {
     Configuration {
         name: "network_in_rten",
         can: || true,
-        run: |recording| {
-            let run = Run::small().data(recording).masked_by(&card("pair-127"));
-            run.set("masking.backend=rten")
-        },
-        ..network_of_one_scan()
+        run: |recording| (network_of_two_scans().run)(recording).set("masking.backend=rten"),
+        ..network_of_two_scans()
     }
 }
 
@@ -474,25 +450,11 @@ pub fn network_at_an_unreadable_scan() -> Configuration {
     }
 }
 
-/// Such a network, and a gap of a year.
-pub fn network_at_a_gap() -> Configuration {
-    Configuration {
-        name: "network_at_a_gap",
-        run: network_of_two_scans().run,
-        can: runtime_is_installed,
-        ..gap()
-    }
-}
-
 /// A simulation that is rendered while it is played.
 pub fn simulation() -> Configuration {
     Configuration {
         name: "simulation",
-        run: |_| {
-            let run =
-                Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n");
-            run.set("simulation.sensor.profile=cts350x-radiate")
-        },
+        run: |_| Run::simulated(24).set("simulation.sensor.profile=cts350x-radiate"),
         ..SMALL
     }
 }
@@ -518,7 +480,6 @@ pub fn replayed() -> Configuration {
     }
 }
 
-/// The masking stage in Python.
 pub fn python() -> Configuration {
     Configuration {
         name: "python",

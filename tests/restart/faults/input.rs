@@ -6,6 +6,9 @@ use rand::Rng;
 
 use super::scene::Scene;
 
+/// The interval of the scans, s.
+const PERIOD_S: f64 = 0.25;
+
 /// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A
 /// stage is killed besides.
 pub fn gaps(scene: &mut Scene) -> Option<()> {
@@ -22,7 +25,7 @@ pub fn gaps(scene: &mut Scene) -> Option<()> {
     alone.complete();
 
     let gap_s = 2.0;
-    let rate = (gap as f64 * scene.configuration.period_s / gap_s).min(1000.0);
+    let rate = (gap as f64 * PERIOD_S / gap_s).min(1000.0);
     let run = scene
         .configuration
         .run_of(recording.path(), &format!("{rate:.3}"));

@@ -1,6 +1,10 @@
 //! `kill -9` of any process at any point of its life, and polite ends.
 
-use std::time::Duration;
+use std::{
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use gyre_journal::{self as journal, checkpoint};
 use gyre_messages::FollowerId;
@@ -11,14 +15,11 @@ use rand::{
 };
 use rustix::process::Signal;
 
-use super::{scene::Scene, watch::Watch};
+use super::scene::Scene;
 use crate::common::{Running, send};
 
-/// No process waits longer between two writes.
-const NO_MORE_WRITES: Duration = Duration::from_secs(2);
 /// Storms in a run: a process is restarted five times at most.
 const STORMS: usize = 4;
-/// Deaths of one process in a run.
 const LIVES: usize = 8;
 
 /// All processes in random order, each at a moment of its own.
@@ -32,23 +33,6 @@ pub fn each(scene: &mut Scene) -> Option<()> {
         scene.pause(20);
         scene.kill(&mut running, name)?;
     }
-    scene.finished(&run, &running.finish());
-    scene.restarted(&run, &names)
-}
-
-/// Two to all processes at once.
-pub fn together(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
-    let mut names = scene.processes();
-    scene.await_processes(&mut running)?;
-    scene.moment(&mut running)?;
-    while names.len() > 2 && !scene.one_in(4) {
-        names.swap_remove(scene.rng.random_range(0..names.len()));
-    }
-    let living = running.stages();
-    let killed = names.iter().filter_map(|name| living.get(name));
-    killed.for_each(|pid| send(*pid, Signal::KILL));
     scene.finished(&run, &running.finish());
     scene.restarted(&run, &names)
 }
@@ -70,6 +54,23 @@ pub fn at_the_start(scene: &mut Scene) -> Option<()> {
     Some(())
 }
 
+/// Waits until a file has been written, or a file in a folder been made, so often that it shows.
+/// `None` without so many writes within `limit`.
+fn await_writes(path: &Path, writes: u64, limit: Duration) -> Option<()> {
+    let state = || {
+        let file = fs::metadata(path).ok()?;
+        Some((file.len(), file.modified().ok()?))
+    };
+    let (since, mut seen) = (Instant::now(), state()?);
+    for _ in 0..writes {
+        while state()? == seen {
+            (since.elapsed() < limit).then_some(())?;
+        }
+        seen = state()?;
+    }
+    Some(())
+}
+
 /// A process at a write of a file that its successor continues from: refinement writes two such
 /// files for each of its keyframes.
 pub fn at_a_write(scene: &mut Scene) -> Option<()> {
@@ -87,7 +88,8 @@ pub fn at_a_write(scene: &mut Scene) -> Option<()> {
     running.await_poses_or_end(scene.rng.random_range(scene.configuration.moments()));
     let pid = *running.stages().get(*stage)?;
     let writes = scene.rng.random_range(1..=4);
-    Watch::of(file)?.wait(writes, NO_MORE_WRITES, |_| true)?;
+    // No process waits longer between its writes.
+    await_writes(file, writes, Duration::from_secs(2 * writes))?;
     send(pid, Signal::KILL);
     scene.finished(&run, &running.finish());
     Some(())
@@ -118,17 +120,6 @@ pub fn after_the_last_pose(scene: &mut Scene) -> Option<()> {
     send(pid, Signal::KILL);
     scene.finished(&run, &running.finish());
     Some(())
-}
-
-/// A process that somebody else asks to end.
-pub fn politely(scene: &mut Scene) -> Option<()> {
-    let name = scene.processes().choose(&mut scene.rng)?.clone();
-    let run = scene.run();
-    let mut running = run.start();
-    running.await_poses_or_end(scene.moments(1)[0]);
-    send(*running.stages().get(&name)?, Signal::TERM);
-    scene.finished(&run, &running.finish());
-    scene.restarted(&run, &[name])
 }
 
 /// Most of all processes together, again and again, and now and then the supervisor with them: the
@@ -172,9 +163,8 @@ pub fn at_the_results(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(1);
-    let watch = Watch::of(run.out())?;
     let writes = scene.rng.random_range(1..=20);
-    watch.wait(writes, Duration::from_secs(60), |file| file != "log.jsonl")?;
+    await_writes(run.out(), writes, Duration::from_secs(60))?;
     running.kill_supervisor();
     scene.resumed(&run);
     Some(())

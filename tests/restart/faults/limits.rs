@@ -1,49 +1,21 @@
-//! Limits of memory and descriptors.
+//! Limits of memory, descriptors and the sizes of files: little for the whole run, or no more for a
+//! process in the middle.
 
-use std::fs;
+use std::{fs, process::Command};
 
 use rand::Rng;
 
 use super::{scene::Scene, tools::limit};
-use crate::common::{Ended, Pid, Run, assert_nothing_left, wrapped};
+use crate::common::{Pid, Run, assert_nothing_left, wrapped};
 
-/// Address space: little for the whole run, or nothing more for a process in the middle.
+/// Address space.
 pub fn memory(scene: &mut Scene) -> Option<()> {
+    // A process without memory or descriptors may hang.
     let run = scene.run().set("run.stall_timeout_s=3");
-    if scene.one_in(3) {
-        let bytes = 10_f64.powf(scene.rng.random_range(7.0..10.0)) as u64;
-        let limit = format!("--as={bytes}:");
-        let ended = run
-            .start_as(wrapped(&["prlimit", &limit], &run.command()))
-            .end();
-        out_of_memory(scene, &run, &ended);
-        return Some(());
-    }
-    let mut running = run.start();
-    scene.moment(&mut running)?;
-    let pid = match scene.one_in(3) {
-        true => running.pid(),
-        false => scene.stage(&running)?,
-    };
-    limit(
-        pid,
-        "as",
-        address_space(pid)? + scene.rng.random_range(0..1 << 20),
-    );
-    scene.kill_stage(&running);
-    let ended = running.end();
-    out_of_memory(scene, &run, &ended);
-    Some(())
-}
-
-/// A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack cannot
-/// grow (SIGSEGV). For the supervisor that is as good as a kill.
-fn out_of_memory(scene: &Scene, run: &Run, ended: &Ended) {
-    if ended.code().is_none() {
-        return scene.resumed(run);
-    }
-    assert_nothing_left(run.out());
-    scene.survived(run, ended);
+    let bytes = 10_f64.powf(scene.rng.random_range(7.0..10.0)) as u64;
+    let more = scene.rng.random_range(0..1 << 20);
+    let more = |pid: Pid| Some(address_space(pid)? + more);
+    limited(scene, &run, run.command(), ("as", bytes), more)
 }
 
 fn address_space(pid: Pid) -> Option<u64> {
@@ -55,28 +27,58 @@ fn address_space(pid: Pid) -> Option<u64> {
     Some(kilobytes << 10)
 }
 
-/// Descriptors: few for the whole run, or no more for a process in the middle.
 pub fn descriptors(scene: &mut Scene) -> Option<()> {
-    // A process without descriptors may hang.
     let run = scene.run().set("run.stall_timeout_s=3");
-    if scene.one_in(3) {
-        let limit = format!("--nofile={}:", scene.rng.random_range(4..160));
-        let ended = run
-            .start_as(wrapped(&["prlimit", &limit], &run.command()))
-            .finish();
-        scene.survived(&run, &ended);
-        return Some(());
-    }
-    let mut running = run.start();
-    scene.moment(&mut running)?;
-    let pid = match scene.one_in(2) {
-        true => running.pid(),
-        false => scene.stage(&running)?,
+    let (few, more) = (scene.rng.random_range(4..160), scene.rng.random_range(0..3));
+    let more = |pid: Pid| Some(fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as u64 + more);
+    limited(scene, &run, run.command(), ("nofile", few), more)
+}
+
+/// No file may become longer. A signal reports the limit, unless the signal is ignored.
+pub fn file_sizes(scene: &mut Scene) -> Option<()> {
+    let run = scene.run();
+    let ignored = if scene.one_in(2) {
+        "trap '' XFSZ; "
+    } else {
+        ""
     };
-    let open = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as u64;
-    limit(pid, "nofile", open + scene.rng.random_range(0..3));
-    scene.kill_stage(&running);
-    let ended = running.finish();
-    scene.survived(&run, &ended);
+    let start = format!("{ignored}exec \"$@\"");
+    let command = wrapped(&["sh", "-c", &start, "sh"], &run.command());
+    let most = (scene.configuration.undisturbed().bytes as f64).log2();
+    let bytes = scene.rng.random_range(12.0..most).exp2() as u64;
+    limited(scene, &run, command, ("fsize", bytes), |_| Some(bytes))
+}
+
+/// Starts a run with a limit, or limits a process in the middle to `of_process`, and judges the
+/// end.
+fn limited(
+    scene: &mut Scene,
+    run: &Run,
+    command: Command,
+    (resource, of_run): (&str, u64),
+    of_process: impl Fn(Pid) -> Option<u64>,
+) -> Option<()> {
+    let ended = if scene.one_in(3) {
+        let limit = format!("--{resource}={of_run}:");
+        run.start_as(wrapped(&["prlimit", &limit], &command)).end()
+    } else {
+        let mut running = run.start_as(command);
+        scene.moment(&mut running)?;
+        let pid = match scene.one_in(3) {
+            true => running.pid(),
+            false => scene.stage(&running)?,
+        };
+        limit(pid, resource, of_process(pid)?);
+        scene.kill_stage(&running);
+        running.end()
+    };
+    // A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack
+    // cannot grow (SIGSEGV). For the supervisor that is as good as a kill.
+    if ended.code().is_none() {
+        scene.resumed(run);
+    } else {
+        assert_nothing_left(run.out());
+        scene.survived(run, &ended);
+    }
     Some(())
 }

@@ -11,69 +11,56 @@
 //! ```
 
 pub mod configurations;
-mod environment;
 mod input;
 mod kills;
 mod limits;
 mod results;
 mod scene;
 mod tools;
-mod watch;
 
 use std::env;
 
 use configurations::Configuration;
 use scene::Scene;
-use tools::Need;
 
 /// Attempts at a fault that comes too late, because the run is over.
 const ATTEMPTS: usize = 20;
 
-/// A kind of faults.
-#[derive(Clone, Copy)]
-struct Fault {
-    /// Runs a configuration, disturbs the run, and judges its results; `None` if the run ended
-    /// before the fault.
-    strike: fn(&mut Scene) -> Option<()>,
-    /// The requirements on the machine.
-    needs: &'static [Need],
-}
+/// A kind of faults: it runs a configuration, disturbs the run, and judges its results; `None` if
+/// the run ended before the fault.
+type Fault = fn(&mut Scene) -> Option<()>;
 
 /// Faults by name, as the rows have them.
 mod kinds {
     #![allow(non_upper_case_globals)]
 
-    use super::{Fault, Need, environment, input, kills, limits, results};
+    use super::{Fault, input, kills, limits, results};
 
     macro_rules! kinds {
-        ($($name:ident: $strike:path $(, $need:ident)*;)*) => {
-            $(pub const $name: Fault = Fault { strike: $strike, needs: &[$(Need::$need),*] };)*
+        ($($name:ident: $strike:path;)*) => {
+            $(pub const $name: Fault = $strike;)*
         };
     }
 
     kinds! {
         each_process_is_killed: kills::each;
-        processes_are_killed_together: kills::together;
         a_process_is_killed_as_it_starts: kills::at_the_start;
         a_process_is_killed_as_it_writes: kills::at_a_write;
         a_process_is_killed_again_and_again: kills::again_and_again;
         a_process_is_killed_after_the_last_pose: kills::after_the_last_pose;
-        a_process_is_asked_to_end: kills::politely;
         processes_are_killed_in_storms: kills::storms;
         the_supervisor_is_killed: kills::supervisor;
         the_supervisor_is_killed_as_it_writes_results: kills::at_the_results;
         the_run_is_interrupted: kills::interrupt;
         the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
-        the_disk_is_full: results::disk_full, Mounts;
-        input_and_output_fail: results::io_errors, Fiu;
-        files_may_not_grow: results::file_size_limit, Prlimit;
-        the_results_are_read_only: results::read_only, Mounts, OtherUser;
+        the_disk_is_full: results::disk_full;
+        files_may_not_grow: limits::file_sizes;
+        the_results_are_read_only: results::read_only;
         the_results_vanish: results::vanish;
         the_recording_has_gaps: input::gaps;
         the_recording_vanishes: input::vanishes;
-        the_clock_is_set: environment::clock_step, Faketime;
-        memory_runs_out: limits::memory, Prlimit;
-        descriptors_run_out: limits::descriptors, Prlimit;
+        memory_runs_out: limits::memory;
+        descriptors_run_out: limits::descriptors;
     }
 }
 
@@ -92,33 +79,31 @@ macro_rules! row {
         $($attribute)*
         fn $fault() {
             use crate::restart::faults::{configurations, kinds, strike};
-            strike(&configurations::$configuration(), &kinds::$fault);
+            strike(&configurations::$configuration(), kinds::$fault);
         }
     };
 }
 
 rows! {
     {}
-    plain: each_process_is_killed processes_are_killed_together a_process_is_killed_as_it_starts
-        a_process_is_killed_again_and_again a_process_is_asked_to_end the_supervisor_is_killed
-        the_run_is_interrupted the_run_is_interrupted_as_it_starts the_recording_has_gaps
-        the_recording_vanishes;
+    plain: each_process_is_killed processes_are_killed_in_storms a_process_is_killed_as_it_starts
+        a_process_is_killed_again_and_again the_supervisor_is_killed the_run_is_interrupted
+        the_run_is_interrupted_as_it_starts the_recording_has_gaps the_recording_vanishes;
     slam: each_process_is_killed a_process_is_killed_as_it_writes processes_are_killed_in_storms
         the_supervisor_is_killed the_supervisor_is_killed_as_it_writes_results the_disk_is_full
-        input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-        the_clock_is_set memory_runs_out descriptors_run_out;
+        files_may_not_grow the_results_are_read_only the_results_vanish
+        memory_runs_out descriptors_run_out;
     loops: each_process_is_killed;
-    gap: processes_are_killed_together;
+    gap: each_process_is_killed;
     unreadable: each_process_is_killed;
     lost_azimuths: each_process_is_killed a_process_is_killed_again_and_again;
     standstill: a_process_is_killed_again_and_again;
     joint_search: each_process_is_killed;
     gyro_and_wheels: each_process_is_killed the_supervisor_is_killed;
     doppler: the_supervisor_is_killed;
-    network_of_one_scan: each_process_is_killed;
-    network_of_two_scans: each_process_is_killed processes_are_killed_together
+    network_of_two_scans: each_process_is_killed processes_are_killed_in_storms
         a_process_is_killed_again_and_again;
-    network_at_an_unreadable_scan: processes_are_killed_together;
+    network_at_an_unreadable_scan: each_process_is_killed;
     network_in_rten: each_process_is_killed;
     simulation: each_process_is_killed the_supervisor_is_killed;
     replayed: each_process_is_killed;
@@ -130,26 +115,24 @@ mod nightly {
         {#[ignore = ".ci/nightly: more rows"]}
         plain: a_process_is_killed_after_the_last_pose;
         small_map: a_process_is_killed_again_and_again the_supervisor_is_killed;
-        gap: each_process_is_killed;
         gyro_and_wheels: processes_are_killed_in_storms;
         doppler: each_process_is_killed;
         network_of_two_scans: the_supervisor_is_killed;
-        network_at_a_gap: processes_are_killed_together;
         objects: a_process_is_killed_again_and_again the_run_is_interrupted;
         gnss: a_process_is_killed_again_and_again;
-        loops: processes_are_killed_together a_process_is_killed_as_it_starts
-            a_process_is_killed_as_it_writes a_process_is_killed_after_the_last_pose
+        loops: a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes
+            a_process_is_killed_after_the_last_pose
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
-            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes memory_runs_out
             descriptors_run_out;
-        radiate: each_process_is_killed processes_are_killed_together
-            a_process_is_killed_as_it_starts a_process_is_killed_as_it_writes
+        radiate: each_process_is_killed a_process_is_killed_as_it_starts
+            a_process_is_killed_as_it_writes
             processes_are_killed_in_storms the_supervisor_is_killed
             the_supervisor_is_killed_as_it_writes_results the_run_is_interrupted the_disk_is_full
-            input_and_output_fail files_may_not_grow the_results_are_read_only the_results_vanish
-            the_recording_has_gaps the_recording_vanishes the_clock_is_set memory_runs_out
+            files_may_not_grow the_results_are_read_only the_results_vanish
+            the_recording_has_gaps the_recording_vanishes memory_runs_out
             descriptors_run_out;
     }
 }
@@ -161,12 +144,8 @@ fn number(variable: &str) -> Option<u64> {
 }
 
 /// Strikes a run of the configuration, where the machine can do that.
-fn strike(configuration: &Configuration, fault: &Fault) {
+fn strike(configuration: &Configuration, fault: Fault) {
     if !configuration.is_possible() {
-        return;
-    }
-    if let Some(missing) = fault.needs.iter().find_map(|need| need.missing()) {
-        println!("skipped: {missing}");
         return;
     }
     let first = number("GYRE_FAULTS_SEED").unwrap_or_else(|| rand::random::<u16>().into());
@@ -174,7 +153,7 @@ fn strike(configuration: &Configuration, fault: &Fault) {
         println!("GYRE_FAULTS_SEED={seed}");
         let mut scene = Scene::new(configuration, seed);
         (0..ATTEMPTS)
-            .find_map(|_| (fault.strike)(&mut scene))
+            .find_map(|_| fault(&mut scene))
             .unwrap_or_else(|| panic!("{ATTEMPTS} runs ended before the fault"));
     }
 }

@@ -2,18 +2,18 @@
 
 use std::{
     fs::{self, Permissions},
-    os::unix::fs::PermissionsExt,
+    os::unix::fs::{PermissionsExt, chown},
     path::Path,
 };
 
-use rand::{Rng, seq::IndexedRandom};
+use rand::Rng;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
-    tools::{AS_NOBODY, Mount, give_to_nobody, limit},
+    tools::{Mount, can_mount},
 };
-use crate::common::{Run, assert_nothing_left_of, wrapped};
+use crate::common::{OtherUser, Run, assert_nothing_left_of};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
@@ -31,6 +31,9 @@ fn fill(place: &Path, leave: u64) {
 
 /// The disk is too small, or becomes full in the middle; then there is room again.
 pub fn disk_full(scene: &mut Scene) -> Option<()> {
+    if !can_mount() {
+        return Some(());
+    }
     let bytes = scene.configuration.undisturbed().bytes;
     let run = scene.run();
     let small = scene.one_in(2);
@@ -54,68 +57,12 @@ pub fn disk_full(scene: &mut Scene) -> Option<()> {
     Some(())
 }
 
-/// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers
-/// of its own.
-pub fn io_errors(scene: &mut Scene) -> Option<()> {
-    let call = *[
-        "rw/write",
-        "rw/pwrite",
-        "rw/*",
-        "sync/*",
-        "dir/rename",
-        "oc/open",
-    ]
-    .choose(&mut scene.rng)?;
-    // As Linux numbers them.
-    let (io_error, no_space) = (5, 28);
-    let error = *[io_error, no_space].choose(&mut scene.rng)?;
-    let probability = 10_f64.powf(scene.rng.random_range(-4.0..-1.0));
-    let command =
-        format!("enable_random name=posix/io/{call},probability={probability:.5},failinfo={error}");
-    println!("{command}");
-    let run = scene.run();
-    let failing = wrapped(&["fiu-run", "-f", "", "-x", "-c", &command], &run.command());
-    let ended = run.start_as(failing).finish();
-    scene.survived(&run, &ended);
-    Some(())
-}
-
-/// No file may become longer: of the whole run, or of a process in the middle. A signal reports the
-/// limit, unless the signal is ignored.
-pub fn file_size_limit(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let signal = if scene.one_in(2) {
-        "trap '' XFSZ; "
-    } else {
-        ""
-    };
-    let mut shell = vec!["sh", "-c"];
-    let start = format!("{signal}exec \"$@\"");
-    shell.extend([&start, "sh"]);
-    let most = (scene.configuration.undisturbed().bytes as f64).log2();
-    let bytes = scene.rng.random_range(12.0..most).exp2() as u64;
-    let at_start = format!("--fsize={bytes}:");
-    if scene.one_in(3) {
-        shell.extend(["prlimit", &at_start]);
-        let ended = run.start_as(wrapped(&shell, &run.command())).finish();
-        scene.survived(&run, &ended);
-        return Some(());
-    }
-    let mut running = run.start_as(wrapped(&shell, &run.command()));
-    scene.moment(&mut running)?;
-    let pid = match scene.one_in(3) {
-        true => running.pid(),
-        false => scene.stage(&running)?,
-    };
-    limit(pid, "fsize", bytes);
-    let ended = running.finish();
-    scene.survived(&run, &ended);
-    Some(())
-}
-
 /// The folder of the results is mounted read-only, or loses its permissions in the middle.
 pub fn read_only(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
+    if !can_mount() {
+        return Some(());
+    }
     if scene.one_in(3) {
         let mount = Mount::tmpfs(run.out(), PLENTY);
         mount.remount("ro");
@@ -125,9 +72,18 @@ pub fn read_only(scene: &mut Scene) -> Option<()> {
         scene.resumed(&run);
         return Some(());
     }
-    give_to_nobody(&run);
-    let as_nobody = || wrapped(&AS_NOBODY, &run.command());
-    let mut running = run.start_as(as_nobody());
+    let Some(user) = OtherUser::new(run.folder()) else {
+        return Some(());
+    };
+    let mut reads = user.command();
+    let reads = reads.args([crate::PROGRAM, "--version"]).output();
+    if !reads.is_ok_and(|output| output.status.success()) {
+        println!("skipped: the build folder is not for all users");
+        return Some(());
+    }
+    fs::create_dir_all(run.out()).unwrap();
+    chown(run.out(), Some(user.id), Some(user.id)).unwrap();
+    let mut running = run.start_as(user.command_of(&run));
     // Killed before it has a guardian, a run of another user would stay in shared memory.
     running.await_stages();
     scene.moment(&mut running)?;

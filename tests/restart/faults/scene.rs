@@ -13,40 +13,32 @@ use crate::common::{Ended, Pid, Run, Running, send};
 
 const LOOK: Duration = Duration::from_millis(2);
 
-/// A fault on its way.
 pub struct Scene<'a> {
-    /// The configuration of the run.
     pub configuration: &'a Configuration,
-    /// The source of all that is random.
     pub rng: ChaCha8Rng,
 }
 
 impl<'a> Scene<'a> {
-    /// The fault of this seed.
     pub fn new(configuration: &'a Configuration, seed: u64) -> Self {
         let rng = ChaCha8Rng::seed_from_u64(seed);
         Self { configuration, rng }
     }
 
-    /// A run of the configuration.
     pub fn run(&self) -> Run {
         // All rows wait for it here and not in the middle of a run.
         self.configuration.undisturbed();
         self.configuration.run()
     }
 
-    /// The stages and followers of a run.
     pub fn processes(&self) -> Vec<String> {
         let undisturbed = self.configuration.undisturbed();
         undisturbed.processes.iter().cloned().collect()
     }
 
-    /// True in one of `of` cases.
     pub fn one_in(&mut self, of: u32) -> bool {
         self.rng.random_ratio(1, of)
     }
 
-    /// Sleeps for up to `limit_ms`.
     pub fn pause(&mut self, limit_ms: u64) {
         thread::sleep(Duration::from_millis(self.rng.random_range(0..=limit_ms)));
     }
@@ -75,40 +67,28 @@ impl<'a> Scene<'a> {
         (!running.is_over()).then_some(())
     }
 
-    /// Waits until all processes live. `None` if the run is over.
-    pub fn await_processes(&mut self, running: &mut Running) -> Option<()> {
-        let names = self.processes();
-        self.until(running, |running| {
-            let living = running.stages();
-            let all = names.iter().all(|name| living.contains_key(name));
-            all.then_some(())
-        })
-    }
-
-    /// A living stage or follower.
     pub fn stage(&mut self, running: &Running) -> Option<Pid> {
         let stages: Vec<Pid> = running.stages().into_values().collect();
         (!stages.is_empty()).then(|| stages[self.rng.random_range(0..stages.len())])
     }
 
-    /// Kills a stage, if one lives.
     pub fn kill_stage(&mut self, running: &Running) -> Option<()> {
         let pid = self.stage(running)?;
         send(pid, Signal::KILL);
         Some(())
     }
 
-    /// Kills a process once it lives. `None` if the run is over.
+    /// Kills a process once it lives, or asks it to end. `None` if the run is over.
     pub fn kill(&mut self, running: &mut Running, name: &str) -> Option<()> {
-        let pid = self.until(running, |running| running.stages().get(name).copied())?;
-        send(pid, Signal::KILL);
-        Some(())
-    }
-
-    fn until<T>(&self, running: &mut Running, look: impl Fn(&Running) -> Option<T>) -> Option<T> {
         while !running.is_over() {
-            if let Some(seen) = look(running) {
-                return Some(seen);
+            if let Some(pid) = running.stages().get(name) {
+                let signal = if self.one_in(4) {
+                    Signal::TERM
+                } else {
+                    Signal::KILL
+                };
+                send(*pid, signal);
+                return Some(());
             }
             thread::sleep(LOOK);
         }

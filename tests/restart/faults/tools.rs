@@ -1,123 +1,36 @@
 //! Programs of the system that make faults.
 
 use std::{
-    ffi::OsStr,
-    fs::{self, Permissions},
-    os::unix::fs::{PermissionsExt, chown},
+    fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use crate::common::{Pid, Run};
+use crate::common::{Pid, processes::is_alive};
 
-/// A user and group without rights: nobody.
-const NOBODY: u32 = 65534;
-
-/// A requirement of a kind of faults on the machine.
-#[derive(Clone, Copy)]
-pub enum Need {
-    /// Mounting, also in a namespace of its own.
-    Mounts,
-    /// Another user who can execute the program.
-    OtherUser,
-    /// `prlimit` of util-linux.
-    Prlimit,
-    /// libfiu's preloaded library.
-    Fiu,
-    /// libfaketime's preloaded library.
-    Faketime,
-}
-
-impl Need {
-    /// Returns the name of the missing tool; `None` if nothing is.
-    pub fn missing(self) -> Option<&'static str> {
-        let works = |command: &[&str]| {
-            let output = Command::new(command[0]).args(&command[1..]).output();
-            output.is_ok_and(|output| output.status.success())
-        };
-        let (there, missing) = match self {
-            Self::Mounts => (
-                works(&[
-                    "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
-                ]),
-                "mounting needs root (CAP_SYS_ADMIN)",
-            ),
-            Self::OtherUser => (
-                works(&[&AS_NOBODY[..], &[crate::PROGRAM, "--version"]].concat()),
-                "another user cannot execute the program (needs root, and a build folder that all can read)",
-            ),
-            Self::Prlimit => (
-                works(&["prlimit", "--version"]),
-                "prlimit of util-linux is not installed",
-            ),
-            Self::Fiu => (
-                works(&["fiu-run", "-x", "true"]),
-                "fiu-run is not installed (Debian: fiu-utils)",
-            ),
-            Self::Faketime => (
-                faketime().is_some(),
-                "libfaketime is not installed (Debian: faketime)",
-            ),
-        };
-        (!there).then_some(missing)
+/// Returns whether this user can mount; prints why a fault is skipped.
+pub fn can_mount() -> bool {
+    let can = works(&[
+        "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
+    ]);
+    if !can {
+        println!("skipped: mounting needs root (CAP_SYS_ADMIN)");
     }
+    can
 }
 
-/// Executes a command as nobody.
-pub const AS_NOBODY: [&str; 4] = [
-    "setpriv",
-    "--reuid=65534",
-    "--regid=65534",
-    "--clear-groups",
-];
-
-/// Lets nobody write the run's results.
-pub fn give_to_nobody(run: &Run) {
-    fs::set_permissions(run.folder(), Permissions::from_mode(0o755)).unwrap();
-    fs::create_dir_all(run.out()).unwrap();
-    chown(run.out(), Some(NOBODY), Some(NOBODY)).unwrap();
+fn works(command: &[&str]) -> bool {
+    let output = Command::new(command[0]).args(&command[1..]).output();
+    output.is_ok_and(|output| output.status.success())
 }
 
-/// The library that fakes the clock.
-pub fn faketime() -> Option<PathBuf> {
-    let folders = fs::read_dir("/usr/lib").into_iter().flatten().flatten();
-    let library = |folder: fs::DirEntry| folder.path().join("faketime/libfaketimeMT.so.1");
-    folders.map(library).find(|path| path.is_file())
-}
-
-/// Executes a program that must succeed.
-pub fn execute<T: AsRef<OsStr>>(program: &str, arguments: impl IntoIterator<Item = T>) {
-    let mut command = Command::new(program);
-    command.args(arguments);
-    let output = command
-        .output()
-        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-    assert!(
-        output.status.success(),
-        "{command:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-}
-
-/// Limits a resource of a process of this user, or of nobody. That the process is gone already is
-/// no error.
+/// Limits a resource of a process. That the process is gone already is no error.
 pub fn limit(pid: Pid, resource: &str, value: u64) {
-    let (pid_option, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
-    let prlimit = ["prlimit", &pid_option, &limit];
-    let limited = |command: &[&str]| {
-        let output = Command::new(command[0]).args(&command[1..]).output();
-        output.is_ok_and(|output| output.status.success())
-    };
+    let (of, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
     assert!(
-        limited(&prlimit) || limited(&[&AS_NOBODY[..], &prlimit].concat()) || !is_alive(pid),
+        works(&["prlimit", &of, &limit]) || !is_alive(pid),
         "cannot limit {resource} of {pid}"
     );
-}
-
-fn is_alive(pid: Pid) -> bool {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    stat.rsplit_once(") ")
-        .is_some_and(|(_, fields)| !fields.starts_with(['Z', 'X']))
 }
 
 /// A mounted file system. Dropped, it is unmounted.
@@ -126,31 +39,27 @@ pub struct Mount(PathBuf);
 impl Mount {
     /// A file system in memory.
     pub fn tmpfs(place: &Path, bytes: u64) -> Self {
-        let size = format!("size={bytes},mode=755");
-        Self::at(
-            place,
-            &[
-                OsStr::new("-t"),
-                "tmpfs".as_ref(),
-                "-o".as_ref(),
-                size.as_ref(),
-                "tmpfs".as_ref(),
-            ],
-        )
-    }
-
-    fn at(place: &Path, options: &[&OsStr]) -> Self {
         fs::create_dir_all(place).unwrap();
-        execute("mount", options.iter().copied().chain([place.as_os_str()]));
-        Self(place.to_owned())
+        let mount = Self(place.to_owned());
+        mount.mount(&[
+            "-t",
+            "tmpfs",
+            "-o",
+            &format!("size={bytes},mode=755"),
+            "tmpfs",
+        ]);
+        mount
     }
 
-    /// Changes its options.
     pub fn remount(&self, options: &str) {
-        let options = format!("remount,{options}");
-        execute(
-            "mount",
-            ["-o".as_ref(), options.as_ref(), self.0.as_os_str()],
+        self.mount(&["-o", &format!("remount,{options}")]);
+    }
+
+    fn mount(&self, options: &[&str]) {
+        let place = self.0.to_str().unwrap();
+        assert!(
+            works(&[&["mount"][..], options, &[place]].concat()),
+            "{place}"
         );
     }
 }

@@ -42,7 +42,6 @@ pub enum Survives {
     Some,
 }
 
-/// A disk after some operations.
 #[derive(Default)]
 pub struct Disk {
     files: Vec<File>,
@@ -62,7 +61,6 @@ pub struct State {
 }
 
 impl State {
-    /// Writes it into a folder.
     pub fn write(&self, to: &Path) {
         for folder in &self.folders {
             fs::create_dir_all(to.join(folder)).unwrap();
@@ -97,7 +95,6 @@ impl Disk {
         disk
     }
 
-    /// Applies the next operation.
     pub fn apply(&mut self, operation: &Operation) {
         self.time += 1;
         match operation {

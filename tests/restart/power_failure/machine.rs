@@ -18,7 +18,7 @@ use gyre_messages::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, fla
 use gyre_results::{Identity, Out, Programs, Session};
 use gyre_run::Ending;
 use gyre_scan_matching::Refiner;
-use gyre_slam::{Keyframe, SlamKind, records_path};
+use gyre_slam::{Keyframe, records_path};
 use gyre_terminal::Failure;
 use nalgebra::{Isometry2, Vector2};
 
@@ -42,8 +42,8 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// A machine whose runs have SLAM or not.
-    pub fn new(slam: SlamKind) -> Self {
+    /// A machine whose runs have this kind of SLAM.
+    pub fn new(slam: &str) -> Self {
         // A small map, whose slots are used again within the drive; and a small picture, because
         // each of thousands of runs draws one.
         let overrides = [
@@ -51,11 +51,7 @@ impl Machine {
             "refinement.keyframes=3",
             "refinement.cell_m=1.0",
             "refinement.reach_m=30.0",
-            match slam {
-                SlamKind::None => "slam.kind=none",
-                SlamKind::Filter => "slam.kind=filter",
-                SlamKind::Graph => "slam.kind=graph",
-            },
+            &format!("slam.kind={slam}"),
         ]
         .map(str::to_owned);
         let configuration = Configuration::of_overrides(&overrides).unwrap();

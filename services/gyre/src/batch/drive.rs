@@ -16,7 +16,7 @@ use gyre_tools::batch::{End, Outcome};
 use rustix::process::Signal;
 
 use crate::{
-    cli::{BatchDriveArguments, RunArguments},
+    cli::RunArguments,
     earlier::{self, Earlier},
     program,
     run::{self, resolve},
@@ -24,16 +24,15 @@ use crate::{
 
 /// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
 const ENDING: Duration = Duration::from_secs(60);
-/// Time between two attempts to lock the folder.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans,
 /// and prints its end.
-pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
-    if !end_with(arguments.parent, Signal::TERM)? {
+pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !end_with(parent, Signal::TERM)? {
         return Ok(ExitCode::FAILURE);
     }
-    let end = computed(&arguments.run);
+    let end = computed(run);
     let end = end.unwrap_or_else(|error| End::of(Outcome::Failed, error.to_string()));
     print::line(serde_json::to_string(&end)?)?;
     Ok(ExitCode::SUCCESS)
@@ -41,8 +40,7 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
 
 fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     // The recording may have been removed since the batch began.
-    let given = &arguments.inputs;
-    let path = given.data.as_ref().or(given.what.first());
+    let path = arguments.inputs.what.last();
     let is_missing = |path: &Path| matches!(path.try_exists(), Ok(false));
     if let Some(path) = path.filter(|path| is_missing(path) && shipped(path).is_none()) {
         return Ok(End::unchecked(format!(
@@ -93,8 +91,7 @@ fn is_same(begun: &Identity, configuration: &Configuration) -> Result<bool, Fail
     begun.has_inputs_of(configuration, &replaced)
 }
 
-/// Returns whether the folder has the results of all these scans with this configuration, by
-/// whatever build.
+/// Returns whether the folder has the results of these scans, by whatever build.
 fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     // A run reports files that cannot be read.
@@ -122,8 +119,7 @@ fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
     })
 }
 
-/// Returns whether an unfinished run in the folder, if there is one, continues with this
-/// configuration. A run of another configuration, build or version is discarded.
+/// A run of another configuration, build or version is discarded.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
     let earlier = Earlier::of(out, configuration, &program::now(configuration)?, false)?;
     Ok(match (&earlier, earlier.identity()) {

@@ -4,8 +4,6 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-use super::RunArguments;
-
 /// The arguments of `gyre batch`.
 #[derive(Debug, Args)]
 pub struct BatchArguments {
@@ -35,16 +33,4 @@ pub struct BatchArguments {
     /// Compute nothing: write the table of the existing results.
     #[arg(long, conflicts_with = "task")]
     pub collect: bool,
-}
-
-/// The arguments of the process of a drive: the arguments of a run, and the parent process, whose
-/// end also ends it.
-#[derive(Debug, Args)]
-pub struct BatchDriveArguments {
-    /// The process that has started it.
-    #[arg(long)]
-    pub parent: i32,
-    /// The run.
-    #[command(flatten)]
-    pub run: RunArguments,
 }

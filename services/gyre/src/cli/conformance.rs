@@ -19,7 +19,6 @@ pub struct ConformanceArguments {
     /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
     #[arg(long, value_name = "FILE", conflicts_with = "command")]
     pub python: Option<PathBuf>,
-    /// The scans to test with and their configuration. Default: a simulated drive on small rasters.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Scans to test with, 8 or more.

@@ -5,203 +5,105 @@ use gyre_terminal::{WIDTH, wrap};
 
 use super::Gyre;
 
-/// The examples of a command.
-type Examples = [&'static str; 2];
+/// The groups of commands in the order of the help, with two examples of each command.
+const GROUPS: &str = "\
+Start:
+gyre demo
+gyre demo --set masking.kind=threshold --fresh
+gyre run DRIVE
+gyre run oxford DRIVE --out out/oxford
+gyre inspect DRIVE
+gyre inspect drive.mcap --json
+gyre config
+gyre config oxford > robot.toml
+gyre doctor
+gyre doctor --out /data/out
 
-/// The groups of commands, in the order of the help.
-const GROUPS: [(&str, &[(&str, Examples)]); 6] = [
-    ("Start", &START),
-    ("See the results", &RESULTS),
-    ("Many drives, another radar", &RADARS),
-    ("Operate a running run", &OPERATE),
-    ("Take it elsewhere", &ELSEWHERE),
-    ("Replace a stage, measure, set up", &DEVELOP),
-];
+See the results:
+gyre report out/demo --open
+gyre report out/a out/b other.tum
+gyre evaluate out/demo
+gyre evaluate other.tum truth.tum --plots plots
+gyre map out/demo --out town
+gyre map out/demo --out town --format geotiff --origin 51.76,-1.26,90
+gyre localise DRIVE --map town
+gyre localise oxford DRIVE --map town --out out/localised
+gyre export out/demo --mcap demo-bag
+gyre export out/drive --format radiate --out repaired
 
-const START: [(&str, Examples); 5] = [
-    (
-        "demo",
-        [
-            "gyre demo",
-            "gyre demo --set masking.kind=threshold --fresh",
-        ],
-    ),
-    (
-        "run",
-        ["gyre run DRIVE", "gyre run oxford DRIVE --out out/oxford"],
-    ),
-    (
-        "inspect",
-        ["gyre inspect DRIVE", "gyre inspect drive.mcap --json"],
-    ),
-    ("config", ["gyre config", "gyre config oxford > robot.toml"]),
-    ("doctor", ["gyre doctor", "gyre doctor --out /data/out"]),
-];
+Many drives, another radar:
+gyre batch DRIVES --config oxford
+gyre batch drives.csv --out out/batch --jobs 4
+gyre calibrate robot.toml DRIVE --distance-m 1520
+gyre calibrate DRIVE --with ANOTHER-DRIVE
+gyre masks DRIVE
+gyre masks demo --scans 10,20
+gyre simulate demo --out recording
+gyre simulate --trajectory drive.tum --format boreas --out recording
 
-const RESULTS: [(&str, Examples); 5] = [
-    (
-        "report",
-        [
-            "gyre report out/demo --open",
-            "gyre report out/a out/b other.tum",
-        ],
-    ),
-    (
-        "evaluate",
-        [
-            "gyre evaluate out/demo",
-            "gyre evaluate other.tum truth.tum --plots plots",
-        ],
-    ),
-    (
-        "map",
-        [
-            "gyre map out/demo --out town",
-            "gyre map out/demo --out town --format geotiff --origin 51.76,-1.26,90",
-        ],
-    ),
-    (
-        "localise",
-        [
-            "gyre localise DRIVE --map town",
-            "gyre localise oxford DRIVE --map town --out out/localised",
-        ],
-    ),
-    (
-        "export",
-        [
-            "gyre export out/demo --mcap demo-bag",
-            "gyre export out/drive --format radiate --out repaired",
-        ],
-    ),
-];
+Operate a running run:
+gyre up 192.168.0.1 robot.toml
+gyre up demo --fresh
+gyre down
+gyre down out/radar
+gyre ps
+gyre ps out/radar --check
+gyre top
+gyre top out/radar --once
+gyre watch
+gyre watch out/radar --listen 0.0.0.0:8080
+gyre logs -f
+gyre logs masking out/radar
+gyre echo
+gyre echo out/radar motion
+gyre record --to drive.mcap
+gyre record out/radar --to drive.mcap
+gyre restart masking
+gyre restart masking out/radar
+gyre swap masking --command ./my-masking
+gyre swap masking out/radar
+gyre shadow masking --command ./my-masking --scans 200
+gyre shadow refinement out/radar
 
-const RADARS: [(&str, Examples); 4] = [
-    (
-        "batch",
-        [
-            "gyre batch DRIVES --config oxford",
-            "gyre batch drives.csv --out out/batch --jobs 4",
-        ],
-    ),
-    (
-        "calibrate",
-        [
-            "gyre calibrate robot.toml DRIVE --distance-m 1520",
-            "gyre calibrate DRIVE --with ANOTHER-DRIVE",
-        ],
-    ),
-    (
-        "masks",
-        ["gyre masks DRIVE", "gyre masks demo --scans 10,20"],
-    ),
-    (
-        "simulate",
-        [
-            "gyre simulate demo --out recording",
-            "gyre simulate --trajectory drive.tum --format boreas --out recording",
-        ],
-    ),
-];
+Take it elsewhere:
+gyre ros2
+gyre ros2 out/radar --domain 7
+gyre link send out/radar --listen tcp/127.0.0.1:7447
+gyre link receive out/seen --connect tcp/127.0.0.1:7447
+gyre radar-server demo
+gyre radar-server DRIVE --rate 2
 
-const OPERATE: [(&str, Examples); 11] = [
-    (
-        "up",
-        ["gyre up 192.168.0.1 robot.toml", "gyre up demo --fresh"],
-    ),
-    ("down", ["gyre down", "gyre down out/radar"]),
-    ("ps", ["gyre ps", "gyre ps out/radar --check"]),
-    ("top", ["gyre top", "gyre top out/radar --once"]),
-    (
-        "watch",
-        ["gyre watch", "gyre watch out/radar --listen 0.0.0.0:8080"],
-    ),
-    ("logs", ["gyre logs -f", "gyre logs masking out/radar"]),
-    ("echo", ["gyre echo", "gyre echo out/radar motion"]),
-    (
-        "record",
-        [
-            "gyre record --to drive.mcap",
-            "gyre record out/radar --to drive.mcap",
-        ],
-    ),
-    (
-        "restart",
-        ["gyre restart masking", "gyre restart masking out/radar"],
-    ),
-    (
-        "swap",
-        [
-            "gyre swap masking --command ./my-masking",
-            "gyre swap masking out/radar",
-        ],
-    ),
-    (
-        "shadow",
-        [
-            "gyre shadow masking --command ./my-masking --scans 200",
-            "gyre shadow refinement out/radar",
-        ],
-    ),
-];
+Replace a stage, measure, set up:
+gyre new stage masking --python
+gyre new stage rotation-search --rust --gyre ../gyre
+gyre conformance masking --python my_mask.py
+gyre conformance refinement radiate DRIVE
+gyre stress demo --quick
+gyre stress radiate DRIVE --scenario kills
+gyre stage refinement
+gyre stage masking --python my_mask.py
+gyre schema > gyre.json
+gyre schema --markdown
+gyre completions bash > ~/.local/share/bash-completion/completions/gyre
+gyre completions fish > ~/.config/fish/completions/gyre.fish
+gyre man man1
+gyre man ~/.local/share/man/man1";
 
-const ELSEWHERE: [(&str, Examples); 3] = [
-    ("ros2", ["gyre ros2", "gyre ros2 out/radar --domain 7"]),
-    (
-        "link",
-        [
-            "gyre link send out/radar --listen tcp/127.0.0.1:7447",
-            "gyre link receive out/seen --connect tcp/127.0.0.1:7447",
-        ],
-    ),
-    (
-        "radar-server",
-        ["gyre radar-server demo", "gyre radar-server DRIVE --rate 2"],
-    ),
-];
+/// Returns the titles of the groups, each with the lines of its examples.
+fn groups() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let groups = GROUPS.split("\n\n");
+    groups.filter_map(|group| group.split_once('\n'))
+}
 
-const DEVELOP: [(&str, Examples); 7] = [
-    (
-        "new",
-        [
-            "gyre new stage masking --python",
-            "gyre new stage rotation-search --rust --gyre ../gyre",
-        ],
-    ),
-    (
-        "conformance",
-        [
-            "gyre conformance masking --python my_mask.py",
-            "gyre conformance refinement radiate DRIVE",
-        ],
-    ),
-    (
-        "stress",
-        [
-            "gyre stress demo --quick",
-            "gyre stress radiate DRIVE --scenario kills",
-        ],
-    ),
-    (
-        "stage",
-        [
-            "gyre stage refinement",
-            "gyre stage masking --python my_mask.py",
-        ],
-    ),
-    (
-        "schema",
-        ["gyre schema > gyre.json", "gyre schema --markdown"],
-    ),
-    (
-        "completions",
-        [
-            "gyre completions bash > ~/.local/share/bash-completion/completions/gyre",
-            "gyre completions fish > ~/.config/fish/completions/gyre.fish",
-        ],
-    ),
-    ("man", ["gyre man man1", "gyre man ~/.local/share/man/man1"]),
-];
+/// Returns the commands of a group, each with its examples.
+fn commands(group: &'static str) -> Vec<(&'static str, Vec<&'static str>)> {
+    let name = |example: &'static str| example.split(' ').nth(1).unwrap_or_default();
+    let examples: Vec<&str> = group.lines().collect();
+    let of_commands = examples.chunk_by(|&one, &next| name(one) == name(next));
+    of_commands
+        .map(|examples| (name(examples[0]), examples.to_vec()))
+        .collect()
+}
 
 /// The exit codes of all commands.
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 wrong arguments, 130 interrupted.";
@@ -217,9 +119,8 @@ pub fn command() -> Command {
         arg.allow_negative_numbers(has_value)
     };
     let mut command = Gyre::command().mut_subcommands(|it| it.mut_args(of_option));
-    for (name, examples) in GROUPS.iter().flat_map(|(_, commands)| *commands) {
-        let [first, second] = examples;
-        let examples = format!("Examples:\n  {first}\n  {second}");
+    for (name, examples) in groups().flat_map(|(_, group)| commands(group)) {
+        let examples = format!("Examples:\n  {}", examples.join("\n  "));
         command = command.mut_subcommand(name, |it| it.after_help(examples));
     }
     let list = list(&command);
@@ -238,10 +139,10 @@ fn list(command: &Command) -> String {
         about.split(". ").next().unwrap_or_default().to_owned()
     };
     let mut text = String::new();
-    for (group, commands) in GROUPS {
-        text += &format!("\n{group}:\n");
-        for (name, _) in commands {
-            let indent = format!("\n  {:NAMES$}", "");
+    let indent = format!("\n  {:NAMES$}", "");
+    for (title, group) in groups() {
+        text += &format!("\n{title}\n");
+        for (name, _) in commands(group) {
             let about = wrap(&about(name), WIDTH - NAMES - 2).join(&indent);
             text += &format!("  {name:NAMES$}{about}\n");
         }
@@ -254,8 +155,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn all() -> impl Iterator<Item = &'static (&'static str, Examples)> {
-        GROUPS.iter().flat_map(|(_, commands)| *commands)
+    fn all() -> Vec<(&'static str, Vec<&'static str>)> {
+        groups().flat_map(|(_, group)| commands(group)).collect()
     }
 
     #[test]
@@ -263,7 +164,7 @@ mod tests {
         let command = Gyre::command();
         let visible = command.get_subcommands().filter(|it| !it.is_hide_set());
         let mut visible: Vec<&str> = visible.map(Command::get_name).collect();
-        let mut grouped: Vec<&str> = all().map(|(name, _)| *name).collect();
+        let mut grouped: Vec<&str> = all().into_iter().map(|(name, _)| name).collect();
         visible.sort_unstable();
         grouped.sort_unstable();
         assert_eq!(grouped, visible);
@@ -277,7 +178,7 @@ mod tests {
                 let words = line.split(' ');
                 let parsed = command().try_get_matches_from(words);
                 let parsed = parsed.unwrap_or_else(|error| panic!("{example}: {error}"));
-                assert_eq!(parsed.subcommand_name(), Some(*name), "{example}");
+                assert_eq!(parsed.subcommand_name(), Some(name), "{example}");
             }
         }
     }

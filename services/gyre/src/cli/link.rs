@@ -4,14 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-/// The arguments of `gyre link`.
-#[derive(Debug, Args)]
-pub struct LinkArguments {
-    /// The end.
-    #[command(subcommand)]
-    pub end: LinkEnd,
-}
-
 /// The ends of a link.
 #[derive(Debug, Subcommand)]
 pub enum LinkEnd {
@@ -34,7 +26,6 @@ pub struct SendArguments {
     /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
     #[arg(long, default_value_t = 60.0, value_name = "S")]
     pub linger_s: f64,
-    /// The other machine.
     #[command(flatten)]
     pub network: NetworkArguments,
 }
@@ -47,7 +38,6 @@ pub struct ReceiveArguments {
     /// The topics that are received of those that are sent. Default: all.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
-    /// The other machine.
     #[command(flatten)]
     pub network: NetworkArguments,
 }

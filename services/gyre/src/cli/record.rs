@@ -8,7 +8,6 @@ use gyre_tools::operate::RunChoice;
 /// The arguments of `gyre record`.
 #[derive(Debug, Args)]
 pub struct RecordArguments {
-    /// The run.
     #[command(flatten)]
     pub run: RunChoice,
     /// The file to write: NAME.mcap.
@@ -18,7 +17,6 @@ pub struct RecordArguments {
     /// correction, fix, log, health. Default: all of these in the run except masked and rotation.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
-    /// When a file is ended.
     #[command(flatten)]
     pub split: SplitArguments,
     /// Continue with the next part of the recording if there is one (as `gyre run` starts it).

@@ -7,7 +7,6 @@ use gyre_tools::operate::RunChoice;
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
 pub struct Ros2Arguments {
-    /// The run.
     #[command(flatten)]
     pub run: RunChoice,
     /// The domain of ROS 2. Default: ROS_DOMAIN_ID, or 0.
@@ -20,7 +19,6 @@ pub struct Ros2Arguments {
     /// The namespace of the topics odom, map, objects and object_markers.
     #[arg(long, value_name = "NAME", default_value = "/")]
     pub namespace: String,
-    /// The frames.
     #[command(flatten)]
     pub frames: FrameArguments,
     /// Publish no transforms of odometry and map, where another program does, such as

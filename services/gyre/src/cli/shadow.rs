@@ -10,7 +10,6 @@ use gyre_tools::operate::RunChoice;
 pub struct ShadowArguments {
     /// The stage: masking, rotation-search, translation-search, joint-search or refinement.
     pub stage: String,
-    /// The run.
     #[command(flatten)]
     pub run: RunChoice,
     /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.

@@ -8,7 +8,6 @@ use gyre_tools::operate::RunChoice;
 /// The arguments of `gyre watch`.
 #[derive(Debug, Args)]
 pub struct WatchArguments {
-    /// The run.
     #[command(flatten)]
     pub run: RunChoice,
     /// The address to serve at. Any but the loopback's needs the token of the address that is

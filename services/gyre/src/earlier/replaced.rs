@@ -53,9 +53,8 @@ fn is_whole(out: &Out) -> bool {
     !is_complete(out.path()) && out.join(ASIDE).join(mark()).exists()
 }
 
-/// Returns whether the run that is to replace a complete one has computed nothing: that is given
-/// back.
-pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
+/// Returns whether the run that is to replace a complete one has computed nothing.
+fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
     }
@@ -210,14 +209,5 @@ mod tests {
         storage::remove(&journal::path(out.path())).unwrap();
         settle(&out).unwrap();
         assert!(!is_kept(&out) && !is_complete(out.path()));
-    }
-
-    #[test]
-    fn a_run_without_a_motion_makes_no_way_for_itself() {
-        let (_folder, out) = being_replaced();
-        compute(&out, 0..1);
-        assert!(!make_way(&out, 1).unwrap());
-        settle(&out).unwrap();
-        assert!(!is_kept(&out) && is_complete(out.path()));
     }
 }

@@ -8,30 +8,26 @@ use gyre_stage::{Launch, StageCounters, StageError};
 use gyre_stages::live_radar::Sizes;
 use gyre_terminal::Failure;
 
-use crate::{cli::Ros2Arguments, features::Absent};
+use crate::{cli::Ros2Arguments, features::absent};
 
-const ABSENT: Absent = Absent("ROS 2");
+const PART: &str = "ROS 2";
 
-/// Refuses, since this build lacks ROS 2.
 pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
-    Err(ABSENT.into())
+    Err(absent(PART).into())
 }
 
-/// Refuses, since this build lacks ROS 2.
 pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
-    Err(ABSENT.into())
+    Err(absent(PART).into())
 }
 
-/// Returns that no driver comes.
 pub fn may_come(_: &Failure) -> bool {
     false
 }
 
-/// Refuses, since this build lacks ROS 2.
 pub fn receive(
     _: &Launch,
     _: &SourceConfig,
     _: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    Err(ABSENT.into())
+    Err(StageError::Configuration(absent(PART)))
 }

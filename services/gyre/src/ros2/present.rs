@@ -74,7 +74,6 @@ pub fn may_come(error: &Failure) -> bool {
     absent.is_some_and(|it| matches!(it, AskError::NoTopic { .. } | AskError::Silent { .. }))
 }
 
-/// Receives the scans of a source.
 pub fn receive(
     launch: &Launch,
     source: &SourceConfig,

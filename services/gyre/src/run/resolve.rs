@@ -21,15 +21,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         );
     }
     let overrides = overrides(arguments, &given)?;
-    let mut configuration = match (&given.configuration, &given.data) {
-        (Some(named), _) => gyre_terminal::inputs::configuration(named, &overrides)?,
-        (None, Some(data)) => {
-            let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
-            print::note(sentence);
-            configuration
-        }
-        (None, None) => Configuration::of_overrides(&overrides)?,
-    };
+    let mut configuration = given.read(&overrides)?;
     if given.data.is_some() {
         configuration.simulation = None;
     }
@@ -64,49 +56,37 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
 /// The overrides: the calibration, `--set`, the options; of two for one key the later one holds.
 fn overrides(arguments: &RunArguments, given: &Given) -> Result<Vec<String>, Failure> {
     let options = &arguments.options;
-    let calibration = arguments.calibration.as_deref().map(calibration::overrides);
-    // As a value, which is quoted: a folder may be named 2019-01-10 or 7.
-    let data = given.data.as_deref().map(path_value).transpose()?;
-    let data = data.iter().flat_map(|data| {
-        let data = format!("source.data={data}");
-        [data, "source.kind='recording'".to_owned()]
-    });
-    let radar = given.radar.iter().flat_map(|address| {
-        let address = toml::Value::from(address.clone());
-        [
-            "source.kind='colossus'".to_owned(),
-            "run.mode='live'".to_owned(),
-            format!("source.address={address}"),
-        ]
-    });
-    let ros2 = arguments.ros2.iter().flat_map(|topic| {
-        let topic = toml::Value::from(topic.clone());
-        [
-            "source.kind='ros2'".to_owned(),
-            "run.mode='live'".to_owned(),
-            format!("source.topic={topic}"),
-        ]
-    });
-    let rate = options.rate.iter().map(|rate| format!("run.rate='{rate}'"));
-    let from = arguments
-        .from
-        .iter()
-        .map(|topic| format!("source.from='{topic}'"));
-    let record = options.record.iter().map(|file| {
+    let mut overrides = match &arguments.calibration {
+        Some(file) => calibration::overrides(file)?,
+        None => Vec::new(),
+    };
+    overrides.extend(arguments.inputs.set.iter().cloned());
+    // As values, which are quoted: a folder may be named 2019-01-10 or 7.
+    let mut set = |key: &str, value: toml::Value| overrides.push(format!("{key}={value}"));
+    if let Some(data) = &given.data {
+        set("source.data", path_value(data)?);
+        set("source.kind", "recording".into());
+    }
+    let (address, topic) = (&given.radar, &arguments.ros2);
+    for (kind, key, of_radar) in [
+        ("colossus", "source.address", address),
+        ("ros2", "source.topic", topic),
+    ] {
+        if let Some(of_radar) = of_radar {
+            set("source.kind", kind.into());
+            set("run.mode", "live".into());
+            set(key, of_radar.clone().into());
+        }
+    }
+    if let Some(rate) = &options.rate {
+        set("run.rate", rate.to_string().into());
+    }
+    if let Some(topic) = &arguments.from {
+        set("source.from", topic.clone().into());
+    }
+    if let Some(file) = &options.record {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
-        Ok(format!("record.file={}", path_value(&file)?))
-    });
-    let record: Vec<String> = record.collect::<Result<_, Failure>>()?;
-    let calibration = calibration.transpose()?.unwrap_or_default();
-    let set = arguments.inputs.set.iter().cloned();
-    Ok(calibration
-        .into_iter()
-        .chain(set)
-        .chain(data)
-        .chain(radar)
-        .chain(ros2)
-        .chain(rate)
-        .chain(from)
-        .chain(record)
-        .collect())
+        set("record.file", path_value(&file)?);
+    }
+    Ok(overrides)
 }

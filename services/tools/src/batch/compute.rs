@@ -214,11 +214,8 @@ impl Drop for Child<'_> {
 
 /// The words of a drive's command: the parent process, then the words of `gyre run`.
 fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
-    let option = |name: &str, path: &Path| {
-        let mut word = OsString::from(name);
-        word.push(path);
-        word
-    };
+    let mut out = OsString::from("--out=");
+    out.push(Row::results(&batch.out, drive));
     let path = batch.list.resolve(&drive.path);
     let own = drive.configuration.as_deref();
     let own = own.map(|named| match batch.list.resolve(named) {
@@ -230,12 +227,12 @@ fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
     let mut words = vec![
         COMMAND.into(),
         format!("--parent={}", process::id()).into(),
-        option("--out=", &Row::results(&batch.out, drive)),
+        out,
     ];
-    match is_configuration(&drive.path) {
-        true => words.push(path.into()),
-        false => words.extend(configuration.into_iter().chain([option("--data=", &path)])),
+    if !is_configuration(&drive.path) {
+        words.extend(configuration);
     }
+    words.push(path.into());
     let set = batch.settings.set.iter().chain(&drive.set);
     words.extend(set.map(|sentence| format!("--set={sentence}").into()));
     words
@@ -276,13 +273,8 @@ mod tests {
         let list = list(folder.path(), text);
         let batch = batch(&list, folder.path(), "gyre");
         let of = |index: usize| words(&batch, &list.drives[index])[3..].to_vec();
-        assert_eq!(of(0), ["/all.toml", "--data=/a", "--set=raster.n=127"]);
-        let own = [
-            "/own.toml",
-            "--data=/b",
-            "--set=raster.n=127",
-            "--set=raster.n=63",
-        ];
+        assert_eq!(of(0), ["/all.toml", "/a", "--set=raster.n=127"]);
+        let own = ["/own.toml", "/b", "--set=raster.n=127", "--set=raster.n=63"];
         assert_eq!(of(1), own);
         assert_eq!(of(2), ["/c.toml", "--set=raster.n=127"]);
     }

@@ -14,13 +14,13 @@ use crate::radar_server::server::Faults;
 /// The arguments of `gyre radar-server`.
 #[derive(Debug, Args)]
 pub struct RadarServerArguments {
-    /// The scans, or by --data a file that --capture has written; of the configuration the sections
+    /// The scans, or a file that --capture has written; of the configuration the sections
     /// `[simulation]`, `[source]` and `[dataset]`.
     #[command(flatten)]
     pub inputs: Inputs,
     /// Record the data of the radar at --radar, byte for byte, into this new file, instead of
     /// playing; until the radar ends, or Ctrl-C.
-    #[arg(long, value_name = "FILE", requires = "radar", conflicts_with = "data")]
+    #[arg(long, value_name = "FILE", requires = "radar", conflicts_with = "what")]
     pub capture: Option<PathBuf>,
     /// The radar to capture: HOST, HOST:PORT or udp://GROUP:PORT (--interface: this machine's
     /// address on its network).

@@ -2,8 +2,7 @@
 
 use toml::{Table, Value};
 
-/// Returns the first key, in alphabetical order, whose values differ:
-/// `masking.threshold was 60 and is now 70`.
+/// Returns the first difference, as `masking.threshold was 60 and is now 70`.
 pub fn first(begun: &Table, now: &Table) -> Option<String> {
     let keys: std::collections::BTreeSet<&String> = begun.keys().chain(now.keys()).collect();
     keys.into_iter()

@@ -61,7 +61,7 @@ pub struct SourceConfig {
     /// Time without an azimuth before the radar is connected again, or in ROS 2 before that is
     /// reported, s; 0: no limit.
     pub silence_s: f64,
-    /// Folder of the recording; `--data` on the command line.
+    /// Folder of the recording.
     pub data: PathBuf,
     /// First topic that is played from a recording of a run: `scan`, `masked`, `rotation`, `motion`
     /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but

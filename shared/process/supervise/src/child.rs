@@ -4,12 +4,12 @@ use std::{
     collections::VecDeque,
     fs,
     os::unix::process::ExitStatusExt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitStatus,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{FollowerId, StageId};
+use gyre_messages::StageId;
 use gyre_stage::{
     Manifest, StageError,
     heartbeat::{self, Heartbeat},
@@ -31,30 +31,25 @@ const KILL_TIMEOUT: Duration = Duration::from_secs(10);
 const PERMANENT: i32 = StageError::PERMANENT as i32;
 
 pub(crate) struct Child {
-    plan: StagePlan,
+    pub plan: StagePlan,
     process: std::process::Child,
-    started: Instant,
+    pub started: Instant,
     status: Option<ExitStatus>,
-    /// True if it did not end although it was killed.
     is_held: bool,
     deaths: VecDeque<Instant>,
-    /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
-    /// The file where the process writes why it ended.
     last_words: PathBuf,
     log: Log,
-    /// The cause of the last death of this program.
-    last_death: Option<String>,
+    pub last_death: Option<String>,
     /// Why the last program that was given up for this one could not be started.
-    pub(crate) start_error: Option<String>,
-    /// The plan before a swap, to go back to.
+    pub start_error: Option<String>,
     before: Option<StagePlan>,
     /// True from a swap until the new program has worked on a pose.
-    is_on_trial: bool,
+    pub is_on_trial: bool,
 }
 
 impl Child {
-    pub(crate) fn spawn(
+    pub fn spawn(
         plan: &StagePlan,
         manifest: &Manifest,
         starter: &Starter<'_>,
@@ -79,17 +74,18 @@ impl Child {
         })
     }
 
-    pub(crate) fn respawn(
+    pub fn respawn(
         &mut self,
         manifest: &Manifest,
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
-        if let Some(path) = self.changed_file() {
-            return Err(SuperviseError::Replaced {
-                stage: self.plan.name.clone(),
-                path: path.to_owned(),
-            });
+        if let Some(path) = self.plan.changed_file() {
+            return Err(SuperviseError::Process(format!(
+                "{} has ended, and {} has changed since it was started: another program may compute other motions; put back the one that the run was begun with",
+                self.plan.name,
+                path.display()
+            )));
         }
         self.last_words = last_words(manifest, &self.plan.name, Position::Free);
         self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
@@ -100,7 +96,7 @@ impl Child {
     }
 
     /// Takes the place of a process that has ended, with another program that stood by for it.
-    pub(crate) fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
+    pub fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
         // It opens its topics when its standard input ends.
         drop(successor.process.stdin.take());
         successor.started = Instant::now();
@@ -112,7 +108,7 @@ impl Child {
     }
 
     /// Uses a different program from the next start on.
-    pub(crate) fn change(&mut self, plan: StagePlan) {
+    pub fn change(&mut self, plan: StagePlan) {
         let before = std::mem::replace(&mut self.plan, plan);
         self.deaths.clear();
         self.try_after(before);
@@ -126,19 +122,8 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Returns whether its program has replaced another and has not worked on a pose yet.
-    pub(crate) fn is_on_trial(&self) -> bool {
-        self.is_on_trial
-    }
-
-    /// The replacing program has worked on a pose.
-    pub(crate) fn pass_trial(&mut self) {
-        self.is_on_trial = false;
-    }
-
-    /// Returns to the program before a swap, from the next start on; or to `begun`, the program of
-    /// the run's begin, if a file of the former has changed since. False without such a program.
-    pub(crate) fn go_back(&mut self, begun: &StagePlan) -> bool {
+    /// Or to `begun`, the program of the run's begin, if a file of the one before has changed.
+    pub fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
         let mut plans = plans.chain(is_another.then(|| begun.clone()));
@@ -152,63 +137,37 @@ impl Child {
         true
     }
 
-    /// Returns a file of its command that has changed since it was started first.
-    pub(crate) fn changed_file(&self) -> Option<&Path> {
-        self.plan.changed_file()
-    }
-
-    pub(crate) fn plan(&self) -> &StagePlan {
-        &self.plan
-    }
-
-    pub(crate) fn name(&self) -> &str {
+    pub fn name(&self) -> &str {
         &self.plan.name
     }
 
-    pub(crate) fn pid(&self) -> u32 {
+    pub fn pid(&self) -> u32 {
         self.process.id()
     }
 
     /// Returns which stage it is; `None` for an additional process.
-    pub(crate) fn stage(&self) -> Option<StageId> {
+    pub fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
     }
 
-    /// Returns whether it is a follower, and not in the stream.
-    pub(crate) fn follows(&self) -> bool {
-        FollowerId::by_name(self.name()).is_some()
-    }
-
-    /// Returns when the process was started.
-    pub(crate) fn started(&self) -> Instant {
-        self.started
-    }
-
-    /// Returns its newest heartbeat; `None` before the first one, or if it writes none.
-    pub(crate) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
+    pub fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
-    /// Returns the cause of its last death.
-    pub(crate) fn last_death(&self) -> Option<&str> {
-        self.last_death.as_deref()
-    }
-
     /// Returns whether it has lived for longer than the window for counting its deaths.
-    pub(crate) fn has_outlived_its_window(&self) -> bool {
+    pub fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
     }
 
-    pub(crate) fn backoff(&self) -> Duration {
+    pub fn backoff(&self) -> Duration {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
 
-    /// Returns whether no pose was published since the last restart.
-    pub(crate) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
+    pub fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
         self.pose_at_restart == Some(newest_pose)
     }
 
-    pub(crate) fn has_exited(&mut self) -> bool {
+    pub fn has_exited(&mut self) -> bool {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
             if self.status.is_some() {
@@ -219,15 +178,14 @@ impl Child {
         self.status.is_some()
     }
 
-    /// Returns whether it was found to have exited.
-    pub(crate) fn is_known_to_have_exited(&self) -> bool {
+    pub fn is_known_to_have_exited(&self) -> bool {
         self.status.is_some()
     }
 
     /// Counts a death against the restart policy.
-    pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
+    pub fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
-            return Err(SuperviseError::Permanent { message });
+            return Err(SuperviseError::Process(message));
         }
         let policy = self.plan.restart;
         let window = Duration::try_from_secs_f64(policy.window_s).unwrap_or(Duration::MAX);
@@ -236,24 +194,19 @@ impl Child {
         if self.deaths.len() <= policy.limit {
             return Ok(());
         }
-        Err(SuperviseError::TooManyDeaths {
-            stage: self.name().to_owned(),
-            times: self.deaths.len(),
-            window_s: policy.window_s,
-            cause: death.cause.clone(),
-            output: death
-                .last_output
-                .as_ref()
-                .map_or(String::new(), |line| format!(" ({line})")),
-        })
+        Err(SuperviseError::Process(format!(
+            "{} died {} times within {} s, the last time by {}{}; giving up",
+            self.name(),
+            self.deaths.len(),
+            policy.window_s,
+            death.cause,
+            death.output()
+        )))
     }
 
     /// Returns the failure of an ended process if a restart would repeat it.
-    pub(crate) fn permanent_failure(&mut self) -> Option<String> {
-        let status = self.status?;
-        if status.code() != Some(PERMANENT) {
-            return None;
-        }
+    pub fn permanent_failure(&mut self) -> Option<String> {
+        self.status?;
         let death = self.death();
         self.message_if_permanent(&death)
     }
@@ -264,7 +217,7 @@ impl Child {
         is_permanent.then(|| death.last_output.clone().unwrap_or_else(message))
     }
 
-    pub(crate) fn death(&mut self) -> Death {
+    pub fn death(&mut self) -> Death {
         let status = self.status.unwrap_or_default();
         let cause = match (status.signal(), status.code()) {
             (Some(signal), _) if signal == Signal::BUS.as_raw() => {
@@ -282,35 +235,33 @@ impl Child {
         }
     }
 
-    pub(crate) fn terminate(&self) {
+    pub fn terminate(&self) {
         if self.status.is_none() {
             self.signal(Signal::TERM);
         }
     }
 
-    /// Kills the process without waiting for its end.
-    pub(crate) fn kill(&self) {
+    pub fn kill(&self) {
         if self.status.is_none() {
             self.signal(Signal::KILL);
         }
     }
 
-    /// Waits for the end of a killed process.
-    pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
+    pub fn await_end(&mut self) -> Result<(), SuperviseError> {
         // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
             self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
         }
         match self.has_exited() {
             true => Ok(()),
-            false => Err(SuperviseError::Undying {
-                stage: self.name().to_owned(),
-                pid: self.pid(),
-            }),
+            false => Err(SuperviseError::System(format!(
+                "{} (process {}) does not end although it was killed: the kernel holds it, as it does while a disk or a network folder does not answer",
+                self.name(),
+                self.pid()
+            ))),
         }
     }
 
-    /// Sends a signal to the process group.
     fn signal(&self, signal: Signal) {
         if let Some(group) = Pid::from_raw(self.process.id() as i32) {
             // Fails if all its processes have exited meanwhile.
@@ -319,7 +270,7 @@ impl Child {
     }
 
     /// Returns the reason that the process gave, else the last line of its output.
-    pub(crate) fn last_output(&mut self) -> Option<String> {
+    pub fn last_output(&mut self) -> Option<String> {
         let reason = fs::read_to_string(&self.last_words).ok();
         let _ = fs::remove_file(&self.last_words);
         let output = self.log.last_line();
@@ -328,8 +279,7 @@ impl Child {
     }
 }
 
-/// Returns the file where a process writes why it ended. One that stands by has its own: the other
-/// is in use.
+/// A process that stands by has its own file: the other is in use.
 fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
     let stands_by = position == Position::Taken;
     manifest.root.join(launch::last_words(name, stands_by))

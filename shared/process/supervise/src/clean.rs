@@ -23,7 +23,6 @@ use gyre_stage::{
 
 use crate::SuperviseError;
 
-/// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
 /// Time after which a file that is still empty is not being created any more, which takes
 /// microseconds.
@@ -42,8 +41,7 @@ pub(crate) fn remove_dead(
     within_limit(move || clean(&manifest, &transport, all_dead))
 }
 
-/// Removes all resources of dead observers, and the files that would make a stage wait for a
-/// stopped one.
+/// Also removes the files that would make a stage wait for a stopped observer.
 pub(crate) fn remove_dead_observers(
     manifest: &Manifest,
     transport: &Transport,
@@ -90,8 +88,7 @@ fn clean(manifest: &Manifest, transport: &Transport, all_dead: bool) -> bool {
     transport.remove_dead_nodes()
 }
 
-/// Removes empty files of living observers that stay empty: an observer was stopped while it
-/// created them.
+/// An observer was stopped while it created them.
 fn unlink_unfinished_files(manifest: &Manifest, transport: &Transport) {
     let ports = ports_of(manifest, &transport.living_nodes(observer::NAME));
     let unfinished = || {

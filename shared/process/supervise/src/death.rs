@@ -2,17 +2,21 @@
 
 use std::fmt;
 
-/// The death of a process.
 #[derive(Clone, Debug)]
 pub struct Death {
-    /// True if a signal killed it, false if it exited.
     pub killed: bool,
     /// The cause, as `signal 9` or `exit code 3`.
     pub cause: String,
-    /// The exit code, if it exited.
     pub code: Option<i32>,
-    /// The last line of its output.
     pub last_output: Option<String>,
+}
+
+impl Death {
+    /// Returns the last line of its output in parentheses, or nothing.
+    pub(crate) fn output(&self) -> String {
+        let line = self.last_output.as_ref();
+        line.map_or_else(String::new, |line| format!(" ({line})"))
+    }
 }
 
 /// The end of a sentence, as `it ended with exit code 3, its last line: ...`.

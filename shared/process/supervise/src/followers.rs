@@ -10,7 +10,6 @@ use gyre_stage::{
 
 use crate::{Ending, Plan, Stall, SuperviseError, roles::Roles};
 
-/// Stalls of a follower in a row after which the run ends.
 const MAX_STALLS: usize = 3;
 
 /// The clock of the follower that the run waits for.
@@ -18,7 +17,6 @@ const MAX_STALLS: usize = 3;
 struct Clock {
     /// The follower, its position, and since when it is there.
     at: Option<(usize, Progress, Instant)>,
-    /// The farthest that this follower has been.
     farthest: u64,
     /// The stalls without going farther.
     stalls_in_a_row: usize,
@@ -41,16 +39,15 @@ impl Clock {
     }
 }
 
-/// The followers of a run.
 pub(crate) struct Followers<'a> {
     roles: Roles<'a>,
     manifest: &'a Manifest,
     limit: Option<Duration>,
     /// True when the stream has ended, and followers are waited for.
-    are_awaited: bool,
+    pub are_awaited: bool,
     clock: Clock,
     /// Those that are not restarted any more, and why.
-    given_up: Vec<(usize, SuperviseError)>,
+    pub given_up: Vec<(usize, String)>,
 }
 
 /// The decision about a follower that the run waits for.
@@ -75,21 +72,6 @@ impl<'a> Followers<'a> {
         }
     }
 
-    /// The stream has ended: from here on followers are waited for.
-    pub fn begin_to_be_awaited(&mut self) {
-        self.are_awaited = true;
-    }
-
-    /// Returns whether the stream has ended.
-    pub fn are_awaited(&self) -> bool {
-        self.are_awaited
-    }
-
-    /// A follower is not restarted any more.
-    pub fn give_up(&mut self, follower: usize, error: SuperviseError) {
-        self.given_up.push((follower, error));
-    }
-
     /// Returns whether a process is a follower that is not restarted any more.
     pub fn has_given_up(&self, process: usize) -> bool {
         self.given_up.iter().any(|(it, _)| *it == process)
@@ -101,8 +83,7 @@ impl<'a> Followers<'a> {
         self.roles.follows(process) && !self.has_given_up(process) && !is_done()
     }
 
-    /// Returns the followers to wait for. None reads what one writes that is not restarted any
-    /// more, or one behind it.
+    /// No follower reads a log of one that was given up, or one behind it.
     pub fn behind(&self) -> Vec<usize> {
         let given_up = self.given_up.iter().map(|(follower, _)| *follower).min();
         let followers = self.roles.followers();
@@ -113,18 +94,16 @@ impl<'a> Followers<'a> {
     /// Returns how the run ends when no follower is behind any more.
     pub fn end(&mut self) -> Result<Ending, SuperviseError> {
         match self.given_up.pop() {
-            Some((_, error)) => Err(error),
+            Some((_, reason)) => Err(SuperviseError::Process(reason)),
             None => Ok(Ending::Complete),
         }
     }
 
-    /// Returns the position of a follower in its logs.
     pub fn progress_of(&self, follower: usize) -> Progress {
         follower::progress_of(self.manifest, self.roles.name(follower))
             .map_or_else(Progress::default, |(progress, _)| progress)
     }
 
-    /// Judges a follower that is here, and whose process was started then.
     pub fn judge(&mut self, follower: usize, progress: Progress, started: Instant) -> Patience {
         let waited = self.clock.look(follower, progress, started);
         let Some(limit) = self.limit.filter(|limit| waited > *limit) else {
@@ -177,7 +156,7 @@ mod tests {
         assert!(followers.is_behind(FOLLOWER) && !followers.is_behind(MASKING));
         assert_eq!(followers.behind(), [FOLLOWER]);
         assert!(matches!(followers.end(), Ok(Ending::Complete)));
-        followers.give_up(FOLLOWER, SuperviseError::TransportStuck);
+        followers.given_up.push((FOLLOWER, "it dies".to_owned()));
         assert!(!followers.is_behind(FOLLOWER) && followers.behind().is_empty());
         assert!(followers.end().is_err());
     }

@@ -26,7 +26,6 @@ use rustix::{
 
 use crate::{ProcessStat, SuperviseError, end::ends_within};
 
-/// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -45,9 +44,11 @@ impl Guardian {
         root: &Path,
         groups: impl IntoIterator<Item = u32>,
     ) -> Result<Self, SuperviseError> {
-        let failed = |source| SuperviseError::Guardian {
-            command: command.join(" "),
-            source,
+        let failed = |error: io::Error| {
+            let command = command.join(" ");
+            SuperviseError::System(format!(
+                "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {error}"
+            ))
         };
         let (program, arguments) = command
             .split_first()
@@ -83,8 +84,7 @@ impl Guardian {
         self.process.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
-    /// Takes a group from the care of the guardian: its processes are dead, and its number may be
-    /// reused.
+    /// Forgets a group: the processes are dead, and the number may be reused.
     pub fn forget(&self, group: u32) {
         if let Some(pipe) = &self.groups {
             send(pipe, -(group as RawPid));
@@ -152,8 +152,7 @@ pub fn guard(mut messages: impl Read, root: Option<&Path>) {
     }
 }
 
-/// Returns whether a group has a process that has not ended. One that nobody waits for stays as a
-/// zombie.
+/// A process that nobody waits for stays as a zombie.
 fn lives(group: Pid) -> bool {
     let group = group.as_raw_pid() as u32;
     ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)
@@ -186,18 +185,5 @@ mod tests {
         assert!(!ends_within(&forgotten, Duration::from_millis(50)));
         forgotten.kill().unwrap();
         forgotten.wait().unwrap();
-    }
-
-    #[test]
-    fn a_guardian_has_the_groups_that_there_are_when_it_begins() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("messages");
-        let script = format!("cat > {}", path.display());
-        let command = ["sh", "-c", &script].map(str::to_owned);
-        let guardian = Guardian::start(&command, folder.path(), [7, 9]).unwrap();
-        guardian.forget(7);
-        drop(guardian);
-        let messages = [7, 9, -7].map(RawPid::to_ne_bytes);
-        assert_eq!(std::fs::read(path).unwrap(), messages.as_flattened());
     }
 }

@@ -45,7 +45,6 @@ mod swaps;
 mod tests;
 mod usage;
 mod wake_limit;
-mod watchdog;
 
 pub use death::Death;
 pub use guardian::guard;

@@ -21,7 +21,6 @@ use crate::Plan;
 
 /// Size of a log beyond which it is moved to its `.old`, bytes.
 const MAX: u64 = 8 << 20;
-/// Time between two looks at the sizes.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// The log of a supervisor that runs in the background, by its name in the folder of the logs.
@@ -46,7 +45,6 @@ pub(crate) struct Log {
     collected: Arc<Mutex<Collected>>,
 }
 
-/// The end of the pipe, and the file.
 struct Collected {
     input: PipeReader,
     file: File,
@@ -87,7 +85,6 @@ impl Log {
         Ok(Self { output, collected })
     }
 
-    /// Returns the pipe for the stage's output.
     pub fn output(&self) -> &PipeWriter {
         &self.output
     }
@@ -127,8 +124,7 @@ fn lock(collected: &Mutex<Collected>) -> MutexGuard<'_, Collected> {
 }
 
 impl Collected {
-    /// Writes the data in the pipe; returns whether more can come. A stage that floods is left for
-    /// others to look at after a while.
+    /// A stage that floods is left for others to look at after a while.
     fn take(&mut self) -> bool {
         for _ in 0..ROUNDS {
             match rustix::io::read(&self.input, &mut self.buffer[..]) {
@@ -142,7 +138,6 @@ impl Collected {
         true
     }
 
-    /// Writes the first bytes of the buffer.
     fn write(&mut self, bytes: usize) {
         let bytes = &self.buffer[..bytes];
         // On a full disk it is lost but for its end.
@@ -194,7 +189,6 @@ impl Logs {
         }
     }
 
-    /// Bounds all logs, if it is time to look.
     pub fn bound_if_due(&mut self) {
         let now = Instant::now();
         if now >= self.due {
@@ -208,13 +202,11 @@ impl Logs {
     }
 }
 
-/// Returns the log of a process.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
-/// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append
-/// to it do not notice.
+/// The processes that append to it do not notice.
 fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {
@@ -252,27 +244,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    #[test]
-    fn a_log_that_is_too_long_keeps_its_end() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("stage.txt");
-        let mut log = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .unwrap();
-        log.write_all(&vec![b'x'; 3 * MAX as usize]).unwrap();
-        log.write_all(b"the end").unwrap();
-        bound(&path);
-        log.write_all(b"and on").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"and on");
-        let old = fs::read(folder.path().join("stage.txt.old")).unwrap();
-        assert_eq!(old.len() as u64, MAX);
-        assert!(old.ends_with(b"the end"));
-        bound(&path);
-        assert_eq!(fs::read(&path).unwrap(), b"and on");
-    }
-
     fn log(folder: &tempfile::TempDir) -> (Log, PathBuf) {
         let path = folder.path().join("stage.txt");
         (Log::at(&path).unwrap(), path)
@@ -306,18 +277,6 @@ mod tests {
         }
         let caught = format!("{said}{frames}cannot open the radar\n");
         assert_eq!(last_line(&caught), Some("cannot open the radar"));
-    }
-
-    #[test]
-    fn only_the_end_of_a_long_output_is_looked_at_whatever_its_bytes() {
-        let folder = tempfile::tempdir().unwrap();
-        let (mut log, _) = log(&folder);
-        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
-        log.output().write_all(b"\nthe end\n").unwrap();
-        assert_eq!(log.last_line().as_deref(), Some("the end"));
-        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
-        let line = log.last_line().unwrap();
-        assert_eq!(line.chars().count(), TAIL);
     }
 
     #[test]

@@ -7,7 +7,6 @@ use std::{
 
 const CGROUPS: &str = "/sys/fs/cgroup";
 
-/// The memory that the machine and the control groups leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
     /// Bytes that programs of the machine can still allocate, if the kernel reports them.
@@ -19,7 +18,6 @@ pub struct Room {
 }
 
 impl Room {
-    /// Reads it.
     pub fn now() -> Self {
         let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
         let groups = limits(Path::new(CGROUPS), &groups);
@@ -86,7 +84,6 @@ fn limits(root: &Path, groups: &str) -> Vec<Group> {
         .collect()
 }
 
-/// The files of a limit and of its use.
 type Files = (&'static str, &'static str);
 const V2: Files = ("memory.max", "memory.current");
 const V1: Files = ("memory.limit_in_bytes", "memory.usage_in_bytes");

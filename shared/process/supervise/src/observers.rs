@@ -7,7 +7,7 @@ use std::{
 
 use gyre_stage::Manifest;
 
-use crate::run::Run;
+use crate::{clean, run::Run};
 
 const PERIOD: Duration = Duration::from_secs(1);
 /// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage
@@ -26,15 +26,15 @@ impl Sweep {
         }
     }
 
-    /// Removes what killed observers left, if it is time to look. `processes` is the number of the
-    /// run's own processes.
+    /// `processes` is the number of the run's own processes.
     pub(crate) fn run_if_due(&mut self, run: &Run<'_>, processes: usize) {
         let now = Instant::now();
         if now < self.due {
             return;
         }
         let has_observers = nodes(run.manifest()) > processes;
-        let failed = has_observers && run.remove_dead_observers().is_err();
+        let failed =
+            has_observers && clean::remove_dead_observers(run.manifest(), &run.transport).is_err();
         self.due = now
             + match failed {
                 true => PERIOD_AFTER_FAILURE,

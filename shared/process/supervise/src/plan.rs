@@ -10,9 +10,8 @@ use gyre_run::{RestartPolicy, Scheduling};
 use gyre_stage::{Manifest, StageError, follower::Progress};
 use thiserror::Error;
 
-use crate::{death::Death, program::Program};
+use crate::program::Program;
 
-/// The plan of a run.
 #[derive(Debug)]
 pub struct Plan {
     /// The manifest, which all processes read.
@@ -46,7 +45,6 @@ pub struct StagePlan {
     pub programs: Vec<Program>,
     /// The directory for starting it; `None`: the supervisor's.
     pub directory: Option<PathBuf>,
-    /// The scheduling of the process.
     pub scheduling: Scheduling,
     pub restart: RestartPolicy,
     /// True if it keeps running when the others are restarted: a live source, since a radar does
@@ -63,6 +61,21 @@ pub struct StagePlan {
 pub const END_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl StagePlan {
+    /// A process that is restarted alone, with the usual policy.
+    pub fn new(name: &str, command: Vec<String>) -> Self {
+        Self {
+            name: name.to_owned(),
+            command,
+            programs: Vec::new(),
+            directory: None,
+            scheduling: Scheduling::default(),
+            restart: RestartPolicy::default(),
+            outlives_restarts: false,
+            restarts_all: false,
+            end_timeout: END_TIMEOUT,
+        }
+    }
+
     /// Returns a file of the command that has changed since this plan was made.
     pub(crate) fn changed_file(&self) -> Option<&Path> {
         let changed = self.programs.iter().find(|program| !program.is_unchanged());
@@ -73,62 +86,22 @@ impl StagePlan {
 /// An event during a run.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// A process was started for the first time.
-    Started {
-        /// The name of the stage.
-        stage: &'a str,
-        pid: u32,
-    },
     Pose(&'a PoseHeader),
-    Died {
-        /// The name of the stage.
-        stage: &'a str,
-        death: &'a Death,
-    },
-    Restarted {
-        /// The only one, by its name; `None` if they are several: all stages, or all but a live
-        /// source.
-        only: Option<&'a str>,
-    },
+    /// A sentence for the person at the terminal.
+    Note(&'a str),
+    /// The run makes no progress: the stages that may be the cause are about to be restarted.
+    Stalled(&'a Stall),
     /// The stream has ended, and a follower has not come to the end of its logs.
     Following {
-        /// The name of the follower.
         follower: &'a str,
         progress: Progress,
     },
-    /// A follower is not restarted any more. Odometry continues, and then the run ends with this
-    /// error.
-    GaveUp {
-        /// The name of the follower.
-        follower: &'a str,
-        error: &'a SuperviseError,
-    },
-    /// The end of the recording, or a notice of a stage about the run.
-    Note {
-        sentence: &'a str,
-    },
-    /// The run makes no progress: the stages that may be the cause are about to be restarted.
-    Stalled(&'a Stall),
     /// All stages have opened their topics, for the first time.
     Ready,
     /// The supervisor has looked at all processes, which it does every 200 ms or more often.
     Watched,
     /// The stages are asked to end.
     Stopping,
-    /// Another program has taken the place of a stage.
-    Swapped {
-        /// The name of the stage.
-        stage: &'a str,
-        /// The program and its arguments.
-        command: &'a [String],
-    },
-    /// The program that had taken the place of a stage has failed: the one before it is started
-    /// again.
-    WentBack {
-        /// The name of the stage.
-        stage: &'a str,
-        reason: &'a str,
-    },
 }
 
 /// A run that makes no progress, although no process has died.
@@ -141,25 +114,13 @@ pub enum Stall {
     Scan { limit: Duration },
     /// The stream has ended, and a follower stays where it is in its logs.
     #[error("{follower} has made no progress for {limit:?} (run.stall_timeout_s)")]
-    Follower {
-        /// The name of the follower.
-        follower: String,
-        limit: Duration,
-    },
+    Follower { follower: String, limit: Duration },
     #[error(
         "{process} hangs: it has not come to its next wait for {limit:?} (run.stall_timeout_s)"
     )]
-    Hang {
-        /// The name of the stage or follower.
-        process: String,
-        limit: Duration,
-    },
+    Hang { process: String, limit: Duration },
     #[error("{stage} has not opened its topics within {limit:?} (run.start_timeout_s)")]
-    Start {
-        /// The name of the stage.
-        stage: String,
-        limit: Duration,
-    },
+    Start { stage: String, limit: Duration },
 }
 
 /// An error that ends a run.
@@ -167,78 +128,12 @@ pub enum Stall {
 pub enum SuperviseError {
     #[error(transparent)]
     Stage(#[from] StageError),
-    #[error(
-        "cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration"
-    )]
-    Spawn {
-        /// The name of the stage.
-        stage: String,
-        command: String,
-        source: std::io::Error,
-    },
-    #[error(
-        "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
-    )]
-    Scheduling {
-        /// The name of the stage.
-        stage: String,
-        /// The key and its value.
-        what: String,
-        source: std::io::Error,
-    },
-    #[error(
-        "cannot limit the time in which processors wake to {us} us (run.cpu_wake_us): /dev/cpu_dma_latency: {source}; give the user \
-         of the run the right to write to it, or leave the key out"
-    )]
-    WakeLimit {
-        /// The limit, us.
-        us: u32,
-        source: std::io::Error,
-    },
-    #[error(
-        "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {source}"
-    )]
-    Guardian {
-        command: String,
-        source: std::io::Error,
-    },
-    #[error(
-        "{stage} (process {pid}) does not end although it was killed: the kernel holds it, as it does while a disk or a network \
-         folder does not answer"
-    )]
-    Undying {
-        /// The name of the stage.
-        stage: String,
-        pid: u32,
-    },
-    #[error(
-        "{stage} has ended, and {path} has changed since it was started: another program may compute other motions; put back the one that the run was begun with"
-    )]
-    Replaced {
-        /// The name of the stage.
-        stage: String,
-        path: PathBuf,
-    },
-    /// A stage failed in a way that a restart would repeat.
-    #[error("{message}")]
-    Permanent {
-        /// The stage's own error message.
-        message: String,
-    },
-    #[error(
-        "{stage} died {times} times within {window_s} s, the last time by {cause}{output}; giving up"
-    )]
-    TooManyDeaths {
-        /// The name of the stage.
-        stage: String,
-        times: usize,
-        /// The window for counting them, s.
-        window_s: f64,
-        /// The cause of the last death.
-        cause: String,
-        /// The last line of output, in parentheses.
-        output: String,
-    },
+    /// One process cannot be kept alive.
+    #[error("{0}")]
+    Process(String),
+    /// The system refuses a thing that the supervisor itself needs.
+    #[error("{0}")]
+    System(String),
     #[error(
         "{0}, three times in a row, although no stage died; log.jsonl and log/ show what the stages wait for"
     )]
@@ -246,18 +141,4 @@ pub enum SuperviseError {
     /// The transport's cleanup hangs; only a new run under new names helps.
     #[error("the transport does not finish cleaning up after a dead process")]
     TransportStuck,
-}
-
-impl SuperviseError {
-    /// Returns whether it means that one process cannot be kept alive.
-    pub(crate) fn is_of_one_process(&self) -> bool {
-        matches!(
-            self,
-            Self::Spawn { .. }
-                | Self::Scheduling { .. }
-                | Self::Replaced { .. }
-                | Self::Permanent { .. }
-                | Self::TooManyDeaths { .. }
-        )
-    }
 }

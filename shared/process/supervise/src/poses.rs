@@ -4,17 +4,15 @@ use std::time::Instant;
 
 use gyre_messages::{Item, Pose, flag};
 use gyre_stage::{
-    Listener, Manifest, StageError,
+    Manifest, StageError,
     reader::{Port, Received},
     schedule,
 };
 
 use crate::run::Run;
 
-/// The reader of the poses.
 pub(crate) struct Poses {
-    port: Port<Pose>,
-    /// The item of the newest pose, and when it was seen.
+    pub port: Port<Pose>,
     newest: Option<Item>,
     seen: Option<Instant>,
 }
@@ -22,7 +20,6 @@ pub(crate) struct Poses {
 /// A message with new information.
 pub(crate) enum News {
     Pose(Received<Pose>),
-    /// The end of the stream.
     End,
 }
 
@@ -33,10 +30,6 @@ impl Poses {
             newest: None,
             seen: None,
         })
-    }
-
-    pub fn listener(&self) -> &Listener {
-        self.port.listener()
     }
 
     /// Returns the next new pose, or the end; `None` if nothing has come.

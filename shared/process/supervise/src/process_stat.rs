@@ -2,7 +2,6 @@
 
 use std::{fs, str::FromStr};
 
-/// A process, as of now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProcessStat {
     pub pid: u32,
@@ -10,7 +9,6 @@ pub struct ProcessStat {
     pub group: u32,
     /// True if it has ended, and nobody has waited for it yet.
     pub has_ended: bool,
-    /// Processor time of all threads, s.
     pub cpu_s: f64,
     /// When it was started, ticks of the system since its start: another process that is given the
     /// same number has another time.

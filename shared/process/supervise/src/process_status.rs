@@ -20,8 +20,12 @@ pub(crate) fn status_of(process: usize, processes: &Processes, run: &Run<'_>) ->
         Some(beat) => activity(beat),
     };
     ProcessStatus {
-        is_swapped: child.plan().command != run.plan.stages[process].command,
-        restarts: processes.restarts_of(process),
+        is_swapped: child.plan.command != run.plan.stages[process].command,
+        restarts: processes
+            .restarts
+            .get(child.name())
+            .copied()
+            .unwrap_or_default(),
         received: match child.stage() {
             Some(StageId::RadarReplay) => received_of(run.manifest()),
             _ => None,
@@ -39,7 +43,6 @@ pub(crate) fn activity(beat: Heartbeat) -> Activity {
     }
 }
 
-/// Returns the state of a process that has never been restarted.
 pub(crate) fn of_child(
     child: &Child,
     beat: Option<Heartbeat>,
@@ -48,13 +51,13 @@ pub(crate) fn of_child(
     ProcessStatus {
         name: child.name().to_owned(),
         pid: child.pid(),
-        command: child.plan().command.clone(),
+        command: child.plan.command.clone(),
         is_swapped: false,
         activity,
         activity_s: beat.map(|beat| beat.age().as_secs_f64()),
-        uptime_s: child.started().elapsed().as_secs_f64(),
+        uptime_s: child.started.elapsed().as_secs_f64(),
         restarts: 0,
-        last_death: child.last_death().map(str::to_owned),
+        last_death: child.last_death.clone(),
         missed: None,
         received: None,
     }

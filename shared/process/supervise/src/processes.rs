@@ -18,13 +18,8 @@ use crate::{
 #[derive(Default)]
 pub(crate) struct Processes {
     children: Vec<Child>,
-    restarts: BTreeMap<String, usize>,
-}
-
-/// The processes that have ended.
-pub(crate) struct Ended {
-    pub stages: Vec<usize>,
-    pub followers: Vec<usize>,
+    /// The numbers of restarts by name.
+    pub restarts: BTreeMap<String, usize>,
 }
 
 impl Index<usize> for Processes {
@@ -42,15 +37,11 @@ impl IndexMut<usize> for Processes {
 }
 
 impl Processes {
-    /// Starts all processes of the plan.
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
             let child = Child::spawn(stage, &plan.manifest, &run.starter(), Position::Free)?;
-            run.say(Event::Started {
-                stage: &stage.name,
-                pid: child.pid(),
-            });
+            run.note(&format!("{:20} pid {}", stage.name, child.pid()));
             self.children.push(child);
         }
         Ok(())
@@ -64,24 +55,21 @@ impl Processes {
         self.children.iter()
     }
 
-    /// Returns the processes that have ended.
-    pub fn ended(&mut self, roles: Roles<'_>) -> Ended {
+    /// Returns the followers and the stages that have ended.
+    pub fn ended(&mut self, roles: Roles<'_>) -> (Vec<usize>, Vec<usize>) {
         let children = self.children.iter_mut().enumerate();
         let ended = children.filter_map(|(i, child)| child.has_exited().then_some(i));
-        let (followers, stages) = ended.partition(|i| roles.follows(*i));
-        Ended { stages, followers }
+        ended.partition(|i| roles.follows(*i))
     }
 
-    /// Returns whether all stages have opened their topics.
     pub fn are_ready(&self, run: &Run<'_>) -> bool {
         let mut stages = self.iter().filter(|child| child.stage().is_some());
         stages.all(|stage| !run.is_starting(stage))
     }
 
-    /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
         let opening = self.iter().filter(|child| run.is_starting(child));
-        opening.min_by_key(|child| child.started())
+        opening.min_by_key(|child| child.started)
     }
 
     /// Returns whether a process has not come to its next wait for longer than `since`. A stage
@@ -98,7 +86,7 @@ impl Processes {
     /// it must not be ended.
     pub fn why_not_again(&self, mut processes: impl Iterator<Item = usize>) -> Option<String> {
         processes.find_map(|i| {
-            let (name, path) = (self[i].name(), self[i].changed_file()?.display());
+            let (name, path) = (self[i].name(), self[i].plan.changed_file()?.display());
             Some(format!(
                 "{name} could not be started again, since {path} has changed; `gyre swap {name}` takes the new one"
             ))
@@ -110,20 +98,10 @@ impl Processes {
         *self.restarts.entry(name).or_default() += 1;
     }
 
-    pub fn restarts_of(&self, process: usize) -> usize {
-        let restarts = self.restarts.get(self[process].name());
-        restarts.copied().unwrap_or_default()
-    }
-
-    /// Returns the numbers of restarts by name.
-    pub fn into_restarts(self) -> BTreeMap<String, usize> {
-        self.restarts
-    }
-
     /// Lets programs pass their trials that have worked on a pose since they took the place of
     /// others.
     pub fn pass_trials(&mut self, pose: &PoseHeader, recovery: &Recovery) {
-        let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial());
+        let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial);
         for child in on_trial {
             let has_passed = match child.stage() {
                 Some(hop) => recovery.has_worked(hop, pose),
@@ -131,7 +109,7 @@ impl Processes {
                 None => child.has_outlived_its_window(),
             };
             if has_passed {
-                child.pass_trial();
+                child.is_on_trial = false;
             }
         }
     }
@@ -171,7 +149,7 @@ impl Processes {
         let children = self.children.iter_mut();
         let living = children.filter_map(|child| (!child.has_exited()).then_some(&*child));
         let timeouts = living.map(|child| match is_complete {
-            true => child.plan().end_timeout,
+            true => child.plan.end_timeout,
             false => END_TIMEOUT,
         });
         timeouts.max()
@@ -183,6 +161,6 @@ impl Processes {
         let children = self.children.iter_mut().enumerate();
         let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));
         let failed = judged.find_map(|(_, child)| child.permanent_failure());
-        failed.map_or(Ok(()), |message| Err(SuperviseError::Permanent { message }))
+        failed.map_or(Ok(()), |message| Err(SuperviseError::Process(message)))
     }
 }

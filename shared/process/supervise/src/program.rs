@@ -13,25 +13,13 @@ pub struct Program {
     state: State,
 }
 
-/// The metadata that changes with a file's content.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct State {
-    device: u64,
-    inode: u64,
-    size: u64,
-    modified: (i64, i64),
-}
+/// The metadata that changes with a file's content: device, inode, size, and time of change, s and
+/// ns.
+type State = (u64, u64, u64, i64, i64);
 
-impl State {
-    fn of(path: &Path) -> io::Result<Self> {
-        let file = fs::metadata(path)?;
-        Ok(Self {
-            device: file.dev(),
-            inode: file.ino(),
-            size: file.size(),
-            modified: (file.mtime(), file.mtime_nsec()),
-        })
-    }
+fn state_of(path: &Path) -> io::Result<State> {
+    let it = fs::metadata(path)?;
+    Ok((it.dev(), it.ino(), it.size(), it.mtime(), it.mtime_nsec()))
 }
 
 impl Program {
@@ -39,7 +27,7 @@ impl Program {
     pub fn at(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),
-            state: State::of(path)?,
+            state: state_of(path)?,
         })
     }
 
@@ -67,7 +55,7 @@ impl Program {
     }
 
     pub(crate) fn is_unchanged(&self) -> bool {
-        State::of(&self.path).is_ok_and(|state| state == self.state)
+        state_of(&self.path).is_ok_and(|state| state == self.state)
     }
 }
 

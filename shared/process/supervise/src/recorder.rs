@@ -44,8 +44,8 @@ impl Recorder {
             return Ok(None);
         };
         let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Position::Free) {
-            Err(error) if error.is_of_one_process() => {
-                say(run, &error.to_string());
+            Err(SuperviseError::Process(reason)) => {
+                run.note(&reason);
                 return Ok(None);
             }
             spawned => spawned?,
@@ -82,7 +82,7 @@ impl Recorder {
             None => {
                 run.guardian.forget(self.child.pid());
                 let death = self.child.death();
-                say(run, &self.judge(death));
+                run.note(&self.judge(death));
                 Ok(())
             }
             Some(restart_at) if Instant::now() < restart_at => Ok(()),
@@ -117,9 +117,9 @@ impl Recorder {
         self.restarts += 1;
         let respawned = self.child.respawn(run.manifest(), &run.starter(), newest);
         match respawned {
-            Err(error) if error.is_of_one_process() => {
+            Err(SuperviseError::Process(reason)) => {
                 self.has_ended = true;
-                say(run, &error.to_string());
+                run.note(&reason);
                 Ok(())
             }
             respawned => respawned,
@@ -133,8 +133,7 @@ impl Recorder {
         ending: Option<Ending>,
     ) -> Result<(), SuperviseError> {
         if self.restart_at.is_some() {
-            say(
-                run,
+            run.note(
                 "the recorder died, and the run ended before it was started again: the end of the recording is missing",
             );
         }
@@ -156,7 +155,6 @@ impl Recorder {
         self.respawn(run, newest)
     }
 
-    /// Returns the state of the recorder.
     pub fn status(&self, manifest: &Manifest) -> ProcessStatus {
         let beat = self.child.heartbeat(manifest);
         let activity = match beat {
@@ -201,13 +199,7 @@ impl Recorder {
             ),
             false => output,
         };
-        say(run, &sentence);
+        run.note(&sentence);
         Ok(())
-    }
-}
-
-fn say(run: &mut Run<'_>, sentence: &str) {
-    if !sentence.is_empty() {
-        run.say(Event::Note { sentence });
     }
 }

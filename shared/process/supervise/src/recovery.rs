@@ -12,7 +12,8 @@ use crate::roles::Roles;
 pub(crate) struct Recovery {
     /// Without a pose yet that the new process worked on.
     recovering: Vec<Recovering>,
-    times: Vec<Duration>,
+    /// The time from each death to the first pose with work of the new process.
+    pub times: Vec<Duration>,
 }
 
 /// A restarted stage without a pose that the new process has worked on.
@@ -29,7 +30,6 @@ impl Recovering {
 }
 
 impl Recovery {
-    /// A stage has been started again that died, or was ended, at `died_ns`.
     pub fn begins(&mut self, hop: StageId, died_ns: i64) {
         self.recovering.push(Recovering {
             hop,
@@ -38,7 +38,6 @@ impl Recovery {
         });
     }
 
-    /// Returns whether the newest process of a stage has worked on a pose.
     pub fn has_worked(&self, hop: StageId, pose: &PoseHeader) -> bool {
         let started = self.recovering.iter().rev().find(|stage| stage.hop == hop);
         started.is_none_or(|stage| stage.has_worked(pose))
@@ -54,11 +53,6 @@ impl Recovery {
             .extend(recovered.map(|stage| {
                 Duration::from_nanos((clock::now_ns() - stage.died_ns).max(0) as u64)
             }));
-    }
-
-    /// Returns the time from each death to the first pose with work of the new process.
-    pub fn into_times(self) -> Vec<Duration> {
-        self.times
     }
 }
 
@@ -112,7 +106,7 @@ mod tests {
         assert!(recovery.has_worked(StageId::Masking, &pose));
         recovery.see(&pose);
         recovery.see(&pose);
-        let times = recovery.into_times();
+        let times = recovery.times;
         assert_eq!(times.len(), 1);
         assert!(times[0] >= Duration::from_secs(7));
     }

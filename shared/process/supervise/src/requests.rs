@@ -10,7 +10,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, StagePlan, SuperviseError,
+    StagePlan, SuperviseError,
     process_status::status_of,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
@@ -79,8 +79,7 @@ impl Supervisor<'_> {
         )));
     }
 
-    /// Ends a process and starts it again, which counts as a restart and not as a death. A process
-    /// that could not be started again continues.
+    /// It counts as a restart and not as a death.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(name) else {
             let newest = self.poses.newest_seq();
@@ -110,14 +109,13 @@ impl Supervisor<'_> {
         self.restart(stages, clock::now_ns())
     }
 
-    /// Starts a program that is to replace another. The client has its answer when that has done
-    /// so, and has worked on a first pose.
+    /// The client has its answer when the new program has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
             return Ok(());
         };
-        if let Some(reason) = self.swaps.why_not_now(self.followers.are_awaited()) {
+        if let Some(reason) = self.swaps.why_not_now(self.followers.are_awaited) {
             client.answer(&Answer::Refused(reason.to_owned()));
             return Ok(());
         }
@@ -128,8 +126,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends a process, and starts another program in its place. If that cannot be started, the one
-    /// before is started again.
+    /// If the new program cannot be started, the one before is started again.
     fn swap_cold(
         &mut self,
         process: usize,
@@ -144,7 +141,7 @@ impl Supervisor<'_> {
         self.processes[process].change(plan);
         self.restart_and_count(&stages)?;
         let child = &mut self.processes[process];
-        if child.is_on_trial() {
+        if child.is_on_trial {
             self.has_swapped(process, client);
             return Ok(());
         }
@@ -189,9 +186,13 @@ impl Supervisor<'_> {
             return Ok(());
         }
         let (child, client) = standby.into_parts(self.run.manifest());
-        let stages = match self.ends_between_scans(process)? {
-            true => vec![process],
-            false => stages,
+        self.processes[process].kill();
+        self.processes[process].await_end()?;
+        // If the one before has left no scan without a pose, the one after it numbers scans as it
+        // would have, and no other process need be restarted with it.
+        let stages = match self.poses.are_owed(self.run.manifest()) {
+            true => stages,
+            false => vec![process],
         };
         self.replace(&stages, clock::now_ns(), Some((process, child)))?;
         self.stalls.restarted();
@@ -199,23 +200,12 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it
-    /// numbers scans as it would have, and no other process need be restarted with it.
-    fn ends_between_scans(&mut self, process: usize) -> Result<bool, SuperviseError> {
-        self.processes[process].kill();
-        self.processes[process].await_end()?;
-        Ok(!self.poses.are_owed(self.run.manifest()))
-    }
-
-    /// Reports that a program has replaced another, and lets the client wait until it proves
-    /// itself.
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
-        self.swaps.has_swapped(child.plan(), self.poses.count());
-        self.run.say(Event::Swapped {
-            stage: child.name(),
-            command: &child.plan().command,
-        });
+        self.swaps.has_swapped(&child.plan, self.poses.count());
+        let (name, command) = (child.name(), child.plan.command.join(" "));
+        self.run
+            .note(&format!("{name} is `{command}` from here on"));
         self.swaps.await_trial(process, child, client);
     }
 
@@ -225,7 +215,7 @@ impl Supervisor<'_> {
         let mut processes: Vec<ProcessStatus> = processes.collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
         let phase = match () {
-            () if self.followers.are_awaited() => Phase::Following,
+            () if self.followers.are_awaited => Phase::Following,
             () if processes.iter().any(is_starting) => Phase::Starting,
             () => Phase::Running,
         };

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use gyre_stage::clock;
 
 use crate::{
-    Event, Stall, SuperviseError, child::Child, death::Death, followers::Patience,
-    recovery::restarted_after, supervisor::Supervisor, watchdog::Starting,
+    Event, Stall, SuperviseError, child::Child, clean, death::Death, followers::Patience,
+    recovery::restarted_after, supervisor::Supervisor,
 };
 
 impl Supervisor<'_> {
@@ -22,10 +22,9 @@ impl Supervisor<'_> {
         self.restart(&restarted, died_ns)
     }
 
-    /// Returns to the programs before those on trial while another stage fails: their messages may
-    /// be the cause. Returns them.
+    /// The messages of a program on trial may be why another stage fails. Returns them.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
-        let is_blamed = |i: &usize| self.processes[*i].is_on_trial() && !dead.contains(i);
+        let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
         blamed.retain(|i| self.go_back(*i, failure));
         blamed
@@ -38,14 +37,13 @@ impl Supervisor<'_> {
         for i in dead {
             let child = &mut self.processes[*i];
             let death = child.death();
-            self.run.say(Event::Died {
-                stage: child.name(),
-                death: &death,
-            });
+            let (name, output) = (child.name(), death.output());
+            self.run
+                .note(&format!("{name} died by {}{output}", death.cause));
             if !death.killed {
                 backoff = backoff.max(child.backoff());
-                if !child.is_on_trial() {
-                    failure = Some(format!("{} died after it: {death}", child.name()));
+                if !child.is_on_trial {
+                    failure = Some(format!("{name} died after it: {death}"));
                 }
             }
             self.require_restart(*i, &death)?;
@@ -55,10 +53,9 @@ impl Supervisor<'_> {
         Ok(failure)
     }
 
-    /// Checks whether a dead process may be started again, by its policy. One that has taken the
-    /// place of another gives way to it first.
+    /// A program that has taken the place of another gives way to it first.
     fn require_restart(&mut self, process: usize, death: &Death) -> Result<(), SuperviseError> {
-        if self.processes[process].is_on_trial() && self.go_back(process, &death.to_string()) {
+        if self.processes[process].is_on_trial && self.go_back(process, &death.to_string()) {
             return Ok(());
         }
         match self.processes[process].may_restart(death) {
@@ -75,7 +72,9 @@ impl Supervisor<'_> {
         let has_gone_back = self.swaps.go_back(process, child, begun, reason, poses);
         if has_gone_back {
             let stage = &begun.name;
-            self.run.say(Event::WentBack { stage, reason });
+            self.run.note(&format!(
+                "{stage} goes back to the program before: {reason}"
+            ));
         }
         has_gone_back
     }
@@ -92,15 +91,17 @@ impl Supervisor<'_> {
     }
 
     fn say_restarted(&mut self, processes: &[usize]) {
-        let only = match processes {
-            [process] => Some(self.processes[*process].name()),
-            _ => None,
-        };
-        self.run.say(Event::Restarted { only });
+        match processes {
+            [process] => {
+                let name = self.processes[*process].name();
+                self.run.note(&format!("restarted {name}"));
+            }
+            // All stages, or all but a live source.
+            _ => self.run.note("restarted the stages from the journal"),
+        }
     }
 
-    /// Ends processes and starts replacements; one of the replacements may be the process on
-    /// standby.
+    /// One of the replacements may be the process on standby.
     pub(crate) fn replace(
         &mut self,
         processes: &[usize],
@@ -109,7 +110,8 @@ impl Supervisor<'_> {
     ) -> Result<(), SuperviseError> {
         self.processes.kill(processes, &self.run.guardian)?;
         let all_dead = processes.len() == self.processes.len() && successor.is_none();
-        self.run.remove_dead(all_dead)?;
+        let (manifest, transport) = (self.run.manifest(), &self.run.transport);
+        clean::remove_dead(manifest, transport, all_dead)?;
         for i in processes {
             match successor.take_if(|(place, _)| place == i) {
                 Some((_, successor)) => {
@@ -125,17 +127,15 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Starts a process again. If its program cannot be started and had replaced another, the
-    /// replaced program is started.
+    /// If its program cannot be started and had replaced another, that one is started.
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
             let (manifest, starter) = (self.run.manifest(), self.run.starter());
             match self.processes[process].respawn(manifest, &starter, newest) {
-                Err(error) if error.is_of_one_process() => {
-                    let reason = error.to_string();
+                Err(SuperviseError::Process(reason)) => {
                     if !self.go_back(process, &reason) {
-                        return Err(error);
+                        return Err(SuperviseError::Process(reason));
                     }
                     self.processes[process].start_error = Some(reason);
                 }
@@ -147,10 +147,8 @@ impl Supervisor<'_> {
     /// Looks for stalls, and restarts what may be stuck.
     pub(crate) fn look_for_stalls(&mut self) -> Result<(), SuperviseError> {
         let (processes, run) = (&self.processes, &self.run);
-        let starting = processes.starting(run).map(|child| Starting {
-            stage: child.name(),
-            since: child.started(),
-        });
+        let starting = processes.starting(run);
+        let starting = starting.map(|child| (child.name(), child.started));
         let hangs = |process, since| processes.hangs(process, since, run);
         let found = self.stalls.look(Instant::now(), hangs, starting);
         for (follower, hang) in found.followers {
@@ -170,26 +168,24 @@ impl Supervisor<'_> {
         self.run.say(Event::Stalled(&stall));
         for i in &processes {
             self.processes.count_restart(*i);
-            if self.processes[*i].is_on_trial() {
+            if self.processes[*i].is_on_trial {
                 self.go_back(*i, &stall.to_string());
             }
         }
         self.restart(&processes, clock::now_ns())
     }
 
-    /// Restarts dead followers that are not at their end. The stages do not notice, and one that
-    /// cannot be restarted does not end them.
+    /// The stages do not notice, and one that cannot be restarted does not end them.
     pub(crate) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let mut dead = dead.to_vec();
         dead.retain(|i| self.followers.is_behind(*i));
         for follower in dead {
             match self.recover_follower(follower) {
-                Err(error) if error.is_of_one_process() => {
-                    self.run.say(Event::GaveUp {
-                        follower: self.processes[follower].name(),
-                        error: &error,
-                    });
-                    self.followers.give_up(follower, error);
+                Err(SuperviseError::Process(reason)) => {
+                    let name = self.processes[follower].name();
+                    self.run
+                        .note(&format!("{reason}: odometry goes on without {name}"));
+                    self.followers.given_up.push((follower, reason));
                 }
                 recovered => recovered?,
             }
@@ -205,8 +201,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Reports the progress of a follower, and ends one that has stayed there for too long: it is
-    /// then started again as after a death.
+    /// A follower that has stayed for too long is started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
         let progress = self.followers.progress_of(follower);
@@ -214,7 +209,7 @@ impl Supervisor<'_> {
             follower: child.name(),
             progress,
         });
-        match self.followers.judge(follower, progress, child.started()) {
+        match self.followers.judge(follower, progress, child.started) {
             Patience::Wait => Ok(()),
             Patience::GiveUp(stall) => Err(SuperviseError::Stalled(stall)),
             Patience::End(stall) => {

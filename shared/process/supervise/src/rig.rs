@@ -13,7 +13,6 @@ use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
     StageId, Topic,
 };
-use gyre_run::RestartPolicy;
 use gyre_stage::{
     Launch, Manifest, StageError,
     reader::Port,
@@ -25,7 +24,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Death, END_TIMEOUT, Scheduling, StagePlan, SuperviseError,
+    Death, Scheduling, StagePlan, SuperviseError,
     child::Child,
     clean,
     guardian::Guardian,
@@ -46,8 +45,7 @@ pub struct Rig<'a> {
     _root: RunRoot,
 }
 
-/// A process that is started in a [`Rig`] as the supervisor starts it. It is killed when this value
-/// is dropped.
+/// A process as the supervisor starts it. It is killed when this value is dropped.
 pub struct Process {
     child: Child,
     death: Option<Death>,
@@ -95,7 +93,6 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// The same without any service.
     pub fn without_services(
         mut manifest: Manifest,
         configuration: &str,
@@ -119,12 +116,10 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Returns the manifest of the run.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// Starts a process with the environment and the process group that a stage of this name has.
     /// The output is appended to the log of the process.
     pub fn start(
         &self,
@@ -133,15 +128,8 @@ impl<'a> Rig<'a> {
         scheduling: &Scheduling,
     ) -> Result<Process, SuperviseError> {
         let plan = StagePlan {
-            name: name.to_owned(),
-            command: command.to_vec(),
-            programs: Vec::new(),
-            directory: None,
             scheduling: scheduling.clone(),
-            restart: RestartPolicy::default(),
-            outlives_restarts: false,
-            restarts_all: false,
-            end_timeout: END_TIMEOUT,
+            ..StagePlan::new(name, command.to_vec())
         };
         let starter = Starter::new(self.signals, &self.guardian);
         Ok(Process {
@@ -155,7 +143,6 @@ impl<'a> Rig<'a> {
         clean::remove_dead(&self.manifest, &self.transport, false)
     }
 
-    /// Returns whether a stage has opened the topic that it publishes.
     pub fn has_publisher(&self, stage: StageId) -> bool {
         let services = self.services.as_ref();
         services.is_some_and(|services| services.has_publisher(stage))
@@ -174,7 +161,6 @@ impl<'a> Rig<'a> {
         self.manifest.root.join(self.transport.services_folder())
     }
 
-    /// Opens a topic of a stage for publishing.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         self.ports().feed(topic)
     }
@@ -191,8 +177,7 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// Sleeps until one of these topics has a new reader, a connection has something to read, or
-    /// `limit` has passed; true on a request to stop.
+    /// True on a request to stop.
     pub fn sleep_until_readable(
         &self,
         feeds: &[&dyn Feed],
@@ -206,8 +191,7 @@ impl<'a> Rig<'a> {
         Ok(woken.stop)
     }
 
-    /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to
-    /// stop.
+    /// True on a request to stop.
     pub fn sleep(&self, taps: &[&dyn Tap], limit: Duration) -> Result<bool, StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
         self.signals.sleep_until_any(&listeners, limit)
@@ -256,12 +240,10 @@ impl<'a> Ports<'a> {
         }
     }
 
-    /// Opens a topic of a stage for publishing.
     pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
         of_topic!(topic, self.open_feed())
     }
 
-    /// Subscribes to a topic of a stage.
     pub fn tap(&self, topic: &str, joining: Joining) -> Result<Box<dyn Tap>, StageError> {
         of_topic!(topic, self.open_tap(joining))
     }

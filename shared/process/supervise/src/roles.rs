@@ -18,12 +18,10 @@ impl<'a> Roles<'a> {
         &self.0[process].name
     }
 
-    /// Returns whether a process is a follower, and not in the stream.
     pub fn follows(self, process: usize) -> bool {
         FollowerId::by_name(self.name(process)).is_some()
     }
 
-    /// Returns the process of this name.
     pub fn named(self, name: &str) -> Option<usize> {
         self.0.iter().position(|plan| plan.name == name)
     }
@@ -59,39 +57,10 @@ impl<'a> Roles<'a> {
         self.0[process].restarts_all
     }
 
-    /// Returns the processes to restart with one of them: itself, or all stages if its restart
-    /// alone does not recover its state.
     pub fn restarted_with(self, process: usize) -> Vec<usize> {
         match self.restarts_all(process) {
             true => self.all_but_survivors(&[process]),
             false => vec![process],
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tests::{FOLLOWER, MASKING, REFINEMENT, SOURCE, plan};
-
-    #[test]
-    fn a_restart_of_all_spares_a_living_live_source_and_the_followers() {
-        let mut plan = plan();
-        let all = |plan: &Plan, dead: &[usize]| Roles::of(plan).all_but_survivors(dead);
-        assert_eq!(all(&plan, &[]), [SOURCE, MASKING, REFINEMENT]);
-        plan.stages[SOURCE].outlives_restarts = true;
-        assert_eq!(all(&plan, &[MASKING]), [MASKING, REFINEMENT]);
-        assert_eq!(all(&plan, &[SOURCE]), [SOURCE, MASKING, REFINEMENT]);
-        assert!(Roles::of(&plan).follows(FOLLOWER));
-    }
-
-    #[test]
-    fn a_process_is_restarted_alone_unless_that_does_not_recover_its_state() {
-        let mut plan = plan();
-        assert_eq!(Roles::of(&plan).restarted_with(MASKING), [MASKING]);
-        plan.stages[MASKING].restarts_all = true;
-        let all = [SOURCE, MASKING, REFINEMENT];
-        assert_eq!(Roles::of(&plan).restarted_with(MASKING), all);
-        assert_eq!(Roles::of(&plan).restarted_with(FOLLOWER), [FOLLOWER]);
     }
 }

@@ -11,8 +11,8 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, Plan, SuperviseError, child::Child, clean, guardian::Guardian, roles::Roles,
-    start::Starter, wake_limit::WakeLimit,
+    Event, Plan, SuperviseError, child::Child, guardian::Guardian, roles::Roles, start::Starter,
+    wake_limit::WakeLimit,
 };
 
 /// The plan of a run, and its processes' needs for start, observation and cleanup.
@@ -26,7 +26,7 @@ pub(crate) struct Run<'a> {
     // Dropped in this order: services, node.
     services: Services,
     pub node: Node,
-    transport: Transport,
+    pub transport: Transport,
     pub signals: Signals,
 }
 
@@ -73,6 +73,13 @@ impl<'a> Run<'a> {
         (self.observe)(event);
     }
 
+    /// Reports a sentence, unless it is empty.
+    pub fn note(&mut self, sentence: &str) {
+        if !sentence.is_empty() {
+            self.say(Event::Note(sentence));
+        }
+    }
+
     /// Returns whether a process is a stage that has not opened its topics.
     pub fn is_starting(&self, child: &Child) -> bool {
         let stage = child.stage();
@@ -96,18 +103,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Removes all that dead processes have left in the transport.
-    pub fn remove_dead(&self, all_dead: bool) -> Result<(), SuperviseError> {
-        clean::remove_dead(self.manifest(), &self.transport, all_dead)
-    }
-
-    /// Removes all that dead observers have left there.
-    pub fn remove_dead_observers(&self) -> Result<(), SuperviseError> {
-        clean::remove_dead_observers(self.manifest(), &self.transport)
-    }
-
-    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried
-    /// again at the next wake-up.
+    /// Without room for a process it is tried again at the next wake-up.
     pub fn keep_guardian(&mut self, groups: impl Iterator<Item = u32>) {
         if self.guardian.has_ended()
             && let Ok(guardian) =

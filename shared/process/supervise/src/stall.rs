@@ -1,29 +1,38 @@
 //! Finds a run that makes no progress although no process has died, and decides which processes to
 //! restart.
+//!
+//! The clock runs only while something is owed: a pose, of an item that the source has published,
+//! or an item that the source should have published by its own schedule. So neither slow playback
+//! nor a gap in a recording is a stall. A stage that has not opened its topics is starting: it may
+//! load a model, and has a limit of its own. The stages on another machine are watched there.
 
 use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
-use gyre_stage::{Manifest, wake};
-
-use crate::{
-    Plan, Stall,
-    roles::Roles,
-    watchdog::{Starting, Watchdog},
+use gyre_stage::{
+    Manifest, remote_progress,
+    schedule::{self, Schedule},
+    wake,
 };
+
+use crate::{Plan, Stall, roles::Roles};
 
 /// Time between two looks at the heartbeats.
 const PERIOD: Duration = Duration::from_secs(1);
 /// Time after which all processes have beaten again that can run.
 const RESUMED: Duration = wake::MAX_WAIT.saturating_mul(5);
 
-/// The stalls of a run.
 pub(crate) struct Stalls<'a> {
     roles: Roles<'a>,
     manifest: &'a Manifest,
     limit: Option<Duration>,
-    watchdog: Watchdog,
+    start_limit: Option<Duration>,
     looks: Looks,
+    /// Scans up to that of the newest pose, by `Item::published`.
+    poses: u64,
+    /// The owed item, and since when without any progress.
+    owed: Option<(Stall, Instant)>,
+    stalls_in_a_row: usize,
 }
 
 /// The result of a look at all processes.
@@ -31,7 +40,6 @@ pub(crate) struct Stalls<'a> {
 pub(crate) struct Found {
     /// Followers that hang: odometry continues, with them or without.
     pub followers: Vec<(usize, Stall)>,
-    /// The stall of the stages.
     pub stall: Option<Stall>,
 }
 
@@ -41,31 +49,37 @@ impl<'a> Stalls<'a> {
             roles: Roles::of(plan),
             manifest: &plan.manifest,
             limit: plan.stall_timeout,
-            watchdog: Watchdog::new(plan),
+            start_limit: plan.start_timeout,
             looks: Looks::new(),
+            poses: 0,
+            owed: None,
+            stalls_in_a_row: 0,
         }
     }
 
     /// Resets the clock at a new pose.
     pub fn progress(&mut self, pose: &Item) {
-        self.watchdog.progress(pose);
+        self.poses = pose.published.saturating_add(1);
+        self.owed = None;
+        self.stalls_in_a_row = 0;
     }
 
     /// Resets the clock at a restart.
     pub fn restarted(&mut self) {
-        self.watchdog.restarted();
+        self.owed = None;
     }
 
     /// Looks for stalls. `hangs` returns whether a process has not come to its next wait for longer
-    /// than a time, and `starting` is the stage that has been opening its topics for longest.
+    /// than a time, and `starting` is the stage that has been opening its topics for longest, and
+    /// since when.
     pub fn look(
         &mut self,
         now: Instant,
         hangs: impl Fn(usize, Duration) -> bool,
-        starting: Option<Starting<'_>>,
+        starting: Option<(&str, Instant)>,
     ) -> Found {
         if self.looks.are_resuming(now) {
-            self.watchdog.restarted();
+            self.restarted();
             return Found::default();
         }
         let mut followers = Vec::new();
@@ -79,7 +93,10 @@ impl<'a> Stalls<'a> {
                 return Found { followers, stall };
             }
         }
-        let stall = self.watchdog.look(self.manifest, starting);
+        let stall = match starting {
+            Some((stage, since)) => self.late_start(stage, since),
+            None => self.late_message(),
+        };
         let cause = match stall {
             // The wait for the due message began some time after the process began to hang.
             Some(Stall::Pose { limit } | Stall::Scan { limit }) => {
@@ -90,6 +107,47 @@ impl<'a> Stalls<'a> {
         Found {
             followers,
             stall: cause.or(stall),
+        }
+    }
+
+    fn late_start(&mut self, stage: &str, since: Instant) -> Option<Stall> {
+        self.owed = None;
+        let limit = self.start_limit?;
+        (since.elapsed() > limit).then(|| Stall::Start {
+            stage: stage.to_owned(),
+            limit,
+        })
+    }
+
+    /// Returns the stall, if something has been owed for too long.
+    fn late_message(&mut self) -> Option<Stall> {
+        let limit = self.limit?;
+        let owed = match remote_progress::owes(self.manifest, self.poses) {
+            true => None,
+            false => self.owed_by(schedule::read(self.manifest), limit),
+        };
+        self.owe(owed);
+        let (stall, since) = self.owed.as_ref()?;
+        (since.elapsed() > limit).then(|| stall.clone())
+    }
+
+    /// Returns the message that is due now. A source without a schedule always owes a scan, and so
+    /// the run a pose.
+    fn owed_by(&self, source: Option<Schedule>, limit: Duration) -> Option<Stall> {
+        let Some(source) = source else {
+            return Some(Stall::Pose { limit });
+        };
+        match (source.published > self.poses, source.is_late()) {
+            (true, _) => Some(Stall::Pose { limit }),
+            (false, true) => Some(Stall::Scan { limit }),
+            (false, false) => None,
+        }
+    }
+
+    /// Keeps the clock running as long as the same is owed.
+    fn owe(&mut self, stall: Option<Stall>) {
+        if self.owed.as_ref().map(|(owed, _)| owed) != stall.as_ref() {
+            self.owed = stall.map(|stall| (stall, Instant::now()));
         }
     }
 
@@ -116,7 +174,8 @@ impl<'a> Stalls<'a> {
     /// stages; `None` when that does not help either.
     pub fn remedy(&mut self, stall: &Stall) -> Option<Vec<usize>> {
         let roles = self.roles;
-        Some(match (self.watchdog.count(), stall) {
+        self.stalls_in_a_row += 1;
+        Some(match (self.stalls_in_a_row, stall) {
             (1, Stall::Hang { process, .. }) => roles
                 .named(process)
                 .map_or_else(Vec::new, |process| roles.restarted_with(process)),
@@ -170,6 +229,7 @@ impl Looks {
 mod tests {
     use super::*;
     use crate::tests::{FOLLOWER, LIMIT, MASKING, REFINEMENT, SOURCE, plan};
+    use gyre_stage::clock;
 
     /// Looks when the heartbeats are due and each of these processes has hung for a time.
     fn found(stalls: &mut Stalls<'_>, hanging: &[usize], time: Duration) -> Found {
@@ -239,5 +299,45 @@ mod tests {
         assert_eq!(late, Some(vec![MASKING, REFINEMENT]));
         let late = stalls.remedy(&Stall::Pose { limit: LIMIT });
         assert_eq!(late, Some(vec![SOURCE, MASKING, REFINEMENT]));
+    }
+
+    #[test]
+    fn a_published_scan_owes_its_pose_and_a_source_the_scan_that_is_due() {
+        let plan = plan();
+        let (pose, scan) = (Stall::Pose { limit: LIMIT }, Stall::Scan { limit: LIMIT });
+        let mut stalls = Stalls::of(&plan);
+        for (poses, published, due_in_s, expected) in [
+            (0, 0, 3600, None),
+            (7, 7, 3600, None),
+            (0, 1, 3600, Some(&pose)),
+            (7, 8, 3600, Some(&pose)),
+            (7, 8, -1, Some(&pose)),
+            (0, 0, -1, Some(&scan)),
+            (7, 7, -1, Some(&scan)),
+        ] {
+            stalls.poses = poses;
+            let due_ns = clock::now_ns() + due_in_s * 1_000_000_000;
+            let source = Schedule { published, due_ns };
+            let owed = stalls.owed_by(Some(source), LIMIT);
+            assert_eq!(owed.as_ref(), expected, "{poses}, {published}, {due_in_s}");
+        }
+        let without_schedule = stalls.owed_by(None, LIMIT);
+        assert_eq!(without_schedule, Some(pose));
+    }
+
+    #[test]
+    fn the_clock_runs_while_the_same_is_owed_and_stops_at_a_pose() {
+        let plan = plan();
+        let mut stalls = Stalls::of(&plan);
+        let pose = || Some(Stall::Pose { limit: LIMIT });
+        stalls.owe(pose());
+        let since = stalls.owed.clone();
+        stalls.owe(pose());
+        assert_eq!(stalls.owed, since);
+        stalls.progress(&Item::default());
+        assert_eq!(stalls.owed, None);
+        stalls.owe(pose());
+        stalls.owe(None);
+        assert_eq!(stalls.owed, None);
     }
 }

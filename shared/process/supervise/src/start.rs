@@ -41,7 +41,6 @@ impl<'a> Starter<'a> {
         Self { signals, guardian }
     }
 
-    /// Starts a stage. Its standard output and error go to `log`.
     pub fn start(
         &self,
         plan: &StagePlan,
@@ -49,10 +48,11 @@ impl<'a> Starter<'a> {
         log: &PipeWriter,
         position: Position,
     ) -> Result<Child, SuperviseError> {
-        let failed = |source| SuperviseError::Spawn {
-            stage: plan.name.clone(),
-            command: plan.command.join(" "),
-            source,
+        let (stage, program) = (&plan.name, plan.command.join(" "));
+        let failed = |source: io::Error| {
+            SuperviseError::Process(format!(
+                "cannot start {stage} with `{program}`: {source}; see [stages.{stage}] command in the configuration"
+            ))
         };
         let (mut refused, refusals) = io::pipe().map_err(failed)?;
         let mut command = self
@@ -72,18 +72,16 @@ impl<'a> Starter<'a> {
         match started {
             Err(source) if refused.read(&mut key).is_ok_and(|length| length > 0) => {
                 let key = Key::ALL[usize::from(key[0]).min(Key::ALL.len() - 1)];
-                Err(SuperviseError::Scheduling {
-                    stage: plan.name.clone(),
-                    what: scheduling::describe(&plan.scheduling, key),
-                    source,
-                })
+                let what = scheduling::describe(&plan.scheduling, key);
+                Err(SuperviseError::Process(format!(
+                    "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
+                )))
             }
-            started => Ok(started.map_err(failed)?),
+            started => started.map_err(failed),
         }
     }
 
-    /// Returns the command of a process, which writes to `refusals` which key of its scheduling the
-    /// system refuses.
+    /// It writes to `refusals` which key of its scheduling the system refuses.
     fn command(
         &self,
         plan: &StagePlan,
@@ -126,8 +124,7 @@ impl<'a> Starter<'a> {
     }
 }
 
-/// Starts a process, and tries again while the system has no room for one. A request to stop ends
-/// the attempts.
+/// A request to stop ends the attempts.
 fn with_patience<T>(
     mut start: impl FnMut() -> io::Result<T>,
     mut pause: impl FnMut(Duration) -> Result<bool, StageError>,

@@ -17,13 +17,13 @@ use crate::{
     log::Logs,
     observers::Sweep,
     poses::{News, Poses},
-    processes::{Ended, Processes},
+    processes::Processes,
     recorder::Recorder,
     recovery::Recovery,
     run::Run,
     socket::ControlSocket,
     stall::Stalls,
-    swaps::Swaps,
+    swaps::{ENDED, Swaps},
 };
 
 /// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not
@@ -43,7 +43,6 @@ pub fn supervise(
     Ok(supervisor.report(ending?))
 }
 
-/// The parts of the supervisor.
 pub(crate) struct Supervisor<'a> {
     pub processes: Processes,
     /// No stage, and no follower.
@@ -103,11 +102,15 @@ impl<'a> Supervisor<'a> {
             }
             self.swaps.continue_trial(&self.processes, &self.run);
             self.continue_swap()?;
-            self.report_readiness();
+            if !self.is_ready && self.processes.are_ready(&self.run) {
+                self.is_ready = true;
+                self.run.say(Event::Ready);
+            }
+            self.run.say(Event::Watched);
             self.keep_house()?;
             let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
             self.observers.run_if_due(&self.run, own);
-            let Ended { stages, followers } = self.processes.ended(self.run.roles());
+            let (followers, stages) = self.processes.ended(self.run.roles());
             self.recover_followers(&followers)?;
             match stages.is_empty() {
                 true => self.look_for_stalls()?,
@@ -120,12 +123,12 @@ impl<'a> Supervisor<'a> {
     /// read what one writes that dies again and again. The stream has ended, so the death of a
     /// stage changes nothing.
     fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
-        self.followers.begin_to_be_awaited();
+        self.followers.are_awaited = true;
         // The last pose may have been the first of a program on trial.
         self.swaps.continue_trial(&self.processes, &self.run);
         self.swaps.end_trial(&self.processes);
-        if let Some((standby, reason)) = self.swaps.end() {
-            self.give_up(standby, reason);
+        if let Some(standby) = self.swaps.standby.take() {
+            self.give_up(standby, ENDED);
         }
         loop {
             let mut behind = self.followers.behind();
@@ -145,7 +148,7 @@ impl<'a> Supervisor<'a> {
 
     /// Sleeps until there is a pose, a request or a dead process; true on a request to stop.
     fn sleep(&self) -> Result<bool, SuperviseError> {
-        let (poses, requests) = (self.poses.listener(), self.socket.descriptor());
+        let (poses, requests) = (self.poses.port.listener(), self.socket.descriptor());
         let woken =
             self.run
                 .signals
@@ -168,14 +171,6 @@ impl<'a> Supervisor<'a> {
         Ok(false)
     }
 
-    fn report_readiness(&mut self) {
-        if !self.is_ready && self.processes.are_ready(&self.run) {
-            self.is_ready = true;
-            self.run.say(Event::Ready);
-        }
-        self.run.say(Event::Watched);
-    }
-
     /// Keeps the logs short, and the processes alive that nothing depends on.
     fn keep_house(&mut self) -> Result<(), SuperviseError> {
         self.logs.bound_if_due();
@@ -183,13 +178,10 @@ impl<'a> Supervisor<'a> {
             && let Some(sentence) = sink::notice(self.run.manifest())
         {
             self.has_notice = true;
-            let sentence = &sentence;
-            self.run.say(Event::Note { sentence });
+            self.run.note(&sentence);
         }
-        let standby = self.swaps.pid();
-        let others = standby
-            .into_iter()
-            .chain(self.recorder.as_ref().map(Recorder::pid));
+        let standby = self.swaps.standby.iter().map(|it| it.child.pid());
+        let others = standby.chain(self.recorder.as_ref().map(Recorder::pid));
         let living = self.processes.iter().map(Child::pid).chain(others);
         self.run.keep_guardian(living);
         match &mut self.recorder {
@@ -218,10 +210,10 @@ impl<'a> Supervisor<'a> {
     fn report(self, ending: Ending) -> Report {
         Report {
             ending,
-            restarts: self.processes.into_restarts(),
-            recovery: self.recovery.into_times(),
+            restarts: self.processes.restarts,
+            recovery: self.recovery.times,
             counters: counters(self.run.plan),
-            swaps: self.swaps.into_done(),
+            swaps: self.swaps.done,
         }
     }
 }

@@ -29,29 +29,26 @@ use trial::Trial;
 /// such moment.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-const ENDED: &str = "the stream has ended";
+pub(crate) const ENDED: &str = "the stream has ended";
 
-/// The swaps of a run: at most one at a time.
 #[derive(Default)]
 pub(crate) struct Swaps {
-    /// The program that stands by to replace another.
-    standby: Option<Standby>,
+    pub standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
-    done: Vec<Swapped>,
+    /// The programs that have taken the place of others, in order.
+    pub done: Vec<Swapped>,
 }
 
-/// A program that stands by.
 pub(crate) struct Standby {
     /// The index of the process whose place it is to take.
     pub process: usize,
-    child: Child,
+    pub child: Child,
     client: Client,
     since: Instant,
     ready: Option<Instant>,
 }
 
-/// The decision about the program that stands by.
 pub(crate) enum Step {
     Wait,
     TakeOver(Standby),
@@ -71,8 +68,6 @@ impl Swaps {
         }
     }
 
-    /// Starts a program that is to take the place of a process. The client has its answer when that
-    /// has done so, and has worked on a first pose.
     pub fn begin(
         &mut self,
         process: usize,
@@ -92,16 +87,13 @@ impl Swaps {
                     ready: None,
                 });
             }
-            Err(error) if error.is_of_one_process() => {
-                client.answer(&Answer::Refused(error.to_string()));
-            }
+            Err(SuperviseError::Process(reason)) => client.answer(&Answer::Refused(reason)),
             Err(error) => return Err(error),
         }
         Ok(())
     }
 
-    /// Looks after the program that stands by. `is_in_flight` returns whether a scan lacks its
-    /// pose.
+    /// `is_in_flight` returns whether a scan lacks its pose.
     pub fn step(&mut self, run: &Run<'_>, is_in_flight: impl FnOnce() -> bool) -> Step {
         let Some(mut standby) = self.standby.take() else {
             return Step::Wait;
@@ -130,33 +122,21 @@ impl Swaps {
         }
     }
 
-    /// Returns the swap that is not done yet.
     pub fn pending(&self, processes: &Processes, run: &Run<'_>) -> Option<PendingSwap> {
-        let Some(standby) = &self.standby else {
-            return self.pending_trial(processes);
+        let (child, since, limit) = match (&self.standby, &self.trial) {
+            (Some(standby), _) => (&standby.child, standby.since, run.plan.start_timeout),
+            (None, Some(trial)) => (&processes[trial.process], trial.since, Some(trial::LIMIT)),
+            (None, None) => return None,
         };
-        let plan = standby.child.plan();
         Some(PendingSwap {
-            process: plan.name.clone(),
-            command: plan.command.clone(),
-            has_taken_over: false,
-            waited_s: standby.since.elapsed().as_secs_f64(),
-            limit_s: run.plan.start_timeout.map(|limit| limit.as_secs_f64()),
+            process: child.plan.name.clone(),
+            command: child.plan.command.clone(),
+            has_taken_over: self.standby.is_none(),
+            waited_s: since.elapsed().as_secs_f64(),
+            limit_s: limit.map(|limit| limit.as_secs_f64()),
         })
     }
 
-    /// Takes back the program that stands by, since the stream has ended.
-    pub fn end(&mut self) -> Option<(Standby, &'static str)> {
-        let standby = self.standby.take()?;
-        Some((standby, ENDED))
-    }
-
-    /// Returns the process that stands by.
-    pub fn pid(&self) -> Option<u32> {
-        self.standby.as_ref().map(|standby| standby.child.pid())
-    }
-
-    /// Records that a program has replaced another.
     pub fn has_swapped(&mut self, plan: &StagePlan, after_poses: u64) {
         self.done.push(Swapped {
             stage: plan.name.clone(),
@@ -165,8 +145,7 @@ impl Swaps {
         });
     }
 
-    /// Returns to the program before a swap, or to `begun`, the program of the run's begin, from
-    /// the next start on; false without such a program.
+    /// False without a program to go back to.
     pub fn go_back(
         &mut self,
         process: usize,
@@ -175,30 +154,21 @@ impl Swaps {
         reason: &str,
         after_poses: u64,
     ) -> bool {
-        let failed = child.plan().command.join(" ");
+        let failed = child.plan.command.join(" ");
         let has_gone_back = child.go_back(begun);
         if has_gone_back {
             self.fail_trial(process, child.name(), &failed, reason);
-            self.has_swapped(child.plan(), after_poses);
+            self.has_swapped(&child.plan, after_poses);
         }
         has_gone_back
-    }
-
-    /// Returns the programs that have taken the place of others, in order.
-    pub fn into_done(self) -> Vec<Swapped> {
-        self.done
     }
 }
 
 impl Standby {
-    /// Returns why it cannot take over any more.
     fn why_not(&mut self) -> Option<String> {
         if self.child.has_exited() {
             let death = self.child.death();
-            let output = death
-                .last_output
-                .map_or(String::new(), |line| format!(" ({line})"));
-            return Some(format!("it ended by {}{output}", death.cause));
+            return Some(format!("it ended by {}{}", death.cause, death.output()));
         }
         let has_gone = self.client.has_gone();
         has_gone.then(|| "who has asked for it has gone".to_owned())
@@ -210,11 +180,10 @@ impl Standby {
         (self.child, self.client)
     }
 
-    /// Informs the client why the program cannot take over, and ends the program. Returns the
-    /// process that it was.
+    /// Returns the process that it was.
     pub fn give_up(self, reason: &str) -> u32 {
         let name = self.child.name();
-        let command = self.child.plan().command.join(" ");
+        let command = self.child.plan.command.join(" ");
         let sentence =
             format!("{name} goes on as before, since `{command}` cannot take over: {reason}");
         self.client.answer(&Answer::Refused(sentence));
@@ -245,7 +214,6 @@ fn judge(
     }
 }
 
-/// Returns the plan of a process after a swap.
 pub(crate) fn plan_of(begun: &StagePlan, swap: &Swap) -> StagePlan {
     match &swap.command {
         None => begun.clone(),
@@ -261,7 +229,6 @@ pub(crate) fn plan_of(begun: &StagePlan, swap: &Swap) -> StagePlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::{MASKING, plan};
 
     #[test]
     fn a_ready_program_takes_over_between_scans_or_when_there_is_no_such_moment() {
@@ -287,22 +254,5 @@ mod tests {
         let swaps = Swaps::default();
         assert_eq!(swaps.why_not_now(true), Some(ENDED));
         assert_eq!(swaps.why_not_now(false), None);
-    }
-
-    #[test]
-    fn a_swap_changes_the_command_alone() {
-        let begun = &plan().stages[MASKING];
-        let swap = |command| Swap {
-            process: begun.name.clone(),
-            command,
-            directory: "/".into(),
-            cold: false,
-        };
-        let other = plan_of(begun, &swap(Some(vec!["other".to_owned()])));
-        assert_eq!(
-            (other.name.as_str(), other.command),
-            ("masking", vec!["other".to_owned()])
-        );
-        assert_eq!(plan_of(begun, &swap(None)).command, begun.command);
     }
 }

@@ -8,9 +8,7 @@ use std::{
 use gyre_messages::{FollowerId, Limits, StageId, Window};
 use gyre_stage::Manifest;
 
-use gyre_run::RestartPolicy;
-
-use crate::{Plan, Scheduling, StagePlan};
+use crate::{Plan, StagePlan};
 
 /// The processes of [`plan`].
 pub(crate) const SOURCE: usize = 0;
@@ -62,25 +60,13 @@ pub(crate) fn plan() -> Plan {
     ];
     Plan {
         manifest: manifest(&PathBuf::from("/nonexistent")),
-        stages: stages.map(stage).into(),
+        stages: stages
+            .map(|name| StagePlan::new(name, vec!["true".to_owned()]))
+            .into(),
         recorder: None,
         guardian: Vec::new(),
         stall_timeout: Some(LIMIT),
         start_timeout: None,
         cpu_wake_us: None,
-    }
-}
-
-fn stage(name: &str) -> StagePlan {
-    StagePlan {
-        name: name.to_owned(),
-        command: vec!["true".to_owned()],
-        programs: Vec::new(),
-        directory: None,
-        scheduling: Scheduling::default(),
-        restart: RestartPolicy::default(),
-        outlives_restarts: false,
-        restarts_all: false,
-        end_timeout: crate::END_TIMEOUT,
     }
 }

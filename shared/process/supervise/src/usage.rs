@@ -10,18 +10,14 @@ use crate::ProcessStat;
 /// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
-    /// Processor time of all threads, s.
     pub cpu_s: f64,
-    /// Memory that is the process's own, bytes: neither files nor memory that it shares with
-    /// others.
+    /// Neither files nor memory that it shares with others.
     pub own_bytes: u64,
     /// Memory that is mapped into the process and present, bytes, including shared memory.
     pub resident_bytes: u64,
-    /// Times that its threads have gone to sleep: each is a wake-up. A thread that has ended
-    /// takes its count with it.
+    /// Times that its threads have gone to sleep; counts of ended threads are gone.
     pub wake_ups: u64,
-    /// Times that its threads were taken off a processor while they had work; counts of ended
-    /// threads are gone.
+    /// Times that its threads were taken off a processor while they had work.
     pub preemptions: u64,
     pub threads: u64,
 }
@@ -47,7 +43,6 @@ impl Usage {
         Some(usage)
     }
 
-    /// Returns the share of one processor that was used since `earlier`, `elapsed` ago.
     pub fn processor_share(&self, earlier: &Self, elapsed: Duration) -> f64 {
         (self.cpu_s - earlier.cpu_s).max(0.0) / elapsed.as_secs_f64().max(1e-9)
     }
@@ -56,14 +51,12 @@ impl Usage {
 /// A run and the resources that its processes use.
 #[derive(Serialize)]
 pub struct UsedRun {
-    /// The supervisor's report.
     pub status: Status,
     /// The usage of each process, in the order of the status; `None` if it has ended.
     pub usage: Vec<Option<Usage>>,
 }
 
 impl UsedRun {
-    /// Reads the usage of a run with this status.
     pub fn of(status: Status) -> Self {
         let usage = status.processes.iter().map(|it| Usage::of(it.pid));
         Self {

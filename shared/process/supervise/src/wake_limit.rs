@@ -4,14 +4,16 @@
 //! up, which can take longer than the hop's message needs. The limit holds for the whole machine,
 //! while the supervisor lives.
 
-use std::{fs::File, io::Write};
+use std::{
+    fs::File,
+    io::{self, Write},
+};
 
 use crate::SuperviseError;
 
 /// The system applies the value written here until the process closes the file (Linux, "PM QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
-/// A limit that is in effect until it is dropped.
 pub(crate) struct WakeLimit {
     _file: File,
 }
@@ -27,6 +29,10 @@ impl WakeLimit {
             file.write_all(&limit.to_ne_bytes())?;
             Ok(Self { _file: file })
         };
-        set().map_err(|source| SuperviseError::WakeLimit { us, source })
+        set().map_err(|error: io::Error| {
+            SuperviseError::System(format!(
+                "cannot limit the time in which processors wake to {us} us (run.cpu_wake_us): {FILE}: {error}; give the user of the run the right to write to it, or leave the key out"
+            ))
+        })
     }
 }

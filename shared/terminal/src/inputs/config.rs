@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use crate::{Failure, WIDTH, print, wrap};
 use clap::Args;
-use gyre_configuration::{ConfigurationError, paths};
+use gyre_configuration::paths;
 
 /// Columns of the names.
 const NAMES: usize = 18;
@@ -21,11 +21,7 @@ pub fn config(arguments: &ConfigArguments) -> Result<ExitCode, Failure> {
     match &arguments.name {
         Some(name) => {
             let text = gyre_shipped::configuration(name).and_then(|path| gyre_shipped::text(&path));
-            let unknown = || ConfigurationError::Unknown {
-                name: name.display().to_string(),
-                suggestion: paths::suggestion(name),
-            };
-            print::line(text.ok_or_else(unknown)?.trim_end())?;
+            print::line(text.ok_or_else(|| paths::unknown(name))?.trim_end())?;
         }
         None => gyre_shipped::configurations().try_for_each(|it| print::line(entry(it)))?,
     }

@@ -2,26 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{Failure, print};
 use clap::Args;
-use gyre_configuration::Configuration;
-use thiserror::Error;
+use gyre_configuration::{Configuration, paths::suggestion};
 
-use crate::inputs::kind::Kind;
+use crate::{Failure, inputs::kind::Kind, print};
 
-/// The words and options that name the inputs of a command.
+/// The words that name the inputs of a command.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Inputs {
     /// The recording (a folder, NAME.mcap, a bag of ROS 2), the configuration (a TOML file, or a
-    /// name that `gyre config` lists) or the address of a radar, in any order.
+    /// name that `gyre config` lists) or the address of a radar, in any order. Defaults: the
+    /// recording of the configuration; settings from the recording's format and its scans.
     #[arg(value_name = "WHAT")]
     pub what: Vec<PathBuf>,
-    /// The configuration. Default: settings from the recording's format and its scans.
-    #[arg(long, value_name = "FILE|NAME")]
-    pub config: Option<PathBuf>,
-    /// The recording (source.data). Default: the recording of the configuration.
-    #[arg(long, value_name = "PATH")]
-    pub data: Option<PathBuf>,
     /// Override a key of the configuration, as in masking.kind=none; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -37,65 +30,38 @@ pub struct Given {
     pub radar: Option<String>,
 }
 
-/// Why the arguments of a command are refused.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum InputError {
-    #[error("`{0}` and `{1}` are both {2}: name one")]
-    Twice(String, String, &'static str),
-    #[error("`{0}` is a recording and `{1}` the address of a radar: name one")]
-    Both(String, String),
-    #[error(
-        "{0} has the results of a run: name {0}/config.toml to compute them again, or export a recording of it (`gyre export`)"
-    )]
-    Results(String),
-    #[error(
-        "`{0}` is a folder here and the name of a configuration: write ./{0} for the folder, --config {0} for the configuration"
-    )]
-    Ambiguous(String),
-    #[error(
-        "`{0}` is no file or folder, no name that `gyre config` lists, and not the address of a radar{1}"
-    )]
-    Unknown(String, String),
-    #[error(
-        "`{0}` is the address of a radar, and only `gyre run` and `gyre up` receive one: name a recording"
-    )]
-    Radar(String),
-}
-
 impl Inputs {
-    pub fn given(&self) -> Result<Given, InputError> {
-        let mut given = Given {
-            configuration: self.config.clone(),
-            data: self.data.clone(),
-            radar: None,
-        };
-        // A folder whose name is also a configuration's is the one that is still missing.
-        let kinds = self.what.iter().map(|word| (word, Kind::of(word)));
-        let (unclear, clear): (Vec<_>, Vec<_>) =
-            kinds.partition(|(_, kind)| *kind == Kind::Ambiguous);
-        for (word, kind) in clear.into_iter().chain(unclear) {
-            given.take(word, kind)?;
+    pub fn given(&self) -> Result<Given, Failure> {
+        let mut given = Given::default();
+        self.what.iter().try_for_each(|word| given.take(word))?;
+        match (&given.data, &given.radar) {
+            (Some(data), Some(radar)) => Err(format!(
+                "`{}` is a recording and `{radar}` the address of a radar: name one",
+                data.display()
+            )
+            .into()),
+            _ => Ok(given),
         }
-        Ok(given)
     }
 
     /// As [`given`](Self::given), for a command that receives no radar.
-    pub fn given_recording(&self) -> Result<Given, InputError> {
+    pub fn given_recording(&self) -> Result<Given, Failure> {
         let given = self.given()?;
         match given.radar {
-            Some(radar) => Err(InputError::Radar(radar)),
+            Some(radar) => Err(format!(
+                "`{radar}` is the address of a radar, and only `gyre run` and `gyre up` receive one: name a recording"
+            )
+            .into()),
             None => Ok(given),
         }
     }
 
-    /// Reads the named configuration; without a name, the configuration of the recording, which is
-    /// then printed. The scans come from the recording, or from the configuration.
+    /// The scans come from the recording, or from the configuration.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
         self.configuration_of(&self.given_recording()?)
     }
 
-    /// As [`configuration`](Self::configuration), of another recording that is read in the same
-    /// way.
+    /// As [`configuration`](Self::configuration), of another recording.
     pub fn configuration_with(&self, data: &Path) -> Result<Configuration, Failure> {
         self.configuration_of(&Given {
             data: Some(data.to_owned()),
@@ -104,21 +70,12 @@ impl Inputs {
     }
 
     fn configuration_of(&self, given: &Given) -> Result<Configuration, Failure> {
-        let configuration = match (&given.configuration, &given.data) {
-            (Some(named), _) => configuration(named, &self.set)?,
-            (None, Some(data)) => {
-                let (configuration, sentence) = Configuration::of_recording(data, &self.set)?;
-                print::note(sentence);
-                configuration
-            }
-            (None, None) => Configuration::of_overrides(&self.set)?,
-        };
+        let configuration = given.read(&self.set)?;
         Ok(configuration.streaming(given.data.as_deref()))
     }
 }
 
-/// Reads a configuration by its path or its name, and prints the place of its files if that is not
-/// clear.
+/// Prints the place of the files of a configuration if that is not clear.
 pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();
@@ -127,52 +84,52 @@ pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration
 }
 
 impl Given {
-    /// Adds the radar of an option.
-    pub fn with_radar(mut self, radar: Option<&String>) -> Result<Self, InputError> {
-        if let Some(radar) = radar {
-            self.take(Path::new(radar), Kind::Radar)?;
-        }
-        match (&self.data, &self.radar) {
-            (Some(data), Some(radar)) => {
-                Err(InputError::Both(data.display().to_string(), radar.clone()))
+    /// Reads the named configuration, or finds and prints the settings of the recording.
+    pub fn read(&self, overrides: &[String]) -> Result<Configuration, Failure> {
+        match (&self.configuration, &self.data) {
+            (Some(named), _) => configuration(named, overrides),
+            (None, Some(data)) => {
+                let (configuration, sentence) = Configuration::of_recording(data, overrides)?;
+                print::note(sentence);
+                Ok(configuration)
             }
-            _ => Ok(self),
+            (None, None) => Ok(Configuration::of_overrides(overrides)?),
         }
     }
 
-    fn take(&mut self, word: &Path, kind: Kind) -> Result<(), InputError> {
+    fn take(&mut self, word: &Path) -> Result<(), Failure> {
         let text = word.display().to_string();
-        match kind {
-            Kind::Configuration => put(&mut self.configuration, word, "configurations"),
-            Kind::Data => put(&mut self.data, word, "recordings"),
-            Kind::Ambiguous if self.data.is_some() && self.configuration.is_none() => {
-                put(&mut self.configuration, word, "configurations")
+        let (before, kinds) = match Kind::of(word) {
+            Kind::Configuration => (
+                self.configuration.replace(word.to_owned()),
+                "configurations",
+            ),
+            Kind::Data => (self.data.replace(word.to_owned()), "recordings"),
+            Kind::Radar => {
+                let before = self.radar.replace(text.clone());
+                (before.map(PathBuf::from), "addresses of radars")
             }
-            Kind::Ambiguous if self.configuration.is_some() && self.data.is_none() => {
-                put(&mut self.data, word, "recordings")
+            Kind::Results => {
+                return Err(format!(
+                    "{text} has the results of a run: name {text}/config.toml to compute them again, or export a recording of it (`gyre export`)"
+                )
+                .into());
             }
-            Kind::Radar => match self.radar.replace(text.clone()) {
-                Some(before) => Err(InputError::Twice(before, text, "addresses of radars")),
-                None => Ok(()),
-            },
-            Kind::Ambiguous => Err(InputError::Ambiguous(text)),
-            Kind::Results => Err(InputError::Results(text)),
             Kind::Unknown => {
-                let suggestion = gyre_configuration::paths::suggestion(word);
-                Err(InputError::Unknown(text, suggestion))
+                let suggestion = suggestion(word);
+                return Err(format!(
+                    "`{text}` is no file or folder, no name that `gyre config` lists, and not the address of a radar{suggestion}"
+                )
+                .into());
+            }
+        };
+        match before {
+            None => Ok(()),
+            Some(before) => {
+                let before = before.display();
+                Err(format!("`{before}` and `{text}` are both {kinds}: name one").into())
             }
         }
-    }
-}
-
-fn put(place: &mut Option<PathBuf>, word: &Path, kinds: &'static str) -> Result<(), InputError> {
-    match place.replace(word.to_owned()) {
-        None => Ok(()),
-        Some(before) => Err(InputError::Twice(
-            before.display().to_string(),
-            word.display().to_string(),
-            kinds,
-        )),
     }
 }
 
@@ -181,13 +138,15 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn given(words: &[&Path]) -> Result<Given, InputError> {
-        let what = words.iter().map(|word| (*word).to_owned()).collect();
+    fn given(words: &[&Path]) -> Result<Given, Failure> {
+        inputs(words).given()
+    }
+
+    fn inputs(words: &[&Path]) -> Inputs {
         Inputs {
-            what,
-            ..Inputs::default()
+            what: words.iter().map(|word| (*word).to_owned()).collect(),
+            set: Vec::new(),
         }
-        .given()
     }
 
     #[test]
@@ -213,10 +172,6 @@ mod tests {
         );
         let unknown = given(&[Path::new("oxfrod")]).unwrap_err().to_string();
         assert!(unknown.ends_with("; did you mean `oxford`?"), "{unknown}");
-        let radar = Inputs {
-            what: vec!["10.0.0.1".into()],
-            ..Inputs::default()
-        };
-        assert!(matches!(radar.given_recording(), Err(InputError::Radar(_))));
+        assert!(inputs(&[Path::new("10.0.0.1")]).given_recording().is_err());
     }
 }

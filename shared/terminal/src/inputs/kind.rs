@@ -14,7 +14,6 @@ const RECORDINGS: [&str; 3] = ["mcap", "db3", "bag"];
 /// Bytes at the start of a file that decide whether it is a text: a text has no zero byte.
 const START: u64 = 4096;
 
-/// The kind of a word of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A configuration: a file, or the name of one in the program.
@@ -23,28 +22,21 @@ pub enum Kind {
     Data,
     /// The folder of a run's results.
     Results,
-    /// A folder whose name is also the name of a configuration in the program.
-    Ambiguous,
-    /// The address of a radar.
     Radar,
-    /// None of these.
     Unknown,
 }
 
 impl Kind {
-    /// Determines the kind of a word: by existing files, then by the names in the program, then by
-    /// its form.
+    /// Existing files go before the names in the program, and those before the form.
     pub fn of(word: &Path) -> Self {
         let ending = word.extension().and_then(|ending| ending.to_str());
         let is_recording = ending.is_some_and(|ending| RECORDINGS.contains(&ending));
         let text = word.to_str().unwrap_or_default();
         if word.is_dir() {
-            return match () {
-                () if gyre_shipped::configuration(word).is_some() => Self::Ambiguous,
-                () if word.join("config.toml").is_file() && word.join("journal").is_dir() => {
-                    Self::Results
-                }
-                () => Self::Data,
+            let is_of_run = word.join("config.toml").is_file() && word.join("journal").is_dir();
+            return match is_of_run {
+                true => Self::Results,
+                false => Self::Data,
             };
         }
         match () {
@@ -60,7 +52,6 @@ impl Kind {
     }
 }
 
-/// Returns whether a path is a file that begins as a text.
 fn is_text(path: &Path) -> bool {
     let start = || -> io::Result<Vec<u8>> {
         let mut start = Vec::new();
@@ -71,8 +62,7 @@ fn is_text(path: &Path) -> bool {
     path.is_file() && start().is_ok_and(|start| !start.contains(&0))
 }
 
-/// Returns whether a text is an address on the network: `192.168.0.1`, with or without a port, a
-/// group as `udp://239.192.43.78:4378`, or `HOST:PORT`.
+/// `192.168.0.1`, with or without a port, `udp://239.192.43.78:4378`, or `HOST:PORT`.
 fn is_address(text: &str) -> bool {
     let is_host = |host: &str| !host.is_empty() && !host.contains('/');
     let has_port = text

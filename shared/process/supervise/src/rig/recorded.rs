@@ -16,7 +16,6 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Creates a message of this header and payload.
     pub fn of<M: Message<Header: Copy>>(
         header: &M::Header,
         payload: &[u8],
@@ -42,7 +41,6 @@ impl Recorded {
         }
     }
 
-    /// Returns the header of a message of topic `M`.
     pub fn header<M: Message<Header: Copy>>(&self) -> Result<M::Header, StageError> {
         match self.header.len() == size_of::<M::Header>() {
             // SAFETY: the bytes are a header of this size, which is plain numbers: any bytes are a
@@ -56,7 +54,6 @@ impl Recorded {
         }
     }
 
-    /// Returns this message with another header.
     #[must_use]
     pub fn with<M: Message<Header: Copy>>(&self, header: &M::Header) -> Self {
         Self::of::<M>(header, &self.payload, self.received_ns)

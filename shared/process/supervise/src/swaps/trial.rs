@@ -3,29 +3,27 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::control::{Answer, PendingSwap};
+use gyre_stage::control::Answer;
 
 use super::Swaps;
 use crate::{child::Child, processes::Processes, run::Run, socket::Client};
 
 /// Time for which a client waits for the first pose, from when the program has opened its topics. A
 /// radar may be switched off.
-const LIMIT: Duration = Duration::from_secs(10);
+pub(super) const LIMIT: Duration = Duration::from_secs(10);
 
-/// A client that waits for the result.
 pub(super) struct Trial {
     /// The index of the process on trial.
-    process: usize,
+    pub(super) process: usize,
     client: Client,
     /// When it was last seen without its topics.
-    since: Instant,
+    pub(super) since: Instant,
 }
 
 impl Swaps {
-    /// Lets the client of a swap wait. Poses do not show the work of a follower: so its swap is
-    /// done when it is started.
+    /// Poses do not show the work of a follower.
     pub fn await_trial(&mut self, process: usize, child: &Child, client: Client) {
-        if child.follows() {
+        if child.stage().is_none() {
             client.answer(&Answer::Done);
             return;
         }
@@ -46,7 +44,7 @@ impl Swaps {
             trial.since = Instant::now();
         }
         match () {
-            () if !child.is_on_trial() => trial.client.answer(&Answer::Done),
+            () if !child.is_on_trial => trial.client.answer(&Answer::Done),
             () if trial.since.elapsed() > LIMIT => {
                 let name = child.name();
                 trial.client.answer(&Answer::Untried(format!(
@@ -58,21 +56,6 @@ impl Swaps {
         }
     }
 
-    /// Returns the swap whose program is on trial.
-    pub(super) fn pending_trial(&self, processes: &Processes) -> Option<PendingSwap> {
-        let trial = self.trial.as_ref()?;
-        let plan = processes[trial.process].plan();
-        Some(PendingSwap {
-            process: plan.name.clone(),
-            command: plan.command.clone(),
-            has_taken_over: true,
-            waited_s: trial.since.elapsed().as_secs_f64(),
-            limit_s: Some(LIMIT.as_secs_f64()),
-        })
-    }
-
-    /// Informs the client that the program has failed, and that the previous program is started
-    /// again.
     pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
         let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
