@@ -64,7 +64,6 @@ impl Settings {
         LoopCloser::new(
             LoopOptions {
                 submap_reach_m: self.slam.submap_reach_m,
-                ..LoopOptions::default()
             },
             &self.refinement,
             self.points.capacity,

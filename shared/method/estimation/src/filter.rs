@@ -1,16 +1,13 @@
 //! The trajectory-oriented extended Kalman filter of Checchin et al.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance::lever};
 use nalgebra::{DMatrix, Matrix3, MatrixXx3, Vector3};
 
-use crate::constraint::{chi_square, group_information, keyframe_exists};
+use crate::constraint::{chi_square, keyframe_exists};
 use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
-
-/// A loop that adds less information to its group than this share of its own is redundant.
-const MIN_SHARE: f64 = 1e-9;
 
 /// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the
 /// third by less than a millimetre.
@@ -24,18 +21,14 @@ pub struct FilterOptions {
     pub max_keyframes: usize,
     /// A loop whose chi-square is larger is rejected.
     pub gate: f64,
-    /// The correlation of the errors of any two loops of one group, 0 to 1.
-    pub group_correlation: f64,
 }
 
 impl Default for FilterOptions {
-    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups that count as
-    /// one loop each.
+    /// Returns 2,000 keyframes (a covariance of 288 MB), and a gate at 99.9 %.
     fn default() -> Self {
         Self {
             max_keyframes: 2000,
             gate: CHI_SQUARE_99_9,
-            group_correlation: 1.0,
         }
     }
 }
@@ -59,8 +52,8 @@ pub struct TrajectoryFilter {
     /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
     /// beyond the poses are reserve.
     covariance: DMatrix<f64>,
-    /// Loops accepted of each group.
-    groups: BTreeMap<u64, usize>,
+    /// Groups that a loop has been counted of.
+    groups: BTreeSet<u64>,
 }
 
 /// A relative pose as an observation of the state.
@@ -80,7 +73,7 @@ impl TrajectoryFilter {
             options,
             poses: vec![start],
             covariance: DMatrix::zeros(3, 3),
-            groups: BTreeMap::new(),
+            groups: BTreeSet::new(),
         }
     }
 
@@ -88,8 +81,8 @@ impl TrajectoryFilter {
     /// all poses.
     ///
     /// The result depends a little on the order of loops, as each is linearised at the estimate
-    /// that it finds. A filter cannot take information back: in a group of dependent loops, each
-    /// later loop adds its increase of the group's information.
+    /// that it finds. A filter cannot take information back: of a group of dependent loops only
+    /// the first counts.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -99,18 +92,6 @@ impl TrajectoryFilter {
             }),
             Kind::Loop { group } => Ok(self.close(constraint, group)),
         }
-    }
-
-    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et
-    /// al., Eq. 3): the initial guess of their registration (Eq. 4).
-    pub fn predict(&self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
-        keyframe_exists(from.max(to), self.poses.len())?;
-        let observation = self.observe([from, to]);
-        let covariance = observation.project(&self.against(&observation));
-        Ok(UncertainMotion {
-            motion: observation.predicted,
-            covariance: 0.5 * (covariance + covariance.transpose()),
-        })
     }
 
     /// Returns the poses of all keyframes.
@@ -193,11 +174,10 @@ impl TrajectoryFilter {
         if chi_square.is_nan() || chi_square > self.options.gate {
             return verdict(Outcome::Rejected);
         }
-        let share = self.share(group);
-        if share < MIN_SHARE {
+        if group.is_some_and(|group| !self.groups.insert(group)) {
             return verdict(Outcome::Redundant);
         }
-        match self.correct(first, measured, measured.covariance / share) {
+        match self.correct(first, measured) {
             Some(()) => verdict(Outcome::Accepted),
             None => verdict(Outcome::Rejected),
         }
@@ -206,13 +186,8 @@ impl TrajectoryFilter {
     /// Corrects all poses by an observation: the iterated update, which linearises the observation
     /// again at the corrected poses. `None` if the covariance of the innovation is singular;
     /// nothing is changed then.
-    fn correct(
-        &mut self,
-        first: Observation,
-        measured: &UncertainMotion,
-        noise: Matrix3<f64>,
-    ) -> Option<()> {
-        let ends = first.ends;
+    fn correct(&mut self, first: Observation, measured: &UncertainMotion) -> Option<()> {
+        let (ends, noise) = (first.ends, measured.covariance);
         let prior = ends.map(|keyframe| self.poses[keyframe]);
         let mut errors = [Vector3::zeros(); 2];
         let mut observation = first;
@@ -236,17 +211,6 @@ impl TrajectoryFilter {
             *pose = exp(&(gain.fixed_rows::<3>(3 * keyframe) * innovation)) * *pose;
         }
         Some(())
-    }
-
-    /// Returns the increase of a group's information by its next loop, relative to one loop, and
-    /// counts the loop.
-    fn share(&mut self, group: Option<u64>) -> f64 {
-        let Some(group) = group else { return 1.0 };
-        let members = self.groups.entry(group).or_default();
-        let information = |members| group_information(members, self.options.group_correlation);
-        let share = information(*members + 1) - information(*members);
-        *members += 1;
-        share
     }
 
     fn observe(&self, ends: [usize; 2]) -> Observation {

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use gyre_geometry::{Pose, UncertainMotion};
 
-use crate::constraint::{chi_square, group_information};
+use crate::constraint::chi_square;
 use crate::kernel::Kernel;
 use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
@@ -29,8 +29,6 @@ pub struct GraphOptions {
     pub gate: f64,
     /// The weight of a loop that disagrees with the other constraints.
     pub kernel: Kernel,
-    /// The correlation of the errors of any two loops of one group, 0 to 1.
-    pub group_correlation: f64,
     /// The largest number of linearisations of one solution.
     pub max_iterations: usize,
     /// A solution is found when a step lowers the cost by less than this share of it.
@@ -38,15 +36,13 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups that
-    /// count as one loop each.
+    /// Returns a gate at 99.9 %, and dynamic covariance scaling from a quarter of it.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
             kernel: Kernel::DynamicCovarianceScaling {
                 phi: 0.25 * CHI_SQUARE_99_9,
             },
-            group_correlation: 1.0,
             max_iterations: 100,
             tolerance: 1e-5,
         }
@@ -197,10 +193,10 @@ impl PoseGraph {
     /// first pose stays fixed where it is put.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
         if poses.len() != self.state.poses.len() {
-            return Err(EstimationError::StartPoses {
-                poses: poses.len(),
-                keyframes: self.state.poses.len(),
-            });
+            let (poses, keyframes) = (poses.len(), self.state.poses.len());
+            return Err(EstimationError::Refused(format!(
+                "there are {poses} poses to start from, and {keyframes} keyframes: each keyframe needs one"
+            )));
         }
         self.state.poses.copy_from_slice(poses);
         self.factorised = false;
@@ -249,10 +245,8 @@ impl PoseGraph {
     /// Returns the edge of a constraint that the graph can take.
     fn edge(&self, constraint: &Constraint) -> Result<Edge, EstimationError> {
         constraint.check(self.state.poses.len())?;
-        let &Constraint {
-            from, to, motion, ..
-        } = constraint;
-        Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })
+        let ends = [constraint.from, constraint.to];
+        Edge::new(ends, constraint.motion).ok_or(EstimationError::Singular)
     }
 
     /// Marks the system as out of date.
@@ -303,9 +297,9 @@ impl PoseGraph {
         });
     }
 
-    /// Returns how much a loop counts because of others of its group: 1 if it is alone.
+    /// Returns how much a loop counts because of others of its group, which count as one together.
     fn share(&self, closing: &Closing) -> f64 {
         let members = closing.group.map_or(1, |group| self.groups[&group]);
-        group_information(members, self.options.group_correlation) / members as f64
+        1.0 / members as f64
     }
 }

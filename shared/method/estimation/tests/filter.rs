@@ -45,20 +45,6 @@ fn a_loop_is_shared_among_the_poses_before_it_by_their_covariance() {
         assert!((found.motion.translation.x - x_m).abs() < 1e-6, "{found:?}");
         assert!((found.covariance[(0, 0)] - variance).abs() < 1e-6);
     }
-    // The errors of both motions are now opposite: var(x2 - x1) = 0.75, not 0.75 + 1.
-    assert!((filter.predict(1, 2).unwrap().covariance[(0, 0)] - 0.75).abs() < 1e-6);
-}
-
-#[test]
-fn a_loop_measured_backward_says_the_same() {
-    let (mut forward, mut backward) = (straight(2), straight(2));
-    forward
-        .apply(&Constraint::closing(0, 2, along(2.4, 2.0)))
-        .unwrap();
-    backward
-        .apply(&Constraint::closing(2, 0, along(-2.4, 2.0)))
-        .unwrap();
-    assert!(apart(forward.poses(), backward.poses()).0 < 1e-9);
 }
 
 #[test]
@@ -84,24 +70,6 @@ fn an_uncertain_turn_makes_a_later_pose_uncertain_sideways() {
 }
 
 #[test]
-fn the_predicted_motion_between_neighbours_is_the_measured_one() {
-    let drive = Drive::new(60, 50, ODOMETRY, 1);
-    let filter = drive.filter();
-    for constraint in &drive.odometry {
-        let predicted = filter.predict(constraint.from, constraint.to).unwrap();
-        let measured = &constraint.motion;
-        assert!(predicted.error(&measured.motion).norm() < 1e-12);
-        assert!((predicted.covariance - measured.covariance).norm() < 1e-12);
-    }
-    let missing = EstimationError::NoKeyframe {
-        keyframe: 60,
-        keyframes: 60,
-    };
-    assert_eq!(filter.predict(0, 60), Err(missing.clone()));
-    assert_eq!(filter.pose(60), Err(missing));
-}
-
-#[test]
 fn a_loop_among_small_errors_is_the_batch_solution() {
     // Errors a thousandth of the usual ones: the problem is linear.
     let [small, noise] = [ODOMETRY, LOOP].map(|sigma| sigma.map(|sigma| 1e-3 * sigma));
@@ -121,23 +89,6 @@ fn a_loop_among_small_errors_is_the_batch_solution() {
         let found = filter.pose(k).unwrap().covariance;
         assert!((found - expected).norm() < 1e-5 * expected.norm(), "{k}");
     }
-}
-
-#[test]
-fn several_loops_approach_the_converged_batch_solution() {
-    let mut drive = Drive::new(90, 30, ODOMETRY, 3);
-    let mut filter = drive.filter();
-    let loops: Vec<_> = [(35, 5), (50, 20), (61, 0), (70, 10), (88, 59)]
-        .map(|(from, to)| drive.close(from, to))
-        .to_vec();
-    for closing in &loops {
-        assert_eq!(filter.apply(closing).unwrap().outcome, Outcome::Accepted);
-    }
-    let started = dead_reckoning(drive.truth[0], &drive.odometry);
-    let all: Vec<_> = drive.odometry.iter().copied().chain(loops).collect();
-    let batch = Batch::solve(&started, &all, 5);
-    let (position, yaw) = apart(filter.poses(), &batch.poses);
-    assert!(position < 1e-3 && yaw < 2e-5, "{position} m, {yaw} rad");
 }
 
 #[test]
@@ -182,8 +133,6 @@ fn the_covariance_stays_symmetric_and_positive_through_many_loops() {
         let covariance = filter.pose(k).unwrap().covariance;
         assert!(covariance.cholesky().is_some(), "{k}: {covariance}");
         assert!((covariance - covariance.transpose()).norm() == 0.0);
-        let between = filter.predict(k, (k + 90) % 200).unwrap();
-        assert!(between.has_covariance(), "{k}: {}", between.covariance);
     }
 }
 
@@ -202,11 +151,7 @@ fn a_full_filter_refuses_the_next_keyframe_and_says_what_to_do() {
     let refused = filter.apply(&Constraint::odometry(2, along(1.0, 1.0)));
     assert_eq!(refused, Err(EstimationError::TooManyKeyframes { limit: 3 }));
     assert_eq!(filter.poses().len(), 3);
-    let sentence = EstimationError::TooManyKeyframes { limit: 2000 }.to_string();
-    assert!(
-        sentence.contains("2000 keyframes, with a covariance of 288 MB"),
-        "{sentence}"
-    );
+    assert!(filter.pose(3).is_err());
     // Loops among the keyframes that it has are still taken.
     let closing = Constraint::closing(0, 2, exact(pose(2.1, 0.0, 0.0), [0.1; 3]));
     assert_eq!(filter.apply(&closing).unwrap().outcome, Outcome::Accepted);

@@ -6,9 +6,7 @@ use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_scan_matching::RefinementConfig;
-use gyre_slam::localisation::{
-    Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status,
-};
+use gyre_slam::localisation::{Localisation, Localiser, Map, MapError, Observation, Status};
 use gyre_slam::{Keyframe, RecordLog};
 use nalgebra::{Matrix3, Point2};
 
@@ -71,8 +69,7 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
 }
 
 fn localiser(street: &[(Point2<f64>, f32)]) -> Localiser {
-    let options = LocaliserOptions::default();
-    Localiser::new(map(street), options, &RefinementConfig::default(), CAPACITY).unwrap()
+    Localiser::new(map(street), &RefinementConfig::default(), CAPACITY).unwrap()
 }
 
 /// Localises scans at some poses, one after the other, with their true motions.
@@ -152,7 +149,7 @@ fn a_drive_is_tracked_and_lost_three_seconds_after_it_has_left_the_map() {
         assert_near(found, truth);
     }
     for (found, truth) in found.iter().zip(&poses) {
-        let away_m = -truth.translation.x - LocaliserOptions::default().reach_m;
+        let away_m = -truth.translation.x - 15.0;
         assert!(away_m < 0.5 || found.fix.is_none(), "{found:?} at {truth}");
         assert!(
             away_m < 31.0 || found.status == Status::Lost,
@@ -212,8 +209,7 @@ fn a_saved_map_finds_the_same_places() {
     assert_eq!(opened.keyframes(), saved.keyframes());
     let points = seen(&street, &pose(99.0, 0.5, 1.0));
     let found = [saved, opened].map(|map| {
-        let options = LocaliserOptions::default();
-        let localiser = Localiser::new(map, options, &RefinementConfig::default(), CAPACITY);
+        let localiser = Localiser::new(map, &RefinementConfig::default(), CAPACITY);
         localiser.unwrap().find(&points, &Twist::default())
     });
     assert!(found[0].is_some());

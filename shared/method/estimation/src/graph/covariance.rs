@@ -25,8 +25,7 @@ impl PoseGraph {
     }
 
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial
-    /// guess of their registration, as
-    /// [`TrajectoryFilter::predict`](crate::TrajectoryFilter::predict).
+    /// guess of their registration (Checchin et al., Eq. 4).
     pub fn predict(&mut self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(from.max(to), self.state.poses.len())?;
         let relative = Relative::predict(&self.state.poses[from], &self.state.poses[to]);

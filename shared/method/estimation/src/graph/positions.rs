@@ -130,7 +130,9 @@ impl PoseGraph {
             && (f64::MIN_POSITIVE..f64::INFINITY).contains(&position.variance_m2)
             && (f64::MIN_POSITIVE..=1.0).contains(&position.share);
         if !is_usable {
-            return Err(EstimationError::Position { keyframe });
+            return Err(EstimationError::Refused(format!(
+                "the position measured at keyframe {keyframe} is not finite, or its variance or share is not above zero"
+            )));
         }
         self.positions.push(Measured {
             it: position,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle};
+use gyre_geometry::{UncertainMotion, pose, wrap_angle};
 use gyre_scan_matching::{
     ConfigError, KeyframeAligner, MaskedCorrelation, MotionMatch, RefinementConfig, RotationMatch,
     Submap, TranslationConfig, TranslationSearch,
@@ -35,6 +35,9 @@ pub enum VerificationOutcome {
     Ambiguous,
     /// The points of the two keyframes do not determine the motion.
     Undetermined,
+    /// The motion contradicts the odometry between the two keyframes, which the verifier does not
+    /// know.
+    ContradictsOdometry,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,9 +74,6 @@ pub struct LoopVerifier {
 impl LoopVerifier {
     /// Plans registrations of keyframes of at most `capacity` points. `refinement` is the
     /// refinement of the odometry: its cells and reach, and the scales of its covariance.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds.
     pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         let translation = TranslationConfig {
             reach_m: REACH_M,
@@ -110,7 +110,10 @@ impl LoopVerifier {
         let searched = pose(best.x_m, best.y_m, best.yaw_rad);
         let mut found = Verification {
             outcome: VerificationOutcome::LowCorrelation,
-            motion: certain(searched),
+            motion: UncertainMotion {
+                motion: searched,
+                ..UncertainMotion::identity()
+            },
             correlation: best.score,
             searched: best.score,
             runner_up: second.max(other.score),
@@ -122,8 +125,10 @@ impl LoopVerifier {
         match self.aligner.align(later, earlier, &searched) {
             Some(motion) => {
                 found.motion = motion;
-                found.correlation = self.correlation_at(&motion.motion);
-                found.outcome = self.judge(&found);
+                let (later, earlier) = (self.later.view(), self.earlier.view());
+                let correlation = self.correlation.at(later, earlier, &motion.motion);
+                found.correlation = correlation.expect(PLANNED);
+                found.outcome = judge(&found);
             }
             None => found.outcome = VerificationOutcome::Undetermined,
         }
@@ -142,21 +147,15 @@ impl LoopVerifier {
             .search(self.later.view(), self.earlier.view(), &rotation)
             .expect(PLANNED)
     }
+}
 
-    fn correlation_at(&mut self, motion: &Pose) -> f64 {
-        self.correlation
-            .at(self.later.view(), self.earlier.view(), motion)
-            .expect(PLANNED)
-    }
-
-    fn judge(&self, found: &Verification) -> VerificationOutcome {
-        if found.correlation < MIN_CORRELATION {
-            VerificationOutcome::LowCorrelation
-        } else if found.searched - found.runner_up < MIN_MARGIN {
-            VerificationOutcome::Ambiguous
-        } else {
-            VerificationOutcome::Accepted
-        }
+fn judge(found: &Verification) -> VerificationOutcome {
+    if found.correlation < MIN_CORRELATION {
+        VerificationOutcome::LowCorrelation
+    } else if found.searched - found.runner_up < MIN_MARGIN {
+        VerificationOutcome::Ambiguous
+    } else {
+        VerificationOutcome::Accepted
     }
 }
 
@@ -164,11 +163,4 @@ impl LoopVerifier {
 fn draw(submap: &Submap, raster: &mut Array2<f32>) {
     submap.draw(CELL_M, raster.view_mut()).expect(PLANNED);
     raster.mapv_inplace(f32::sqrt);
-}
-
-fn certain(motion: Pose) -> UncertainMotion {
-    UncertainMotion {
-        motion,
-        ..UncertainMotion::identity()
-    }
 }

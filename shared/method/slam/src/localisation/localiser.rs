@@ -7,12 +7,34 @@ use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle}
 use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 use nalgebra::{Matrix3, Point2, Vector3};
 
-use crate::localisation::{LocaliserOptions, Map, registration::Registration};
+use crate::localisation::{Map, registration::Registration};
 
 /// Two poses are the same within this angle, rad.
 const SAME_RAD: f64 = 5.0 * PI / 180.0;
+/// Two poses nearer than this, m, and than [`SAME_RAD`] are the same.
+const SAME_M: f64 = 2.0;
 /// The most similar poses of a search are aligned.
 const ALIGNED: usize = 3;
+/// Places and headings that are searched for a first fix: first these, and all if none of them is
+/// accepted.
+const FIRST_CANDIDATES: usize = 8;
+const CANDIDATES: usize = 150;
+/// Headings for comparing a place.
+const ANGLES: usize = 3;
+/// Two candidates are of different places if they are farther apart, m.
+const APART_M: f64 = 10.0;
+/// Smallest correlation of a first fix with the map, of a single scan with a submap of many, and
+/// its smallest difference from the correlation of any other pose that was tried.
+const MIN_CORRELATION: f64 = 0.4;
+const MIN_MARGIN: f64 = 0.125;
+/// Smallest correlation of a tracked scan with the map.
+const TRACKED_CORRELATION: f64 = 0.35;
+/// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 99.9 % pass.
+const GATE: f64 = 16.27;
+/// Distance from the nearest keyframe of the map beyond which there is no fix, m.
+const REACH_M: f64 = 15.0;
+/// Time without a fix after which the localiser is lost, s.
+const LOST_AFTER_S: f64 = 3.0;
 
 /// A scan, with its motion by odometry.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +99,6 @@ struct Track {
 /// Localises scans in a map.
 pub struct Localiser {
     map: Map,
-    options: LocaliserOptions,
     describer: Describer,
     descriptor: Descriptor,
     registration: Registration,
@@ -95,22 +116,20 @@ impl Localiser {
     /// odometry's.
     pub fn new(
         map: Map,
-        options: LocaliserOptions,
         refinement: &RefinementConfig,
         capacity: usize,
     ) -> Result<Self, ConfigError> {
         Ok(Self {
-            registration: Registration::new(&options, refinement, capacity)?,
+            registration: Registration::new(refinement, capacity)?,
             describer: Describer::new(),
             descriptor: Descriptor::default(),
-            candidates: Vec::with_capacity(options.candidates),
-            hypotheses: Vec::with_capacity(4 * options.candidates),
+            candidates: Vec::with_capacity(CANDIDATES),
+            hypotheses: Vec::with_capacity(4 * CANDIDATES),
             scan: Submap::with_capacity(capacity),
             place: map.new_submap(),
             drawn: None,
             track: None,
             map,
-            options,
         })
     }
 
@@ -154,7 +173,7 @@ impl Localiser {
         self.describer.describe(&self.scan, &mut self.descriptor);
         self.choose_candidates();
         self.hypotheses.clear();
-        let few = self.options.first_candidates.min(self.candidates.len());
+        let few = FIRST_CANDIDATES.min(self.candidates.len());
         (0..few).for_each(|k| self.search(k));
         let fix = self.best().filter(|fix| self.is_accepted(fix));
         fix.or_else(|| {
@@ -165,17 +184,14 @@ impl Localiser {
 
     fn is_accepted(&self, fix: &Fix) -> bool {
         let place = Point2::from(fix.pose.motion.translation.vector);
-        fix.correlation >= self.options.min_correlation
-            && fix.margin >= self.options.min_margin
-            && self.map.nearest(place).1 <= self.options.reach_m
+        fix.correlation >= MIN_CORRELATION
+            && fix.margin >= MIN_MARGIN
+            && self.map.nearest(place).1 <= REACH_M
     }
 
     /// Chooses the places and headings that look most similar, each once.
     fn choose_candidates(&mut self) {
-        let similar = self
-            .map
-            .similar(&self.descriptor, self.options.angles)
-            .to_vec();
+        let similar = self.map.similar(&self.descriptor, ANGLES).to_vec();
         self.candidates.clear();
         for candidate in similar {
             let is_new = |other: &Candidate| {
@@ -184,12 +200,12 @@ impl Localiser {
                 let turned = |(pose, yaw_rad): (Pose, f64)| pose.rotation.angle() + yaw_rad;
                 // Up to half a turn.
                 let apart_rad = 0.5 * wrap_angle(2.0 * (turned(one) - turned(other)));
-                apart_m >= self.options.apart_m || apart_rad.abs() > SAME_RAD
+                apart_m >= APART_M || apart_rad.abs() > SAME_RAD
             };
             if self.candidates.iter().all(is_new) {
                 self.candidates.push(candidate);
             }
-            if self.candidates.len() == self.options.candidates {
+            if self.candidates.len() == CANDIDATES {
                 break;
             }
         }
@@ -250,8 +266,7 @@ impl Localiser {
 
     fn is_same(&self, one: &Pose, other: &Pose) -> bool {
         let apart = one.inv_mul(other);
-        apart.translation.vector.norm() <= self.options.same_m
-            && apart.rotation.angle().abs() <= SAME_RAD
+        apart.translation.vector.norm() <= SAME_M && apart.rotation.angle().abs() <= SAME_RAD
     }
 
     /// Aligns the scan with a keyframe from a pose on the map.
@@ -274,7 +289,7 @@ impl Localiser {
         self.registration.set_scan(&self.scan);
         let place = Point2::from(predicted.motion.translation.vector);
         let (keyframe, distance_m) = self.map.nearest(place);
-        let is_inside = distance_m <= self.options.reach_m;
+        let is_inside = distance_m <= REACH_M;
         if let Some(fix) = self.register(keyframe, &predicted).filter(|_| is_inside) {
             self.track = Some(Track {
                 pose: fix.pose,
@@ -286,7 +301,7 @@ impl Localiser {
             };
         }
         let without_s = (observation.stamp_ns - track.fixed_ns) as f64 * 1e-9;
-        if without_s >= self.options.lost_after_s {
+        if without_s >= LOST_AFTER_S {
             return self.start(observation);
         }
         self.track = Some(Track {
@@ -309,11 +324,11 @@ impl Localiser {
     /// unless both agree.
     fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
         let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
-        if correlation < self.options.tracked_correlation {
+        if correlation < TRACKED_CORRELATION {
             return None;
         }
         Some(Fix {
-            pose: fused(predicted, &measured, self.options.gate)?,
+            pose: fused(predicted, &measured)?,
             correlation,
             margin: 0.0,
             keyframe,
@@ -330,16 +345,12 @@ impl Localiser {
 
 /// Updates a prediction with a measurement (Joseph form); `None` if their difference exceeds the
 /// gate.
-fn fused(
-    predicted: &UncertainMotion,
-    measured: &UncertainMotion,
-    gate: f64,
-) -> Option<UncertainMotion> {
+fn fused(predicted: &UncertainMotion, measured: &UncertainMotion) -> Option<UncertainMotion> {
     let innovation = measured.error(&predicted.motion);
     let inverse = (predicted.covariance + measured.covariance).try_inverse()?;
     let chi_square = (innovation.transpose() * inverse * innovation).x;
     // Not a number does not.
-    let agrees = chi_square <= gate;
+    let agrees = chi_square <= GATE;
     if !agrees {
         return None;
     }

@@ -7,13 +7,18 @@ use gyre_scan_matching::{
 };
 use ndarray::Array2;
 
-use crate::localisation::{LocaliserOptions, sight::Sight};
+use crate::localisation::sight::Sight;
 
 /// Cells a side of the rasters, and their size: 102 m to each side.
 const RASTER_CELLS: usize = 255;
 const CELL_M: f64 = 0.8;
 /// Cells within this range of both sensors are correlated: farther away few points are extracted.
 const RANGE_M: f64 = 80.0;
+/// Largest distance of a scan from the keyframe of its place, along each axis, m.
+const SEARCH_REACH_M: f64 = 25.0;
+/// Factor of the covariance of a registration with the map over a registration with the scans just
+/// before.
+const VARIANCE_SCALE: f64 = 2.0;
 const PLANNED: &str = "rasters have the shape that the searches are planned for";
 
 /// Registers a scan with submaps.
@@ -26,18 +31,13 @@ pub(crate) struct Registration {
     sight: Sight,
     scan: Array2<f32>,
     place: Array2<f32>,
-    variance_scale: f64,
 }
 
 impl Registration {
     /// Plans registrations of scans of at most `capacity` points.
-    pub fn new(
-        options: &LocaliserOptions,
-        refinement: &RefinementConfig,
-        capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         let translation = TranslationConfig {
-            reach_m: options.search_reach_m,
+            reach_m: SEARCH_REACH_M,
             ..TranslationConfig::default()
         };
         let raster = || Array2::zeros((RASTER_CELLS, RASTER_CELLS));
@@ -48,7 +48,6 @@ impl Registration {
             sight: Sight::new(RASTER_CELLS),
             scan: raster(),
             place: raster(),
-            variance_scale: options.variance_scale,
         })
     }
 
@@ -88,7 +87,7 @@ impl Registration {
         initial: &Pose,
     ) -> Option<(UncertainMotion, f64)> {
         let mut motion = self.aligner.align_to_submap(scan, place, initial)?;
-        motion.covariance *= self.variance_scale;
+        motion.covariance *= VARIANCE_SCALE;
         let rasters = (self.scan.view(), self.place.view());
         let correlation = match self.sight.seen() {
             Some(seen) => self
