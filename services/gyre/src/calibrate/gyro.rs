@@ -2,7 +2,7 @@
 
 use std::path::{Path, absolute};
 
-use gyre_calibration::{Drive, GyroCalibration, GyroError, calibrate_gyro};
+use gyre_calibration::{ClockError, Drive, GyroCalibration, calibrate_gyro};
 use gyre_configuration::Configuration;
 use gyre_datasets::GyroLog;
 use gyre_samples::{GyroConfig, GyroKind};
@@ -48,7 +48,7 @@ impl Gyro {
     }
 
     /// Finds the clock and the axes of the gyro by a drive, and prints them.
-    fn calibrate(&self, drive: &Drive) -> Result<Result<GyroCalibration, GyroError>, Failure> {
+    fn calibrate(&self, drive: &Drive) -> Result<Result<GyroCalibration, ClockError>, Failure> {
         let track = drive.mean_track()?;
         let log = self.log.path.display();
         print::line(format_args!("{:<21} {log}", "gyro, log"))?;

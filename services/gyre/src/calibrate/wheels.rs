@@ -2,7 +2,7 @@
 
 use std::path::{Path, absolute};
 
-use gyre_calibration::{Drive, WheelCalibration, WheelError, calibrate_wheels};
+use gyre_calibration::{ClockError, Drive, WheelCalibration, calibrate_wheels};
 use gyre_configuration::Configuration;
 use gyre_datasets::WheelLog;
 use gyre_samples::{WheelsConfig, WheelsKind};
@@ -49,7 +49,7 @@ impl Wheels {
     }
 
     /// Finds the clock and the scale of the wheels by a drive, and prints them.
-    fn calibrate(&self, drive: &Drive) -> Result<Result<WheelCalibration, WheelError>, Failure> {
+    fn calibrate(&self, drive: &Drive) -> Result<Result<WheelCalibration, ClockError>, Failure> {
         let track = drive.mean_track()?;
         let log = self.log.path.display();
         print::line(format_args!("{:<21} {log}", "wheels, log"))?;

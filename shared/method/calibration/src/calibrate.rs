@@ -245,10 +245,7 @@ fn round(
 ) -> Result<Round, CalibrationError> {
     let system = System::measure(drive, track, &pairs(track, revisits), change);
     let solved = system.solve(free).ok_or(CalibrationError::Undetermined)?;
-    let unknown = [Estimate {
-        value: 0.0,
-        sigma: f64::INFINITY,
-    }; FACTS];
+    let unknown = [Estimate::UNKNOWN; FACTS];
     let checked = system.solve(&Fact::ALL).unwrap_or(unknown);
     Ok(Round {
         free: free.to_vec(),
@@ -282,10 +279,7 @@ fn drift_of(
     let here = aligned(drive, at, revisits, change);
     let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
     let configured = change[Fact::EccentricityCos as usize];
-    Ok(found.map(|found| Estimate {
-        value: found.value + configured,
-        ..found
-    }))
+    Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
 /// The revisits with their poses aligned under a change of the facts.
@@ -325,10 +319,7 @@ fn facts(
             true => found.solved[k],
             false => found.checked[k],
         };
-        let by_overlap = Estimate {
-            value: solved.value + change[k],
-            sigma: solved.sigma.hypot(floor),
-        };
+        let by_overlap = Estimate::new(solved.value + change[k], solved.sigma.hypot(floor));
         let by_drift = by_drift.filter(|_| fact == Fact::EccentricityCos);
         let change = by_drift.map_or(by_overlap, |by_drift| by_overlap.combined(&by_drift));
         FactEstimate {

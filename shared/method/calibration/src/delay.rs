@@ -40,11 +40,8 @@ pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let turns = turns(&stamps, &steps, &starts);
     let peak = search::nearest(&turns, &log)?;
     let [_, _, delay_s] = Fit::new(&turns, &log, &peak, has_bias)?.parameters;
-    Some(Estimate {
-        // By the turns that a search finds right gyros are up to 0.4 of an interval late.
-        sigma: delay_s.sigma.hypot(0.2 * interval_s),
-        ..delay_s
-    })
+    // By the turns that a search finds right gyros are up to 0.4 of an interval late.
+    Some(delay_s.with_error(0.2 * interval_s))
 }
 
 #[cfg(test)]

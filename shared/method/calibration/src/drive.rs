@@ -49,8 +49,10 @@ pub struct Drive {
     /// The scans in their order.
     pub sweeps: Vec<Sweep>,
     pub(crate) sense: Sign,
+    /// Chirps rise and fall by turns, as the scans report.
     pub(crate) alternates: bool,
-    reflections: OwnReflections,
+    /// The reflections of the vehicle itself in the scans.
+    pub(crate) reflections: OwnReflections,
     extractor: PointExtractor,
 }
 
@@ -150,14 +152,14 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns whether chirps rise and fall by turns, as the scans report.
-    pub fn alternates(&self) -> bool {
-        self.alternates
+    /// Returns the stamps of the scans, ns, and whether the chain of motions starts with each.
+    pub(crate) fn stamps(&self) -> (Vec<i64>, Vec<bool>) {
+        let stamps = self.sweeps.iter().map(|sweep| sweep.stamp_ns);
+        (stamps.collect(), self.starts())
     }
 
-    /// Returns the reflections of the vehicle itself in the scans.
-    pub fn reflections(&self) -> &OwnReflections {
-        &self.reflections
+    fn starts(&self) -> Vec<bool> {
+        self.sweeps.iter().map(|it| it.interval_s <= 0.0).collect()
     }
 
     /// Returns the points of a scan under changed facts.
@@ -192,13 +194,9 @@ impl Drive {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
         let mut motions = vec![UncertainMotion::identity(); count];
-        let order: Vec<usize> = if reversed {
-            (0..count).rev().collect()
-        } else {
-            (0..count).collect()
-        };
         let mut earlier: Option<(usize, Vec<SparsePoint>)> = None;
-        for (number, &scan) in order.iter().enumerate() {
+        for number in 0..count {
+            let scan = if reversed { count - 1 - number } else { number };
             let mut points = self.points(scan, change);
             if reversed {
                 points.iter_mut().for_each(|point| {
@@ -243,11 +241,7 @@ impl Track {
         let twists = (0..poses.len())
             .map(|scan| twist_at(&poses, drive, scan))
             .collect();
-        let starts = drive
-            .sweeps
-            .iter()
-            .map(|sweep| sweep.interval_s <= 0.0)
-            .collect();
+        let starts = drive.starts();
         Self {
             poses,
             motions,
@@ -259,16 +253,11 @@ impl Track {
     /// Returns the path up to each scan, m.
     pub fn path_m(&self) -> Vec<f64> {
         let mut path_m = 0.0;
-        let steps = self
-            .motions
-            .iter()
-            .map(|motion| motion.motion.translation.vector.norm());
-        steps
-            .map(|step| {
-                path_m += step;
-                path_m
-            })
-            .collect()
+        let up_to = |motion: &UncertainMotion| {
+            path_m += motion.motion.translation.vector.norm();
+            path_m
+        };
+        self.motions.iter().map(up_to).collect()
     }
 
     /// Returns whether the chain of motions restarts between two scans.

@@ -49,14 +49,8 @@ impl Mounting {
         }
         let sigma = (variance * ((BLOCKS - 1) as f64 / BLOCKS as f64)).map(f64::sqrt);
         // The vehicle's straight ahead lies at the fitted direction in the radar's frame.
-        let yaw_rad = Estimate {
-            value: -all.x,
-            sigma: sigma.x,
-        };
-        let ahead_m = Estimate {
-            value: all.y,
-            sigma: sigma.y,
-        };
+        let yaw_rad = Estimate::new(-all.x, sigma.x);
+        let ahead_m = Estimate::new(all.y, sigma.y);
         Some(Self { yaw_rad, ahead_m })
     }
 }

@@ -192,10 +192,8 @@ impl System {
             variance += apart.component_mul(&apart);
         }
         let scale = (BLOCKS - 1) as f64 / BLOCKS as f64;
-        Some(std::array::from_fn(|k| Estimate {
-            value: value[k],
-            sigma: (scale * variance[k]).sqrt(),
-        }))
+        let estimate = |k: usize| Estimate::new(value[k], (scale * variance[k]).sqrt());
+        Some(std::array::from_fn(estimate))
     }
 
     fn solve_without(&self, free: &[Fact], left_out: Option<usize>) -> Option<FactVector> {

@@ -2,7 +2,7 @@
 
 use std::{fmt, iter};
 
-use super::{Configured, WRONG_SIGMAS};
+use super::Configured;
 use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
 
 /// The given length of the path over that by the scans: beyond, it is of another drive, or scans
@@ -10,6 +10,9 @@ use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
 const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Least relative difference of the path between both directions of time: the error of its length.
 const PATH_ERROR: f64 = 1e-3;
+
+/// Key, name, unit for printing, and factor to that unit.
+pub(super) type Label = (&'static str, &'static str, &'static str, f64);
 
 /// A constant that the configuration has a key for.
 #[derive(Clone)]
@@ -63,26 +66,16 @@ impl Constant {
             mean.is_determined() && drives().all(|it| it.is_proposed || !it.is_determined());
         mean
     }
-
-    /// Returns whether the configured value contradicts the drive.
-    pub fn is_wrong(&self) -> bool {
-        (self.configured - self.found.value).abs() > WRONG_SIGMAS * self.found.sigma
-    }
 }
 
 /// Puts the estimate of a fact beside its configured value.
 pub(super) fn constant(
-    key: &'static str,
-    name: &'static str,
-    (unit, scale): (&'static str, f64),
+    (key, name, unit, scale): Label,
     configured: f64,
     fact: &FactEstimate,
     calibration: &Calibration,
 ) -> Constant {
-    let found = Estimate {
-        value: configured + fact.change.value,
-        sigma: fact.change.sigma,
-    };
+    let found = Estimate::new(configured + fact.change.value, fact.change.sigma);
     let part = |estimate: &Estimate| {
         format!(
             "{:.3} \u{b1} {:.3}",
@@ -145,10 +138,7 @@ pub(super) fn resolution(
         unit: "m",
         scale: 1.0,
         configured: resolution_m,
-        found: Estimate {
-            value,
-            sigma: value * PATH_ERROR,
-        },
+        found: Estimate::new(value, value * PATH_ERROR),
         useful_sigma: f64::INFINITY,
         has_settled: true,
         is_proposed: true,
@@ -163,7 +153,7 @@ impl fmt::Display for Constant {
         let verdict = match (self.is_determined(), self.is_proposed) {
             (false, _) => "the scans do not tell it well enough",
             (true, false) => "not proposed: the scans would overlap less",
-            _ if self.is_wrong() => "CONTRADICTS the configured value",
+            _ if self.found.contradicts(self.configured) => "CONTRADICTS the configured value",
             _ => "agrees with the configured value",
         };
         let [value, sigma, configured] =

@@ -11,10 +11,7 @@ fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
         unit: "m",
         scale: 1.0,
         configured: -0.1,
-        found: Estimate {
-            value: -0.5,
-            sigma: 0.02,
-        },
+        found: Estimate::new(-0.5, 0.02),
         useful_sigma: 0.2,
         has_settled: true,
         is_proposed,

@@ -80,21 +80,15 @@ impl Fit {
                 variance += apart.component_mul(&apart);
             }
             let share = (BLOCKS - 1) as f64 / BLOCKS as f64;
-            Some(std::array::from_fn(|k| Estimate {
-                value: all[k],
-                sigma: (share * variance[k]).sqrt(),
-            }))
+            let estimate = |k: usize| Estimate::new(all[k], (share * variance[k]).sqrt());
+            Some(std::array::from_fn(estimate))
         };
         let [scale, bias, late, _] = jackknife(without_drift)?;
-        let unknown = Estimate {
-            value: 0.0,
-            sigma: f64::INFINITY,
-        };
         let halves = [&turns[..count / 2], &turns[count / 2..]];
         Some(Self {
             parameters: [scale, bias, late],
             halves_s: halves.map(|half| Some(problem.solve(half, without_drift)?[2])),
-            drift: jackknife(with_drift).map_or(unknown, |all| all[3]),
+            drift: jackknife(with_drift).map_or(Estimate::UNKNOWN, |all| all[3]),
             turns: count,
         })
     }
