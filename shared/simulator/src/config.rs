@@ -1,6 +1,7 @@
 //! The configuration of a simulation.
 
 use gyre_datasets::DatasetOptions;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::drive::DriveConfig;
@@ -15,9 +16,7 @@ use crate::wheels::SimulatedWheelsConfig;
 pub(crate) const MAX_SCANS: usize = 100_000;
 
 /// The errors of the radar.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Realism {
     /// Noise, speckle, fluctuating echoes, a jittering encoder, and azimuths that are lost.
@@ -31,7 +30,7 @@ pub enum Realism {
 ///
 /// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines
 /// and logarithms are the system's).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
     /// Scans to generate. A drive around a block is repeated as long as they last; a drive along a
@@ -106,11 +105,8 @@ impl SimulationConfig {
         self.drive.validate()?;
         self.sensor.validate()?;
         if self.sensor.lost_azimuths && self.output.format != Some(OutputFormat::Radiate) {
-            return Err(SimulatorError::Config {
-                key: "sensor.lost_azimuths",
-                value: "true".to_owned(),
-                expected: "false unless output.format = \"radiate\": in other formats the azimuth of each row is written beside it".to_owned(),
-            });
+            let expected = "false unless output.format = \"radiate\": in other formats the azimuth of each row is written beside it";
+            return Err(SimulatorError::key("sensor.lost_azimuths", true, expected));
         }
         self.gyro.validate()?;
         self.wheels.validate()?;

@@ -59,8 +59,8 @@ pub(crate) fn fixes(
 ) -> Option<Vec<RawFix>> {
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
-        let mut rng = Stream::GnssErrors.generator(seed);
-        let mut holes = Episodes::new(HOLE_EVERY_S, HOLE_S, Stream::GnssHoles.generator(seed));
+        let mut rng = Stream::GNSS_ERRORS.generator(seed);
+        let mut holes = Episodes::new(HOLE_EVERY_S, HOLE_S, Stream::GNSS_HOLES.generator(seed));
         let kept = (-1.0 / (config.rate_hz * BIAS_LASTS_S)).exp();
         let fresh_m = BIAS_M * (1.0 - kept * kept).sqrt();
         let mut bias_m = normal(&mut rng) * BIAS_M;

@@ -2,19 +2,7 @@
 //!
 //! A vehicle with a radar drives around a block of houses or along a trajectory. The result is a
 //! dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed into a pipeline.
-//! In the order of the data:
-//!
-//! - [`config`]: the configuration,
-//! - [`drive`], [`path`]: the path of the sensor, a pose for every instant; `route`: the places
-//!   along it,
-//! - `scenery`, `cars`, `tunnel`: what stands along the route and what moves on it,
-//! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
-//!   points,
-//! - [`profile`]: the radars; [`sensor`]: the measurement of one sweep; [`gyro`], [`wheels`],
-//!   [`gnss`]: the other sensors,
-//! - [`simulator`]: single scans with their exact poses,
-//! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format, with its truth,
-//! - [`writer`]: the same on a disk.
+//! [`simulator`] renders single scans with their exact poses, [`sensor`] measures one sweep.
 //!
 //! ```
 //! use gyre_simulator::{SimulationConfig, Simulator};

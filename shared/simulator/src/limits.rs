@@ -12,9 +12,6 @@ pub(crate) fn require_within(
     if (min..=max).contains(&value) {
         return Ok(());
     }
-    Err(SimulatorError::Config {
-        key,
-        value: value.to_string(),
-        expected: format!("between {min} and {max}"),
-    })
+    let expected = format!("between {min} and {max}");
+    Err(SimulatorError::key(key, value, expected))
 }

@@ -2,15 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Bytes before each azimuth's bins: stamp, encoder, validity or chirp, as in Oxford's files.
 pub const METADATA_BYTES: usize = 11;
 
 /// A radar.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
     /// Navtech CTS350-X as recorded by Oxford Radar RobotCar: 3768 bins of 0.0438 m.

@@ -15,7 +15,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
+use crate::body::{Body, NO_BODY, Scatterer, Wall};
 use crate::cars::car;
 use crate::route::{KERBS_M, Route, Side};
 use crate::stream::Stream;
@@ -45,7 +45,7 @@ pub(crate) fn build(route: &Route, seed: u64) -> Body {
         built: Body::default(),
         bodies: NO_BODY,
         taken: lanes(route),
-        rng: Stream::Scenery.generator(seed),
+        rng: Stream::SCENERY.generator(seed),
     };
     for side in Side::BOTH {
         site.furnish_kerb(route, side);
@@ -245,12 +245,8 @@ impl Site {
         }
         let body = self.body();
         let [from, to] = [-half_m, half_m].map(|x| frame * Point2::new(x, 0.0));
-        self.built.walls.push(Wall {
-            from,
-            to,
-            transmission: FENCE_TRANSMISSION,
-            body,
-        });
+        let fence = Wall::new(from, to, FENCE_TRANSMISSION, body);
+        self.built.walls.push(fence);
         for post in 0..(6.0 * half_m) as usize {
             let place = from + (to - from) * (post as f64 / (6.0 * half_m));
             let cross_section_m2 = 0.3 * 10f64.powf(0.4 * self.normal());
@@ -262,12 +258,8 @@ impl Site {
     /// A wall of a house, seen from outside; outside is on the right when going from its first end
     /// to its second.
     fn front(&mut self, [from, to]: [Point2<f64>; 2], bay_m: f64, detail: f64, body: u32) {
-        self.built.walls.push(Wall {
-            from,
-            to,
-            transmission: HOUSE_TRANSMISSION,
-            body,
-        });
+        let wall = Wall::new(from, to, HOUSE_TRANSMISSION, body);
+        self.built.walls.push(wall);
         let length_m = (to - from).norm();
         let along = (to - from) / length_m;
         let outward = Vector2::new(along.y, -along.x);
@@ -318,15 +310,9 @@ impl Site {
         body: u32,
     ) {
         let cross_section_m2 = median_m2 * 10f64.powf(0.3 * self.normal());
-        self.built.scatterers.push(Scatterer {
-            position,
-            cross_section_m2,
-            aspect: Aspect::Facing {
-                normal: direction.normalize(),
-                sharpness,
-            },
-            body,
-        });
+        let normal = direction.normalize();
+        let part = Scatterer::facing(position, cross_section_m2, normal, sharpness, body);
+        self.built.scatterers.push(part);
     }
 
     /// Takes a rectangle of a frame, unless something stands there.

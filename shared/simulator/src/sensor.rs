@@ -121,7 +121,7 @@ impl Sensor {
         index: u64,
         slot: &mut ScanSlot<'_>,
     ) -> SweepGeometry {
-        let mut rng = Stream::Scan(index).generator(self.seed);
+        let mut rng = Stream::scan(index).generator(self.seed);
         self.collect_echoes(scene, time);
         for azimuth in 0..self.sampling.azimuths {
             rng.set_word_pos((azimuth as u128 + 1) * WORDS_PER_AZIMUTH);

@@ -13,11 +13,9 @@ use crate::cars;
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
 use crate::gyro::log;
-use crate::layout::SideFile;
-use crate::layout::{boreas, oxford, radiate};
-use crate::output::{HostStamps, OutputFormat};
-use crate::profile::Chirp;
-use crate::profile::METADATA_BYTES;
+use crate::layout::{SideFile, boreas, oxford, radiate};
+use crate::output::OutputFormat;
+use crate::profile::{Chirp, METADATA_BYTES};
 use crate::sensor::Sensor;
 use crate::simulator::Simulator;
 use crate::truth;
@@ -29,8 +27,6 @@ use render_ahead::Ahead;
 pub struct SimulatedDrive {
     simulator: Simulator,
     output: OutputFormat,
-    host: HostStamps,
-    seed: u64,
 }
 
 impl SimulatedDrive {
@@ -41,12 +37,7 @@ impl SimulatedDrive {
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
         }
-        Ok(Self {
-            simulator,
-            output,
-            host: config.output.host_stamps,
-            seed: config.sensor_seed(),
-        })
+        Ok(Self { simulator, output })
     }
 
     pub fn simulator(&self) -> &Simulator {
@@ -80,9 +71,8 @@ impl SimulatedDrive {
     /// The folder of the images, relative to the dataset's.
     pub fn image_folder(&self) -> &'static str {
         match self.output {
-            OutputFormat::Oxford => oxford::FOLDER,
-            OutputFormat::Boreas => boreas::FOLDER,
-            OutputFormat::Radiate => radiate::FOLDER,
+            OutputFormat::Oxford | OutputFormat::Boreas => "radar",
+            OutputFormat::Radiate => "Navtech_Polar",
         }
     }
 
@@ -98,16 +88,11 @@ impl SimulatedDrive {
     /// Columns and rows of an image.
     pub fn image_size(&self) -> ImageSize {
         let sampling = self.simulator.sampling();
-        match self.output {
-            OutputFormat::Radiate => ImageSize {
-                width: sampling.azimuths,
-                height: sampling.bins,
-            },
-            _ => ImageSize {
-                width: METADATA_BYTES + sampling.bins,
-                height: sampling.azimuths,
-            },
-        }
+        let [width, height] = match self.output {
+            OutputFormat::Radiate => [sampling.azimuths, sampling.bins],
+            _ => [METADATA_BYTES + sampling.bins, sampling.azimuths],
+        };
+        ImageSize { width, height }
     }
 
     /// The scan's time as the format defines it, nanoseconds since 1970.
@@ -122,14 +107,15 @@ impl SimulatedDrive {
         }
     }
 
+    fn stamps_ns(&self) -> Vec<i64> {
+        (0..self.scans())
+            .map(|index| self.stamp_ns(index))
+            .collect()
+    }
+
     /// `ground_truth.tum`: the poses at the times of the scans.
     pub fn ground_truth_tum(&self) -> Vec<u8> {
-        truth::ground_truth_tum(
-            &self.simulator,
-            (0..self.scans())
-                .map(|index| self.stamp_ns(index))
-                .collect(),
-        )
+        truth::ground_truth_tum(&self.simulator, self.stamps_ns())
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
@@ -146,48 +132,43 @@ impl SimulatedDrive {
 
     /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
+        let simulator = &self.simulator;
         let mut files = match self.output {
-            OutputFormat::Oxford => oxford::side_files(&self.simulator),
-            OutputFormat::Boreas => boreas::side_files(&self.simulator),
-            OutputFormat::Radiate => self
-                .stamps()
-                .map(|text| ("Navtech_Polar.txt".into(), text.into_bytes()))
-                .into_iter()
-                .collect(),
+            OutputFormat::Oxford => oxford::side_files(simulator),
+            OutputFormat::Boreas => boreas::side_files(simulator),
+            OutputFormat::Radiate => Vec::new(),
         };
-        files.push(("ground_truth.tum".into(), self.ground_truth_tum()));
-        files.push((
-            "azimuth_poses.npy".into(),
-            truth::azimuth_poses_npy(&self.simulator),
-        ));
-        let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
-        files.push((
-            cars::FILE.into(),
-            truth::objects_csv(&self.simulator, stamps_ns),
-        ));
-        files.extend(
-            self.gyro_samples()
-                .map(|samples| (log::FILE.into(), log::csv(&samples))),
-        );
-        files.extend(
-            self.wheel_samples()
-                .map(|samples| (wheels::FILE.into(), wheels::csv(&samples))),
-        );
-        let fixes = self.simulator.gnss_fixes();
-        files.extend(fixes.map(|fixes| (gnss::FILE.into(), gnss::csv(&fixes))));
+        let mut add = |name: &str, bytes: Vec<u8>| files.push((name.into(), bytes));
+        if let Some(stamps) = self.stamps() {
+            add("Navtech_Polar.txt", stamps.into_bytes());
+        }
+        add("ground_truth.tum", self.ground_truth_tum());
+        add("azimuth_poses.npy", truth::azimuth_poses_npy(simulator));
+        add(cars::FILE, truth::objects_csv(simulator, &self.stamps_ns()));
+        if let Some(samples) = self.gyro_samples() {
+            add(log::FILE, log::csv(&samples));
+        }
+        if let Some(samples) = self.wheel_samples() {
+            add(wheels::FILE, wheels::csv(&samples));
+        }
+        if let Some(fixes) = simulator.gnss_fixes() {
+            add(gnss::FILE, gnss::csv(&fixes));
+        }
         files
     }
 
     fn stamps(&self) -> Option<String> {
+        let config = self.simulator.config();
+        let host = config.output.host_stamps;
         (self.output == OutputFormat::Radiate)
-            .then(|| radiate::stamps(&self.simulator, self.host, self.seed))
+            .then(|| radiate::stamps(&self.simulator, host, config.sensor_seed()))
     }
 
     /// Returns the azimuths of a scan that the host loses, in order: see
     /// [`SensorConfig::lost_azimuths`](crate::SensorConfig::lost_azimuths).
     pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
         match self.output {
-            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, self.seed, index),
+            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, index),
             OutputFormat::Oxford | OutputFormat::Boreas => Vec::new(),
         }
     }

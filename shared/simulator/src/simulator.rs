@@ -124,12 +124,8 @@ impl Simulator {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
     /// without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(
-            &self.config.gyro,
-            self.config.seed,
-            self.path(),
-            self.span(),
-        )
+        let Self { config, .. } = self;
+        log::samples(&config.gyro, config.seed, self.path(), self.span())
     }
 
     /// The samples of the wheels, by their stamps. `None` without wheels that measure.
@@ -142,6 +138,11 @@ impl Simulator {
     pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
         let Self { config, .. } = self;
         gnss::fixes(&config.gnss, config.seed, self.path(), self.span())
+    }
+
+    /// The time of a stamp since the start of the drive, seconds.
+    pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {
+        (stamp_ns - self.span().0) as f64 * 1e-9
     }
 
     /// The start of the drive, ns since 1970, and its duration, s.
@@ -207,11 +208,9 @@ fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize,
     }
     let most = (duration_s / period_s + 0.5) as usize;
     match wanted {
-        Some(scans) if scans > most => Err(SimulatorError::TooManyScans {
-            scans,
-            most,
-            duration_s,
-        }),
+        Some(scans) if scans > most => Err(SimulatorError::Refused(format!(
+            "`simulation.scans` is {scans}, but the drive ends after {most} scans ({duration_s:.1} s): take at most so many, or leave the key out"
+        ))),
         Some(scans) => Ok(scans),
         None => Ok(most.clamp(1, MAX_SCANS)),
     }

@@ -3,13 +3,10 @@
 //!
 //! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the
 //! first azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise.
-//! It takes 12.8 MB for 1,000 scans of 400 azimuths, and `numpy.load(path, mmap_mode="r")` opens
-//! it. The header is written here since `ndarray-npy` and `npyz` would add a Python parser (pest)
-//! and a C build for these ten lines.
 
 use std::fmt::Write;
 
-use gyre_geometry::{Pose, xy_yaw};
+use gyre_geometry::xy_yaw;
 use gyre_radar::Trajectory;
 use nalgebra::Point2;
 
@@ -21,26 +18,13 @@ use crate::world::World;
 
 /// `ground_truth.tum` as bytes. `stamps_ns` are the times of the scans.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
-    let poses = stamps_ns
-        .iter()
-        .enumerate()
-        .map(|(index, ns)| pose_at(simulator, index, *ns))
-        .collect();
+    let pose = |stamp_ns: &i64| simulator.path().pose(simulator.drive_time_s(*stamp_ns));
+    let poses = stamps_ns.iter().map(pose).collect();
+    let stamp_ns = Some(stamps_ns);
     let mut text = Vec::new();
     // Writing to memory cannot fail, and there are stamps.
-    let _ = gyre_datasets::write_tum(
-        &Trajectory {
-            stamp_ns: Some(stamps_ns),
-            poses,
-        },
-        &mut text,
-    );
+    let _ = gyre_datasets::write_tum(&Trajectory { stamp_ns, poses }, &mut text);
     text
-}
-
-fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Pose {
-    let epoch_ns = simulator.time(index).epoch_us * 1000;
-    simulator.path().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }
 
 /// `azimuth_poses.npy` as bytes.
@@ -53,12 +37,8 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
         for azimuth in 0..azimuths {
             let time_s = time.drive_time_s(time.stamp_us(azimuth));
             let pose = simulator.path().pose(time_s);
-            for value in [
-                time_s,
-                pose.translation.x,
-                pose.translation.y,
-                pose.rotation.angle(),
-            ] {
+            let [x, y, yaw] = xy_yaw(&pose);
+            for value in [time_s, x, y, yaw] {
                 bytes.extend(value.to_le_bytes());
             }
         }
@@ -80,12 +60,11 @@ fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
 }
 
 /// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.
-pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: impl Iterator<Item = i64>) -> Vec<u8> {
+pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     let receiver = simulator.config().sensor.receiver();
-    for (scan, stamp_ns) in stamps_ns.enumerate() {
-        let (start_ns, _) = simulator.span();
-        let time_s = (stamp_ns - start_ns) as f64 * 1e-9;
+    for (scan, &stamp_ns) in stamps_ns.iter().enumerate() {
+        let time_s = simulator.drive_time_s(stamp_ns);
         let place = Point2::from(simulator.path().pose(time_s).translation.vector);
         for car in simulator.cars().near(place, REPORTED_M, time_s) {
             let [visible, power] = best_echo(simulator.world(), &receiver, place, &car);
@@ -113,7 +92,7 @@ fn best_echo(world: &World, receiver: &Receiver, from: Point2<f64>, car: &Moving
         let ray = from - there.position;
         let range_m = ray.norm().max(1.0);
         let passed = world.transmission(from, there.position, there.body);
-        let gain = there.aspect.gain(ray / range_m);
+        let gain = there.gain(ray / range_m);
         let power = there.cross_section_m2 * gain * receiver.sensitivity(range_m);
         [passed, power * passed]
     });

@@ -5,11 +5,12 @@ mod resume;
 
 use std::fs::{self, File};
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use gyre_datasets::ImageSource as _;
+use gyre_storage::StorageError;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
@@ -22,9 +23,6 @@ pub use resume::MADE_BY;
 /// The result of writing a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// The dataset's folder.
-    pub folder: PathBuf,
-    /// Scans in the dataset.
     pub scans: usize,
     /// Scans that existed already.
     pub kept: usize,
@@ -63,7 +61,7 @@ pub fn write_dataset_on(
 ) -> Result<Summary, SimulatorError> {
     let drive = SimulatedDrive::new(config)?;
     let images = out.join(drive.image_folder());
-    fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
+    fs::create_dir_all(&images).map_err(StorageError::at("write", &images))?;
     let _alone = lock(out)?;
     let missing = resume::missing(&drive, config, out)?;
     gyre_storage::write(&out.join(MADE_BY), resume::made_by(config)?)?;
@@ -74,25 +72,32 @@ pub fn write_dataset_on(
     progress(kept, drive.scans());
     let mut written = |done| progress(kept + done, drive.scans());
     write_images(&drive, &missing, threads.get(), &images, &mut written)?;
-    Ok(summary(&drive, out, kept))
+    Ok(summary(&drive, kept))
+}
+
+/// The error of a folder that holds a foreign file.
+fn in_use(folder: &Path, other: &str) -> SimulatorError {
+    SimulatorError::OtherFiles(format!(
+        "{} holds `{other}`, which is no file of this dataset: choose an empty folder",
+        folder.display()
+    ))
 }
 
 /// Locks the folder for this process until the returned file is dropped.
 fn lock(folder: &Path) -> Result<File, SimulatorError> {
-    let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
+    let failed = StorageError::at("write", folder);
+    let handle = File::open(folder).map_err(&failed)?;
     match handle.try_lock() {
         Ok(()) => Ok(handle),
-        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy {
-            folder: folder.to_owned(),
-        }),
-        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write {
-            path: folder.to_owned(),
-            source,
-        }),
+        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Refused(format!(
+            "another process is writing to {}: wait for it, or choose another folder",
+            folder.display()
+        ))),
+        Err(fs::TryLockError::Error(source)) => Err(failed(source).into()),
     }
 }
 
-fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
+fn summary(drive: &SimulatedDrive, kept: usize) -> Summary {
     let simulator = drive.simulator();
     let last = simulator.scans() - 1;
     let step_m = |i: usize| {
@@ -102,7 +107,6 @@ fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
             .norm()
     };
     Summary {
-        folder: out.to_owned(),
         scans: simulator.scans(),
         kept,
         path_m: (0..last).map(step_m).sum(),
@@ -114,7 +118,7 @@ fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorE
     for (name, bytes) in drive.side_files() {
         let path = out.join(name);
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
+            fs::create_dir_all(folder).map_err(StorageError::at("write", folder))?;
         }
         gyre_storage::write(&path, &bytes)?;
     }

@@ -260,6 +260,7 @@ fn an_interrupted_dataset_is_completed() {
     })
     .unwrap();
     assert_eq!((summary.scans, summary.kept), (6, 4));
+    assert!((summary.duration_s - 1.25).abs() < 1e-9 && summary.path_m > 2.0);
     assert_eq!(seen, [(4, 6), (5, 6), (6, 6)]);
     assert_eq!(
         fs::metadata(&images[1]).unwrap().modified().unwrap(),
@@ -292,7 +293,7 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     };
     assert!(matches!(
         write(&other_seed, folder.path()),
-        Err(SimulatorError::OtherDataset { .. })
+        Err(SimulatorError::OtherFiles(_))
     ));
     let fewer = SimulationConfig {
         scans: Some(2),
@@ -300,7 +301,7 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     };
     assert!(matches!(
         write(&fewer, folder.path()),
-        Err(SimulatorError::OutputInUse { .. })
+        Err(SimulatorError::OtherFiles(_))
     ));
     assert!(all_files(folder.path()) == before);
     let unnamed = tempfile::tempdir().unwrap();
@@ -312,7 +313,7 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     .unwrap();
     assert!(matches!(
         write(&original, unnamed.path()),
-        Err(SimulatorError::OutputInUse { .. })
+        Err(SimulatorError::OtherFiles(_))
     ));
 }
 
@@ -329,7 +330,7 @@ fn an_image_that_would_be_rendered_differently_is_reported() {
     fs::write(&first, bytes).unwrap();
     let error = write(&config, folder.path());
     assert!(
-        matches!(&error, Err(SimulatorError::OtherImage { path }) if *path == first),
+        matches!(&error, Err(SimulatorError::OtherFiles(text)) if text.contains("differs from the image")),
         "{error:?}"
     );
 }

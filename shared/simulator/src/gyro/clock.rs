@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::config::SimulatedGyroConfig;
+use super::SimulatedGyroConfig;
 use crate::{episodes::Episodes, stream::Stream};
 
 /// Time between two stamps while a host catches up, ns.
@@ -25,10 +25,10 @@ pub(super) struct Clock<'a> {
 impl<'a> Clock<'a> {
     /// The clock of a drive.
     pub fn new(config: &'a SimulatedGyroConfig, seed: u64) -> Self {
-        let stalls = Stream::GyroStalls.generator(seed);
+        let stalls = Stream::GYRO_STALLS.generator(seed);
         Self {
             config,
-            rng: Stream::GyroClock.generator(seed),
+            rng: Stream::GYRO_CLOCK.generator(seed),
             stalls: Episodes::new(STALL_EVERY_S, STALL_S, stalls),
             last_ns: i64::MIN + CATCH_UP_NS,
         }

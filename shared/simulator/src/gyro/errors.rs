@@ -31,7 +31,7 @@ pub(super) struct Errors {
 impl Errors {
     /// Draws the errors of a drive.
     pub fn new(figures: &GyroFigures, seed: u64) -> Self {
-        let mut rng = Stream::GyroErrors.generator(seed);
+        let mut rng = Stream::GYRO_ERRORS.generator(seed);
         let bias = normal(&mut rng);
         let scale = normal(&mut rng);
         let askew = normal(&mut rng);

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use gyre_samples::{Sample, SampleKind};
 
+use super::SimulatedGyroConfig;
 use super::attitude::MeanMotion;
 use super::clock::Clock;
-use super::config::SimulatedGyroConfig;
 use super::errors::Errors;
 use crate::path::Path;
 

@@ -4,6 +4,7 @@
 //! with the temperature inside a vehicle: a change of 1 K over 10 minutes is assumed, and the
 //! accuracy of the mounting is assumed where the sheet has no figure.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Degrees in radians.
@@ -13,9 +14,7 @@ const HOUR_S: f64 = 3600.0;
 const TEMPERATURE_S: f64 = 600.0;
 
 /// A gyro.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GyroProfile {
     /// No gyro, and no log.

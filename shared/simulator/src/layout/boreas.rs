@@ -7,8 +7,6 @@ use std::f64::consts::PI;
 use super::SideFile;
 use crate::simulator::Simulator;
 
-pub(crate) const FOLDER: &str = "radar";
-
 /// Time over which the yaw rate is taken, seconds.
 const RATE_SPAN_S: f64 = 1e-3;
 

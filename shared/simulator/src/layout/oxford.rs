@@ -5,8 +5,6 @@
 use super::SideFile;
 use crate::simulator::Simulator;
 
-pub(crate) const FOLDER: &str = "radar";
-
 pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
     format!("{}.png", simulator.time(index).start_us)
 }

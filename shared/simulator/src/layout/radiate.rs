@@ -11,8 +11,6 @@ use crate::output::HostStamps;
 use crate::simulator::Simulator;
 use crate::stream::Stream;
 
-pub(crate) const FOLDER: &str = "Navtech_Polar";
-
 /// Sensor periods that a reader can recognise, microseconds.
 const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
 /// One host stall in this many scans: a recording has seven in 466.
@@ -25,17 +23,14 @@ const CATCH_UP_US: i64 = 5_000;
 /// Checks that readers of this format can handle the radar.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
-    match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
-        true => Ok(()),
-        false => Err(SimulatorError::Config {
-            key: "output.format",
-            value: "radiate".to_owned(),
-            expected: format!(
-                "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
-                sampling.azimuths, sampling.bins, sampling.period_us
-            ),
-        }),
+    if PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
+        return Ok(());
     }
+    let expected = format!(
+        "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
+        sampling.azimuths, sampling.bins, sampling.period_us
+    );
+    Err(SimulatorError::key("output.format", "radiate", expected))
 }
 
 /// Probability that the host loses an azimuth: as in a recording, where 46 % of the scans have lost
@@ -43,11 +38,11 @@ pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
 const LOST: f64 = 0.0015;
 
 /// Returns the azimuths of a scan that the host loses, in order.
-pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
+pub(crate) fn lost_azimuths(simulator: &Simulator, index: usize) -> Vec<usize> {
     if index == 0 || !simulator.config().sensor.lost_azimuths {
         return Vec::new();
     }
-    let mut rng = Stream::Lost(index as u64).generator(seed);
+    let mut rng = Stream::lost(index as u64).generator(simulator.config().sensor_seed());
     let azimuths = 0..simulator.sampling().azimuths;
     azimuths.filter(|_| rng.random_bool(LOST)).collect()
 }
@@ -99,7 +94,7 @@ fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) ->
         return 0;
     }
     let block = index / STALL_EVERY;
-    let mut rng = Stream::Stall(block as u64).generator(seed);
+    let mut rng = Stream::stall(block as u64).generator(seed);
     let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
     let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
     let Some(waiting) = index.checked_sub(begins) else {

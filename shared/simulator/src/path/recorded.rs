@@ -33,9 +33,8 @@ pub struct Excerpt {
 /// is noise of the poses.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
-    let error = |reason: String| SimulatorError::Drive {
-        path: path.to_owned(),
-        reason,
+    let error = |reason: String| {
+        SimulatorError::Refused(format!("cannot drive along {}: {reason}", path.display()))
     };
     let end_s = excerpt.from_s + excerpt.for_s;
     let within: Vec<_> = poses

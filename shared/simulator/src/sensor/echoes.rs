@@ -103,7 +103,7 @@ impl View<'_> {
             false => 1.0,
         };
         let in_sight = scatterer.cross_section_m2
-            * scatterer.aspect.gain(direction)
+            * scatterer.gain(direction)
             * fluctuation
             * self.receiver.sensitivity(range_m);
         if in_sight < NEGLIGIBLE_POWER {

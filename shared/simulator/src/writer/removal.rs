@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use gyre_storage::StorageError;
+
 use super::resume::{DATASET_OPTIONS, MADE_BY, made_with};
 use crate::error::SimulatorError;
 use crate::simulated_drive::SimulatedDrive;
@@ -14,10 +16,6 @@ use crate::simulated_drive::SimulatedDrive;
 pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     let _alone = super::lock(folder)?;
     let found = files(folder)?;
-    let in_use = |other: &Path| SimulatorError::OutputInUse {
-        folder: folder.to_owned(),
-        other: other.display().to_string(),
-    };
     let ours = match made_with(folder)? {
         Some(config) => files_of(&SimulatedDrive::new(&config)?),
         None => BTreeSet::new(),
@@ -26,14 +24,14 @@ pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
         .iter()
         .find(|path| !ours.contains(*path) && !gyre_storage::is_draft(path))
     {
-        return Err(in_use(other));
+        return Err(super::in_use(folder, &other.to_string_lossy()));
     }
     // The file that identifies the dataset is removed last.
     let (last, first): (Vec<_>, Vec<_>) = found
         .iter()
         .partition(|path| path.as_path() == Path::new(MADE_BY));
     for path in first.into_iter().chain(last).map(|path| folder.join(path)) {
-        fs::remove_file(&path).map_err(SimulatorError::write(&path))?;
+        fs::remove_file(&path).map_err(StorageError::at("remove", &path))?;
     }
     Ok(())
 }
@@ -53,13 +51,10 @@ fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
 fn files(folder: &Path) -> Result<Vec<PathBuf>, SimulatorError> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(next) = folders.pop() {
-        let listing = |source| SimulatorError::List {
-            folder: next.clone(),
-            source,
-        };
-        for entry in fs::read_dir(&next).map_err(listing)? {
-            let entry = entry.map_err(listing)?;
-            match entry.file_type().map_err(listing)?.is_dir() {
+        let listing = StorageError::at("list", &next);
+        for entry in fs::read_dir(&next).map_err(&listing)? {
+            let entry = entry.map_err(&listing)?;
+            match entry.file_type().map_err(&listing)?.is_dir() {
                 true => folders.push(entry.path()),
                 false => files.extend(entry.path().strip_prefix(folder).map(Path::to_owned)),
             }
