@@ -61,7 +61,6 @@ impl Scatterer {
         self.normal.dot(&direction).max(0.0).powf(self.sharpness)
     }
 
-    /// The same scatterer on a body that stands at `pose`.
     pub fn moved(&self, pose: &Pose) -> Self {
         Self {
             position: pose * self.position,
@@ -81,7 +80,6 @@ impl Wall {
         }
     }
 
-    /// The same wall on a body that stands at `pose`.
     pub fn moved(&self, pose: &Pose) -> Self {
         Self::new(
             pose * self.from,
@@ -92,14 +90,12 @@ impl Wall {
     }
 }
 
-/// Scatterers and walls.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
     pub scatterers: Vec<Scatterer>,
     pub walls: Vec<Wall>,
 }
 
-/// A moving body at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Moving<'a> {
     /// The content, in its own frame (x ahead), with a number that no other body has.

@@ -65,7 +65,6 @@ pub struct SimulationConfig {
     pub output: OutputConfig,
 }
 
-/// Returns whether all keys of a section are as configurations leave them out.
 fn is_default<T: Default + PartialEq>(section: &T) -> bool {
     *section == T::default()
 }
@@ -89,7 +88,6 @@ impl Default for SimulationConfig {
 }
 
 impl SimulationConfig {
-    /// Checks that all values can be simulated.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         if let Some(scans) = self.scans {
             require_within("scans", scans as f64, 1.0, MAX_SCANS as f64)?;

@@ -52,7 +52,6 @@ impl DriveConfig {
         }
     }
 
-    /// Checks that all values can be driven.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         for side_m in self.block_m {
             require_within("drive.block_m", side_m, 30.0, 400.0)?;

@@ -43,7 +43,6 @@ pub struct SimulatedGnssConfig {
 }
 
 impl SimulatedGnssConfig {
-    /// Checks that all values can be simulated.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("gnss.rate_hz", self.rate_hz, 0.0, 100.0)
     }

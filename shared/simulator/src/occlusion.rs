@@ -24,7 +24,6 @@ pub struct WallGrid {
 }
 
 impl WallGrid {
-    /// Indexes the walls.
     pub fn new(walls: Vec<Wall>) -> Self {
         let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
         let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b))
@@ -66,7 +65,6 @@ impl WallGrid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Visits all walls between two points; see [`crate::World::walls_between`].
     pub fn between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(&Wall, f64)) {
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;

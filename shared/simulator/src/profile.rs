@@ -34,7 +34,6 @@ pub enum Chirp {
     Alternating,
 }
 
-/// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     pub azimuths: usize,
@@ -47,13 +46,11 @@ pub struct Sampling {
     pub range_offset_m: f64,
     /// Time of one turn, microseconds.
     pub period_us: i64,
-    /// Counts of the encoder in one turn.
     pub encoder_counts: u16,
     /// Count of the first azimuth: real sweeps do not begin at zero.
     pub encoder_first: u16,
     /// Counts from one azimuth to the next.
     pub encoder_step: u16,
-    /// The direction of the chirps.
     pub chirp: Chirp,
     /// Doppler shift: metres of range for each m/s of closing speed.
     pub doppler_s: f64,
@@ -104,7 +101,6 @@ impl Sampling {
         f64::from(self.encoder_step) * TAU / f64::from(self.encoder_counts)
     }
 
-    /// Encoder count at an azimuth.
     pub fn encoder_count(&self, azimuth: usize) -> u16 {
         self.encoder_first + self.encoder_step * azimuth as u16
     }
@@ -119,7 +115,6 @@ impl Sampling {
         METADATA_BYTES + self.bins
     }
 
-    /// The bin of a range, with fractions.
     pub fn bin(&self, range_m: f64) -> f64 {
         (range_m - self.range_offset_m) / self.range_resolution_m - 0.5
     }
@@ -136,7 +131,6 @@ impl Sampling {
 }
 
 impl Profile {
-    /// The sampling of this radar.
     pub fn sampling(self) -> Sampling {
         let oxford = Sampling {
             azimuths: 400,

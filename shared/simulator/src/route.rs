@@ -15,7 +15,6 @@ const STEP_S: f64 = 0.02;
 /// left of a street with two lanes.
 pub(crate) const KERBS_M: [f64; 2] = [2.8, 6.2];
 
-/// One side of the street.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Left,

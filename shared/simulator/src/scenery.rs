@@ -39,7 +39,6 @@ const HALLS_M: std::ops::Range<f64> = 24.0..90.0;
 const HOUSE_TRANSMISSION: f64 = 0.1;
 const FENCE_TRANSMISSION: f64 = 0.6;
 
-/// Builds the scenery of a route.
 pub(crate) fn build(route: &Route, seed: u64) -> Body {
     let mut site = Site {
         built: Body::default(),
@@ -85,10 +84,8 @@ fn square(place: Point2<f64>) -> Square {
     (at.x.floor() as i64, at.y.floor() as i64)
 }
 
-/// The scenery that grows.
 struct Site {
     built: Body,
-    /// Bodies so far.
     bodies: u32,
     taken: HashSet<Square>,
     rng: ChaCha8Rng,
@@ -330,7 +327,6 @@ impl Site {
         is_free
     }
 
-    /// The number of a new body.
     fn body(&mut self) -> u32 {
         self.bodies += 1;
         self.bodies

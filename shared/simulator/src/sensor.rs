@@ -59,7 +59,6 @@ pub struct Scene<'a> {
     pub world: &'a World,
     /// The moving bodies near the sensor, at the middle of the sweep.
     pub movers: &'a [Moving<'a>],
-    /// The path of the sensor.
     pub path: &'a dyn Path,
     /// True if the radome is blocked, so that no echo passes.
     pub blind: bool,
@@ -134,7 +133,6 @@ impl Sensor {
         self.geometry(time)
     }
 
-    /// Collects the echoes of the sweep.
     fn collect_echoes(&mut self, scene: Scene<'_>, time: SweepTime) {
         let error_rad = |azimuth_rad: f64| self.eccentricity_rad * azimuth_rad.cos();
         self.sweep_poses

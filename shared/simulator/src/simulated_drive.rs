@@ -22,7 +22,6 @@ use crate::truth;
 use crate::{gnss, wheels};
 use render_ahead::Ahead;
 
-/// A simulated drive in a dataset format.
 #[derive(Clone)]
 pub struct SimulatedDrive {
     simulator: Simulator,
@@ -76,7 +75,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// The name of an image.
     pub fn image_name(&self, index: usize) -> String {
         match self.output {
             OutputFormat::Oxford => oxford::file_name(&self.simulator, index),
@@ -113,7 +111,6 @@ impl SimulatedDrive {
             .collect()
     }
 
-    /// `ground_truth.tum`: the poses at the times of the scans.
     pub fn ground_truth_tum(&self) -> Vec<u8> {
         truth::ground_truth_tum(&self.simulator, self.stamps_ns())
     }

@@ -75,7 +75,6 @@ impl Simulator {
         &self.config
     }
 
-    /// The sampling of the radar.
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
     }
@@ -85,7 +84,6 @@ impl Simulator {
         self.scans
     }
 
-    /// The path of the sensor.
     pub fn path(&self) -> &dyn Path {
         self.path.as_ref()
     }
@@ -95,7 +93,6 @@ impl Simulator {
         &self.world
     }
 
-    /// The time of scan `index`.
     pub fn time(&self, index: usize) -> SweepTime {
         let Sampling {
             period_us,
@@ -116,7 +113,6 @@ impl Simulator {
         self.path.pose(time.drive_time_s(time.middle_us()))
     }
 
-    /// The oncoming cars.
     pub(crate) fn cars(&self) -> &Cars {
         &self.cars
     }
@@ -140,7 +136,6 @@ impl Simulator {
         gnss::fixes(&config.gnss, config.seed, self.path(), self.span())
     }
 
-    /// The time of a stamp since the start of the drive, seconds.
     pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {
         (stamp_ns - self.span().0) as f64 * 1e-9
     }
@@ -151,14 +146,12 @@ impl Simulator {
         (EPOCH_US * 1000, end_s)
     }
 
-    /// A new sensor for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
         let Self { config, .. } = self;
         let is_exact = config.realism == Realism::Exact;
         Sensor::new(&config.sensor, is_exact, config.sensor_seed())
     }
 
-    /// The size of one scan.
     pub fn limits(&self) -> ScanLimits {
         ScanLimits {
             bytes: self.sampling.azimuths * self.sampling.stride(),

@@ -40,7 +40,6 @@ impl Stream {
         Self((1 << 44) + index)
     }
 
-    /// The stream's generator, at its first number.
     pub fn generator(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(self.0);

@@ -27,7 +27,6 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
     text
 }
 
-/// `azimuth_poses.npy` as bytes.
 pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
     let (scans, azimuths) = (simulator.scans(), simulator.sampling().azimuths);
     let mut bytes = npy_header(scans, azimuths);

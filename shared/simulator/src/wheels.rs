@@ -44,7 +44,6 @@ pub struct SimulatedWheelsConfig {
 }
 
 impl SimulatedWheelsConfig {
-    /// Checks that all values can be simulated.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("wheels.rate_hz", self.rate_hz, 0.0, 1000.0)?;
         require_within("wheels.delay_s", self.delay_s, -1e6, 1e6)

@@ -38,7 +38,6 @@ pub struct FactEstimate {
     pub fact: Fact,
     /// Change against the configured value, in the fact's unit.
     pub change: Estimate,
-    /// The estimate from the overlap of scans alone.
     pub by_overlap: Estimate,
     /// The estimate from the drift between revisits alone, if there are any.
     pub by_drift: Option<Estimate>,
@@ -78,7 +77,6 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Returns the changes of the facts that are corrected.
     pub fn change(&self) -> FactVector {
         change_of(&self.facts, &self.proposed)
     }
@@ -229,7 +227,6 @@ fn evenly(mut revisits: Vec<Revisit>, track: &Track) -> Vec<Revisit> {
     revisits.into_iter().step_by(stride).collect()
 }
 
-/// The pairs of scans along a track, and the revisits.
 fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Pair> {
     let mut pairs = along(track);
     pairs.extend(revisits.iter().map(Pair::from));

@@ -11,7 +11,6 @@ use crate::{
 /// The turn or the distance from one scan to the next, by the radar alone and by another sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
-    /// The stamp of the later scan, ns.
     pub stamp_ns: i64,
     /// The time between them, ns.
     pub interval_ns: i64,

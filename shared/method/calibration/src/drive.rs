@@ -25,7 +25,6 @@ const DIRECTIONS: usize = 360;
 /// Motion from scan to scan above which the vehicle moves, m.
 const MOVING_M: f64 = 0.5;
 
-/// A scan of the drive.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// Number of the scan in the recording.
@@ -38,11 +37,9 @@ pub struct Sweep {
     pub searched: Pose,
     /// The points as measured under the configured facts.
     pub points: Vec<SparsePoint>,
-    /// Times of the rows by direction, s.
     row_time_s: Vec<f32>,
 }
 
-/// The scans of a drive.
 pub struct Drive {
     odometry: Odometry,
     config: OdometryConfig,
@@ -82,7 +79,6 @@ impl Drive {
         })
     }
 
-    /// Returns the configuration of the odometry.
     pub fn config(&self) -> &OdometryConfig {
         &self.config
     }
@@ -162,7 +158,6 @@ impl Drive {
         self.sweeps.iter().map(|it| it.interval_s <= 0.0).collect()
     }
 
-    /// Returns the points of a scan under changed facts.
     pub fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
         let points = self.sweeps[scan].points.iter();
         points
@@ -177,7 +172,6 @@ impl Drive {
         self.sweeps[scan].row_time_s[direction.min(DIRECTIONS - 1)].into()
     }
 
-    /// Returns the mean of the tracks in both directions of time, as configured.
     pub fn mean_track(&self) -> Result<Track, ConfigError> {
         self.mean_track_with(&FactVector::zeros())
     }
@@ -250,7 +244,6 @@ impl Track {
         }
     }
 
-    /// Returns the path up to each scan, m.
     pub fn path_m(&self) -> Vec<f64> {
         let mut path_m = 0.0;
         let up_to = |motion: &UncertainMotion| {
@@ -265,7 +258,6 @@ impl Track {
         self.starts[earlier + 1..=later].contains(&true)
     }
 
-    /// Returns the mean of two tracks of one drive, motion by motion.
     pub fn mean(&self, other: &Self, drive: &Drive) -> Self {
         let motions = self.motions.iter().zip(&other.motions);
         let motions = motions.map(|(a, b)| UncertainMotion {

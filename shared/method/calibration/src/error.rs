@@ -12,11 +12,7 @@ pub enum CalibrationError {
     #[error(
         "{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more, so give a longer recording or a larger --scans"
     )]
-    TooShort {
-        scans: usize,
-        /// Length of the path, m.
-        path_m: f64,
-    },
+    TooShort { scans: usize, path_m: f64 },
     #[error(
         "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones"
     )]
@@ -29,7 +25,6 @@ pub enum CalibrationError {
     Distance {
         /// The given length, m.
         distance_m: f64,
-        /// The length of the path by odometry, m.
         path_m: f64,
     },
     #[error(transparent)]

@@ -9,7 +9,6 @@ pub const FACTS: usize = 5;
 /// One number for each [`Fact`].
 pub type FactVector = SVector<f64, FACTS>;
 
-/// A square matrix over the facts.
 pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 
 /// A fact that moves the points of a scan.
@@ -29,7 +28,6 @@ pub enum Fact {
 }
 
 impl Fact {
-    /// All facts in the order of [`FactVector`].
     pub const ALL: [Self; FACTS] = [
         Self::RangeOffset,
         Self::EccentricityCos,

@@ -42,7 +42,6 @@ const LABELS: [Label; SOLVED.len()] = [
 
 pub struct Found {
     pub scans: usize,
-    /// Length of the path, m.
     pub path_m: f64,
     has_settled: bool,
     /// Mean overlap of scans of one place as configured, and with the drive's findings.
@@ -113,7 +112,6 @@ impl Found {
         }
     }
 
-    /// Returns the changes of the facts that are proposed.
     pub(crate) fn change(&self) -> FactVector {
         let mut change = FactVector::zeros();
         for (fact, constant) in SOLVED.into_iter().zip(&self.constants) {
@@ -135,7 +133,6 @@ impl Found {
         self
     }
 
-    /// Returns the constants that are written.
     pub fn proposed(&self) -> impl Iterator<Item = &Constant> {
         let solved = self
             .constants

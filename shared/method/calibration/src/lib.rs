@@ -44,6 +44,8 @@ pub use section::toml;
 pub use study::Study;
 pub use wheels::{WheelCalibration, calibrate_wheels};
 
+use nalgebra::SVector;
+
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
 
@@ -66,12 +68,10 @@ impl Estimate {
         Self::new(self.value, self.sigma.hypot(sigma))
     }
 
-    /// Returns whether a configured value is wrong.
     pub(crate) fn contradicts(&self, configured: f64) -> bool {
         (configured - self.value).abs() > WRONG_SIGMAS * self.sigma
     }
 
-    /// Returns the verdict on a configured value, if there is one that is used.
     pub(crate) fn verdict(&self, configured: Option<f64>) -> String {
         let Some(value) = configured else {
             return String::new();
@@ -94,6 +94,25 @@ impl Estimate {
             sigma: (own + others).powf(-0.5) * apart.max(1.0),
         }
     }
+}
+
+/// Blocks of the drive for the jackknife.
+pub(crate) const BLOCKS: usize = 12;
+
+/// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block of
+/// the drive.
+pub(crate) fn jackknife<const N: usize>(
+    solve: impl Fn(Option<usize>) -> Option<SVector<f64, N>>,
+) -> Option<[Estimate; N]> {
+    let all = solve(None)?;
+    let mut variance = SVector::<f64, N>::zeros();
+    for block in 0..BLOCKS {
+        let apart = solve(Some(block))? - all;
+        variance += apart.component_mul(&apart);
+    }
+    let share = (BLOCKS - 1) as f64 / BLOCKS as f64;
+    let estimate = |k: usize| Estimate::new(all[k], (share * variance[k]).sqrt());
+    Some(std::array::from_fn(estimate))
 }
 
 #[cfg(test)]

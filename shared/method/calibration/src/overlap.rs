@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 use std::thread;
 
 use crate::{
-    Drive, Estimate, Fact, FactMatrix, FactVector, Revisit, Track,
+    BLOCKS, Drive, Estimate, Fact, FactMatrix, FactVector, Revisit, Track,
     facts::FACTS,
+    jackknife,
     pair::{PairSlope, View, compare},
 };
 
@@ -19,8 +20,6 @@ const SPACING_M: f64 = 2.5;
 const MAX_PAIRS: usize = 1200;
 /// Views that a thread keeps: the scans within the longest baseline.
 const VIEWS: usize = 24;
-/// Blocks of the drive for the jackknife.
-const BLOCKS: usize = 12;
 
 /// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +30,6 @@ pub(crate) struct Pair {
     pub pose: gyre_geometry::Pose,
 }
 
-/// Returns pairs of scans along the path.
 pub(crate) fn along(track: &Track) -> Vec<Pair> {
     let path_m = track.path_m();
     let length_m = path_m.last().copied().unwrap_or_default();
@@ -185,15 +183,7 @@ impl System {
     /// deviations by the jackknife over blocks of the drive; the facts that are not in `free` keep
     /// their values. `None` if the pairs do not determine them.
     pub fn solve(&self, free: &[Fact]) -> Option<[Estimate; FACTS]> {
-        let value = self.solve_without(free, None)?;
-        let mut variance = FactVector::zeros();
-        for block in 0..BLOCKS {
-            let apart = self.solve_without(free, Some(block))? - value;
-            variance += apart.component_mul(&apart);
-        }
-        let scale = (BLOCKS - 1) as f64 / BLOCKS as f64;
-        let estimate = |k: usize| Estimate::new(value[k], (scale * variance[k]).sqrt());
-        Some(std::array::from_fn(estimate))
+        jackknife(|left_out| self.solve_without(free, left_out))
     }
 
     fn solve_without(&self, free: &[Fact], left_out: Option<usize>) -> Option<FactVector> {

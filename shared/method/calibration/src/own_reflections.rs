@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 
 use gyre_radar::PolarScan;
 
-/// Depth of a cell, m.
 const CELL_M: f64 = 0.25;
 const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;
 const SECTORS: usize = 90;

@@ -13,7 +13,6 @@ use crate::{CalibrationError, Drive, Track, facts::FactVector};
 #[derive(Clone, Copy, Debug)]
 pub struct Revisit {
     pub later: usize,
-    /// The earlier scan.
     pub earlier: usize,
     /// The pose of the later scan in the frame of the earlier one.
     pub pose: Pose,

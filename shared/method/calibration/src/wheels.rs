@@ -29,7 +29,6 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// The clock and the scale of the wheels, by the distances of the radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
-    /// The delay of the wheels' stamps, s.
     pub delay_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
@@ -131,7 +130,6 @@ impl WheelCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside the configured values if wheels are used.
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
             let verdict = found.verdict(configured.is_used().then_some(value));
@@ -163,7 +161,6 @@ mod tests {
     const START_NS: i64 = 1_549_986_607_000_000_000;
     const SECONDS: i64 = 120;
 
-    /// A speed that changes as in a town, m/s, by a time, s.
     fn speed(time_s: f64, seed: f64) -> f64 {
         let waves = (1..7).map(|k| {
             let pace = 0.07 * f64::from(k) + 0.013 * seed;

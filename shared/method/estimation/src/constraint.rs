@@ -26,7 +26,6 @@ pub struct Constraint {
     pub kind: Kind,
 }
 
-/// The source of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// The motion from the last keyframe to a new one. It is never rejected.
@@ -40,7 +39,6 @@ pub enum Kind {
 }
 
 impl Constraint {
-    /// Creates the odometry constraint from keyframe `from` to the next one.
     pub fn odometry(from: usize, motion: UncertainMotion) -> Self {
         Self {
             from,
@@ -60,7 +58,6 @@ impl Constraint {
         }
     }
 
-    /// Checks that an estimator with `keyframes` keyframes can take the constraint.
     pub(crate) fn check(&self, keyframes: usize) -> Result<(), EstimationError> {
         let &Self { from, to, .. } = self;
         let last = keyframes - 1;

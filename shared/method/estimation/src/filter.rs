@@ -13,7 +13,6 @@ use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict
 /// third by less than a millimetre.
 const LINEARISATIONS: usize = 3;
 
-/// Options of [`TrajectoryFilter`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterOptions {
     /// The largest number of keyframes. The covariance takes 72 bytes times its square, and a loop
@@ -59,7 +58,6 @@ pub struct TrajectoryFilter {
 /// A relative pose as an observation of the state.
 struct Observation {
     ends: [usize; 2],
-    /// The relative pose as predicted.
     predicted: Pose,
     /// Jacobian H of its x, y and yaw with respect to the error of the second pose; for the first
     /// pose it has the opposite sign.
@@ -94,7 +92,6 @@ impl TrajectoryFilter {
         }
     }
 
-    /// Returns the poses of all keyframes.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
@@ -242,7 +239,6 @@ impl TrajectoryFilter {
         used.fill_lower_triangle_with_upper_triangle();
     }
 
-    /// Returns the columns of a keyframe in the covariance.
     fn columns(&self, keyframe: usize) -> MatrixXx3<f64> {
         let size = nalgebra::Dyn(3 * self.poses.len());
         self.covariance

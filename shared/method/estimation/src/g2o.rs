@@ -50,7 +50,6 @@ struct Raw {
 }
 
 impl G2o {
-    /// Reads the text of a g2o file.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
         let mut raw = Raw::default();
         for (number, line) in text.lines().enumerate() {
@@ -200,7 +199,6 @@ impl Raw {
     }
 }
 
-/// Returns the ids and the numbers of a line that has exactly these.
 fn fields<'a, const IDS: usize, const NUMBERS: usize>(
     words: impl Iterator<Item = &'a str>,
     line: usize,

@@ -22,7 +22,6 @@ pub use positions::{Position, WeightedPosition, align};
 use solve::Weights;
 use system::System;
 
-/// Options of [`PoseGraph`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraphOptions {
     /// A loop whose chi-square against the odometry is larger is rejected.
@@ -60,7 +59,6 @@ pub struct PoseGraph {
     state: State,
     odometry: Vec<Edge>,
     loops: Vec<Closing>,
-    /// Number of loops of each group.
     groups: BTreeMap<u64, usize>,
     positions: Vec<Measured>,
     /// The normal equations of the present constraints; `None` after a constraint was added.
@@ -242,7 +240,6 @@ impl PoseGraph {
             .chain(loops)
     }
 
-    /// Returns the edge of a constraint that the graph can take.
     fn edge(&self, constraint: &Constraint) -> Result<Edge, EstimationError> {
         constraint.check(self.state.poses.len())?;
         let ends = [constraint.from, constraint.to];

@@ -42,7 +42,6 @@ impl Drawing {
         })
     }
 
-    /// Draws the next keyframe at `pose`.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), MapError> {
         let odometry = keyframe.pose.motion;
         let pose = *pose;
@@ -55,7 +54,6 @@ impl Drawing {
         Ok(())
     }
 
-    /// Returns the evidence of the keyframes.
     pub fn evidence(&mut self) -> &mut Evidence {
         &mut self.evidence
     }

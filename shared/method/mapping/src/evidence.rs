@@ -38,14 +38,12 @@ pub struct Evidence {
     options: MapOptions,
     view: View,
     store: TileStore,
-    /// The pose of each drawn keyframe, by its `seq`.
     drawn: BTreeMap<u64, Pose>,
     changed: BTreeSet<TileIndex>,
     /// The contribution of a keyframe to a tile: the cell and the amount.
     returned: BTreeMap<TileIndex, Vec<(u32, u32)>>,
 }
 
-/// A change of the drawing.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     Draw,

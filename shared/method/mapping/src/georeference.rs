@@ -10,7 +10,6 @@ use thiserror::Error;
 pub struct Origin {
     /// Latitude of the frame's origin, the sensor at the first keyframe, degrees.
     pub latitude_deg: f64,
-    /// Longitude, degrees.
     pub longitude_deg: f64,
     /// Heading of the frame's x axis, degrees clockwise from true north.
     pub heading_deg: f64,

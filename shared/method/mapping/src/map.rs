@@ -107,7 +107,6 @@ pub fn require_tiles_only(folder: &Path) -> Result<(), MapError> {
     tiles_in(folder).map(drop)
 }
 
-/// Returns the paths of the tiles in a folder, drafts included.
 fn tiles_in(folder: &Path) -> Result<Vec<PathBuf>, MapError> {
     let tiles = folder.join(TILES);
     if !tiles.exists() {
@@ -216,7 +215,6 @@ impl TileSource for Map {
     }
 }
 
-/// Decodes the PNG file of a tile.
 fn decode(bytes: &[u8], image: &mut TileImage) -> Result<(), String> {
     let damaged = |error: png::DecodingError| format!("the tile is damaged: {error}");
     let mut reader = png::Decoder::new(Cursor::new(bytes))

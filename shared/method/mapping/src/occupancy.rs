@@ -18,7 +18,6 @@ pub enum Occupancy {
 }
 
 impl Occupancy {
-    /// Classifies a cell.
     pub fn of(cell: Cell) -> Self {
         match cell {
             cell if cell.looked < KNOWN_LOOKED => Self::Unknown,

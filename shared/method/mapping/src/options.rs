@@ -7,7 +7,6 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapOptions {
-    /// Side of a cell, m.
     pub cell_m: f64,
     /// Range of the nearest returns, m: nothing nearer was looked at.
     pub near_m: f64,
@@ -32,7 +31,6 @@ impl Default for MapOptions {
     }
 }
 
-/// An option that is out of bounds.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("the map's {name} is {value}, but must be {bounds}")]
 pub struct OptionError {
@@ -42,7 +40,6 @@ pub struct OptionError {
 }
 
 impl MapOptions {
-    /// Checks the bounds of all options.
     pub fn validate(&self) -> Result<(), OptionError> {
         let option = |fits: bool, name, value, bounds| match fits {
             true => Ok(()),

@@ -38,7 +38,6 @@ pub enum MapError {
 
 /// A map, tile by tile.
 pub trait TileSource {
-    /// The side of a cell, m.
     fn cell_m(&self) -> f64;
 
     /// The tiles in rising order.

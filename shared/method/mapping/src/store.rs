@@ -14,7 +14,6 @@ use crate::tile::{CELLS, TILE_CELLS, TileIndex};
 /// Cells per side of a block: how often it was looked at varies slowly, and is kept for a block
 /// rather than a cell.
 pub const BLOCK: usize = 4;
-/// Blocks per side of a tile.
 pub const BLOCKS: usize = TILE_CELLS / BLOCK;
 /// One look from nearby, and one return of full weight in it.
 pub const ONE: u32 = 1 << 14;
@@ -34,7 +33,6 @@ pub struct Tile {
 /// A tile that keyframes look at.
 #[derive(Default)]
 struct Entry {
-    /// The number of keyframes that touch it.
     keyframes: u32,
     /// When it was last used.
     used: u64,
@@ -59,7 +57,6 @@ pub struct TileStore {
 }
 
 impl TileStore {
-    /// Keeps at most `max_in_memory` tiles in memory, and the others in a file in `folder`.
     pub fn new(folder: &Path, max_in_memory: usize) -> Self {
         Self {
             entries: BTreeMap::new(),

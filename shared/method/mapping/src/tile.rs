@@ -7,16 +7,13 @@ use nalgebra::{Point2, Vector2};
 /// Cells per side of a tile, as web maps have them.
 pub const TILE_CELLS: usize = 256;
 
-/// The number of cells of a tile.
 pub(crate) const CELLS: usize = TILE_CELLS * TILE_CELLS;
 
 /// A tile's place: tile (0, 0) has its corner of lowest x and y at the origin of the map frame. It
 /// is written as `X_Y`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileIndex {
-    /// Number of the tile along x, from 0 at the origin.
     pub x: i32,
-    /// Number of the tile along y.
     pub y: i32,
 }
 
@@ -50,7 +47,6 @@ fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
     tile(at_m - reach_m)..=tile(at_m + reach_m)
 }
 
-/// A cell of a tile as it is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Cell {
@@ -61,7 +57,6 @@ pub struct Cell {
     pub looked: u8,
 }
 
-/// The cells of a tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileImage {
     /// Row after row, from the highest y down; in each row the lowest x first.

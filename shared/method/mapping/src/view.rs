@@ -27,7 +27,6 @@ const SPREAD_SIGMAS: f64 = 2.0;
 pub struct View {
     options: MapOptions,
     points: Submap,
-    /// The farthest range of a look into each sector, m.
     farthest_m: [f64; SECTORS],
     own_m: [f64; SECTORS],
 }

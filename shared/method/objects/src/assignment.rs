@@ -52,7 +52,6 @@ mod tests {
         (pairs.len(), pairs.iter().sum())
     }
 
-    /// All assignments, one after the other.
     fn all(rows: usize, columns: usize) -> Vec<Vec<Option<usize>>> {
         (0..rows).fold(vec![Vec::new()], |partial, _| {
             let mut longer = Vec::new();

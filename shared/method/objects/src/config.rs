@@ -44,7 +44,6 @@ impl Default for ObjectsConfig {
     }
 }
 
-/// An error of the tracking of objects.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObjectsError {
     #[error("objects.{key} is {value}, but must be {bounds}")]
@@ -64,7 +63,6 @@ impl From<PlanesError> for ObjectsError {
 }
 
 impl ObjectsConfig {
-    /// Returns whether objects are tracked.
     pub fn is_on(&self) -> bool {
         self.kind == ObjectsKind::Tracks
     }

@@ -39,7 +39,6 @@ pub(crate) struct Detection {
     pub at: Point2<f64>,
     /// The velocity, m/s.
     pub velocity: Vector2<f64>,
-    /// Unit vector in its heading.
     pub heading: Vector2<f64>,
     /// Length and width, m.
     pub size_m: [f64; 2],
@@ -100,7 +99,6 @@ impl Detector {
 struct Output(Vec<f32>);
 
 impl Output {
-    /// Returns a value of the cell in a row and a column.
     fn value(&self, plane: usize, [row, column]: [usize; 2]) -> f32 {
         const HALF: usize = OUT / 2;
         let part = 4 * plane + 2 * (row % 2) + column % 2;

@@ -67,7 +67,6 @@ pub(crate) struct Sighting {
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
     difference: Vector2<f64>,
-    /// Covariance of that, m².
     covariance: Matrix2<f64>,
     jacobian: Matrix2x4<f64>,
     noise: Matrix2<f64>,
@@ -120,7 +119,6 @@ impl Filter {
         }
     }
 
-    /// Returns the position, m.
     pub fn position(&self) -> Point2<f64> {
         Point2::new(self.mean.state[0], self.mean.state[1])
     }
@@ -130,12 +128,10 @@ impl Filter {
         Vector2::new(self.mean.state[2], self.mean.state[3])
     }
 
-    /// Returns the covariance of the position, m².
     pub fn position_covariance(&self) -> Matrix2<f64> {
         self.mean.covariance.fixed_view::<2, 2>(0, 0).into()
     }
 
-    /// Returns the covariance of the velocity, (m/s)².
     pub fn velocity_covariance(&self) -> Matrix2<f64> {
         self.mean.covariance.fixed_view::<2, 2>(2, 2).into()
     }

@@ -26,9 +26,7 @@ pub struct Object {
     pub velocity: Vector2<f64>,
     /// The heading, rad: the direction of the velocity, or the network's heading for a slow object.
     pub yaw_rad: f64,
-    /// The length along the heading, m.
     pub length_m: f64,
-    /// The width across it, m.
     pub width_m: f64,
     /// False if its speed is not significantly above a standing object's.
     pub moving: bool,
@@ -36,7 +34,6 @@ pub struct Object {
     pub age: u32,
     /// Covariance of the centre, m².
     pub position_covariance: Matrix2<f64>,
-    /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
 }
 
@@ -44,7 +41,6 @@ pub struct Object {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outline {
     pub centre: Point2<f64>,
-    /// Unit vector in its heading.
     pub heading: Vector2<f64>,
     /// Length and width, m.
     pub size_m: [f64; 2],

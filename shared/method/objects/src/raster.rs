@@ -7,10 +7,8 @@ use nalgebra::{Isometry2, Point2};
 
 use crate::PlacedScan;
 
-/// Cells a side.
 pub(crate) const SIDE: usize = 256;
 const CELLS: usize = SIDE * SIDE;
-/// Side of a cell, m.
 pub(crate) const CELL_M: f64 = 0.5;
 /// Planes: one for each of the last scans, the share of those before, and the range.
 pub(crate) const PLANES: usize = RECENT + 2;
@@ -47,7 +45,6 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Creates a memory of nothing.
     pub fn new() -> Self {
         let range = |cell: usize| {
             let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);

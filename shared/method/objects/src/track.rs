@@ -24,7 +24,6 @@ const HEADING_SIGMA_RAD: f64 = 0.2;
 const GATE: f64 = 50.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
-/// The score below which a track ends.
 const END_SCORE: f64 = -2.0;
 /// Loss of the score by a scan that does not show the object.
 const MISSED_LOSS: f64 = 1.0;
@@ -116,7 +115,6 @@ impl Track {
         (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
-    /// Updates the track with a detection.
     pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
         self.filter.update(&sighting(detection));
         measure_velocity(&mut self.filter, detection);
@@ -274,7 +272,6 @@ fn sighting(detection: &Detection) -> Sighting {
     }
 }
 
-/// Updates a filter by the velocity of a detection.
 fn measure_velocity(filter: &mut Filter, detection: &Detection) {
     let sigma_mps = detection.sigma_mps * VELOCITY_SIGMAS;
     for axis in [Vector2::x(), Vector2::y()] {
@@ -309,7 +306,6 @@ mod tests {
         }
     }
 
-    /// A track that has been seen so many times.
     fn seen(times: u32, config: &ObjectsConfig) -> Track {
         let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
         for scan in 1..times {

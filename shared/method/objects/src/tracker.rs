@@ -118,7 +118,6 @@ impl ObjectTracker {
             .collect()
     }
 
-    /// Begins tracks at what belongs to none.
     fn begin(&mut self, rest: &[Detection]) {
         let tracks = rest.iter().map(|it| Track::new(it, &self.config));
         self.tracks.extend(tracks);

@@ -71,7 +71,6 @@ pub struct LoopCloser {
     index: PlaceIndex,
     /// The odometry alone, against which loops are tested.
     odometry: PoseGraph,
-    /// Path up to each keyframe, m.
     path_m: Vec<f64>,
     has_ended: bool,
     /// Number of the keyframe that is queried next.
@@ -126,7 +125,6 @@ impl LoopCloser {
         self.next_query = keyframe;
     }
 
-    /// Returns the number of keyframes taken.
     pub fn keyframes(&self) -> usize {
         self.path_m.len()
     }
@@ -222,7 +220,6 @@ impl LoopCloser {
         found[..found.len().min(CANDIDATES)].to_vec()
     }
 
-    /// Draws the submap around a keyframe as the query's (0) or as the candidate's (1).
     fn draw<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -15,7 +15,6 @@ pub struct Correction {
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
     seq: u64,
-    /// The pose of the odometry frame in the map frame.
     map_from_odometry: Pose,
 }
 

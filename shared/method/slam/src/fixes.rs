@@ -101,7 +101,6 @@ impl Fixes {
         }
     }
 
-    /// Returns what became of the fixes.
     pub fn counts(&self) -> FixCounts {
         let counted = self.counts.outside + self.counts.thinned + self.counts.far;
         FixCounts {
@@ -198,7 +197,6 @@ impl Fixes {
         self.refusal.clone_from(&before.refusal);
     }
 
-    /// Gives these fixes to the graph.
     pub(crate) fn give(
         &self,
         graph: &mut PoseGraph,
@@ -221,7 +219,6 @@ impl Fixes {
         self.refusal.is_none()
     }
 
-    /// Checks that the graph agrees with most of the fixes.
     pub(crate) fn check(&mut self, graph: &PoseGraph) {
         let taken = graph.positions().count();
         let agreeing = graph.positions().filter(|it| it.weight >= LEAST_WEIGHT);

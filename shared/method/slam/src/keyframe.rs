@@ -27,7 +27,6 @@ pub struct Keyframe {
     /// [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
     pub twist: Twist,
-    /// Length of the path through all keyframes up to this one, m.
     pub path_m: f64,
     /// The points of the scan as measured: with `twist` they are freed of motion and of the Doppler
     /// shift.

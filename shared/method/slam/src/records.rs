@@ -65,7 +65,6 @@ impl<R: Record> RecordLog<R> {
         self.log.len() - usize::from(self.ended)
     }
 
-    /// Returns whether there are no records.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -15,7 +15,6 @@ use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 /// proportion to it.
 const GROWTH: usize = 8;
 
-/// The estimator of the poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorKind {
     /// The pose graph: all poses by least squares.
@@ -72,20 +71,10 @@ pub struct TrajectoryEstimator {
 /// A keyframe with its pose by odometry.
 struct Corrected {
     seq: u64,
-    stamp_ns: i64,
-    odometry: Pose,
+    at: Stamped,
     motion: UncertainMotion,
     noise: Matrix3<f64>,
     path_m: f64,
-}
-
-impl Corrected {
-    fn stamped(&self) -> Stamped {
-        Stamped {
-            stamp_ns: self.stamp_ns,
-            odometry: self.odometry,
-        }
-    }
 }
 
 enum Estimator {
@@ -112,7 +101,20 @@ impl Estimator {
         }
     }
 
-    /// Takes a loop, and notes the verdict.
+    fn graph(&self) -> Option<&PoseGraph> {
+        match self {
+            Self::Graph(graph) => Some(graph),
+            Self::Filter(_) => None,
+        }
+    }
+
+    fn graph_mut(&mut self) -> Option<&mut PoseGraph> {
+        match self {
+            Self::Graph(graph) => Some(graph),
+            Self::Filter(_) => None,
+        }
+    }
+
     fn take(&mut self, it: &mut JudgedLoop) -> Result<(), EstimationError> {
         (it.verdict, it.weight) = match self.apply(&it.constraint)?.outcome {
             Outcome::Accepted => (LoopVerdict::Used, 1.0),
@@ -154,17 +156,17 @@ impl TrajectoryEstimator {
     /// whether the next solution has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
-            fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
+            fixes.advance(keyframe, ends[0].at, ends[1].at);
         }
         let before = &self.fixes.positions()[..self.given_fixes];
         let stand = fixes.positions().starts_with(before);
         let have_changed = !stand || fixes.settled() > self.given_fixes;
-        match (stand, &mut self.estimator) {
-            (true, _) => fixes.go_on_from(&self.fixes),
-            (false, Estimator::Graph(graph)) => graph.clear_positions(),
-            (false, Estimator::Filter(_)) => {}
-        }
-        if !stand {
+        if stand {
+            fixes.go_on_from(&self.fixes);
+        } else {
+            if let Some(graph) = self.estimator.graph_mut() {
+                graph.clear_positions();
+            }
             (self.judged_fixes, self.given_fixes) = (0, 0);
         }
         self.fixes = fixes;
@@ -186,15 +188,17 @@ impl TrajectoryEstimator {
         self.odometry.push(&keyframe.motion);
         self.keyframes.push(Corrected {
             seq: keyframe.seq,
-            stamp_ns: keyframe.stamp_ns,
-            odometry: keyframe.pose.motion,
+            at: Stamped {
+                stamp_ns: keyframe.stamp_ns,
+                odometry: keyframe.pose.motion,
+            },
             motion: keyframe.motion,
             noise: keyframe.noise,
             path_m: keyframe.path_m,
         });
         if let [.., from, to] = self.keyframes.as_slice() {
-            let from_index = self.keyframes.len() - 2;
-            self.fixes.advance(from_index, from.stamped(), to.stamped());
+            let keyframe = self.keyframes.len() - 2;
+            self.fixes.advance(keyframe, from.at, to.at);
         }
         Ok(())
     }
@@ -210,9 +214,9 @@ impl TrajectoryEstimator {
     /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is
     /// decided by its keyframes.
     pub fn close_loop(&mut self, closing: &Constraint) -> Result<(), EstimationError> {
-        let chi_square = match &self.estimator {
-            Estimator::Graph(graph) => graph.test(closing)?.chi_square,
-            Estimator::Filter(_) => 0.0,
+        let chi_square = match self.estimator.graph() {
+            Some(graph) => graph.test(closing)?.chi_square,
+            None => 0.0,
         };
         self.insert(closing, chi_square)
     }
@@ -265,9 +269,9 @@ impl TrajectoryEstimator {
     /// loops. Returns the scale, which is 1 without loops and in the filter. It takes some 1,400
     /// solutions of the equations.
     pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
-        self.scale = match &mut self.estimator {
-            Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
-            Estimator::Filter(_) => 1.0,
+        self.scale = match self.estimator.graph_mut() {
+            Some(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
+            None => 1.0,
         };
         Ok(self.scale)
     }
@@ -291,18 +295,16 @@ impl TrajectoryEstimator {
     /// Returns the fixes that the keyframes have, with their weights as of the last solution; none
     /// if they were refused, and in the filter.
     pub fn positions(&self) -> Vec<WeightedPosition> {
-        match &self.estimator {
-            Estimator::Graph(graph) => graph.positions().collect(),
-            Estimator::Filter(_) => Vec::new(),
-        }
+        let graph = self.estimator.graph();
+        graph.map_or(Vec::new(), |graph| graph.positions().collect())
     }
 
     /// Returns the pose of the frame of the first scan in the frame of the fixes, east and north,
     /// with its covariance; `None` without fixes that determine it.
     pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
-        let frame = match &mut self.estimator {
-            Estimator::Graph(graph) => graph.uncertain_frame()?,
-            Estimator::Filter(_) => None,
+        let frame = match self.estimator.graph_mut() {
+            Some(graph) => graph.uncertain_frame()?,
+            None => None,
         };
         Ok(frame.map(|frame| UncertainMotion {
             covariance: frame.covariance * self.scale,
@@ -312,14 +314,14 @@ impl TrajectoryEstimator {
 
     /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
-        let keyframes = self.keyframes.iter().map(|it| (it.seq, it.odometry));
+        let keyframes = self.keyframes.iter().map(|it| (it.seq, it.at.odometry));
         Correction::new(keyframes, self.poses())
     }
 
     /// Starts an estimator with the first keyframe.
     fn start(&self) -> Estimator {
         let start = self.keyframes.first();
-        let start = start.map_or(Pose::identity(), |first| first.odometry);
+        let start = start.map_or(Pose::identity(), |first| first.at.odometry);
         Estimator::new(start, self.options.kind)
     }
 
@@ -361,7 +363,6 @@ impl TrajectoryEstimator {
         self.compare(|it| it.is_used());
     }
 
-    /// Compares some of the loops with those that speak for all.
     fn compare(&mut self, some: impl Fn(&JudgedLoop) -> bool) {
         for it in self.loops.iter_mut().filter(|it| some(it)) {
             if !self.speakers.accept(&self.odometry, &it.constraint) {
@@ -370,17 +371,16 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Compares the clock of the fixes with the keyframes' clock.
     fn compare_clocks(&mut self) {
-        let stamped: Vec<Stamped> = self.keyframes.iter().map(Corrected::stamped).collect();
+        let stamped: Vec<Stamped> = self.keyframes.iter().map(|it| it.at).collect();
         self.fixes.compare_clocks(&stamped);
         self.judged_fixes = self.fixes.taken();
     }
 
-    /// Solves the graph with all loops that are used and so many fixes, from the odometry. If most
-    /// of the fixes contradict the solution it is made without them.
+    /// Solves the graph with all loops that are used and so many fixes, from the odometry; without
+    /// the fixes if most of them contradict the solution.
     fn solve_graph(&mut self, fixes: usize) -> Result<(), EstimationError> {
-        let Estimator::Graph(graph) = &mut self.estimator else {
+        let Some(graph) = self.estimator.graph_mut() else {
             return Ok(());
         };
         graph.clear_loops();
@@ -427,7 +427,7 @@ impl TrajectoryEstimator {
         {
             return self.solve_graph(settled);
         }
-        let Estimator::Graph(graph) = &mut self.estimator else {
+        let Some(graph) = self.estimator.graph_mut() else {
             return Ok(());
         };
         for it in self.loops.iter_mut().filter(new) {
@@ -445,7 +445,7 @@ impl TrajectoryEstimator {
 
     /// Notes the kernel's weights of the loops that are used.
     fn weigh(&mut self) {
-        let Estimator::Graph(graph) = &self.estimator else {
+        let Some(graph) = self.estimator.graph() else {
             return;
         };
         let mut weights: Vec<_> = graph

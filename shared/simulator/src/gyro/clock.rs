@@ -23,7 +23,6 @@ pub(super) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// The clock of a drive.
     pub fn new(config: &'a SimulatedGyroConfig, seed: u64) -> Self {
         let stalls = Stream::GYRO_STALLS.generator(seed);
         Self {

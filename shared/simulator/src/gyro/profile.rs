@@ -45,7 +45,6 @@ pub struct GyroFigures {
     pub bias_drift_s: f64,
     /// Error of the scale, a share.
     pub scale_sigma: f64,
-    /// Misalignment about each axis, rad.
     pub misalignment_rad: f64,
     /// Step of the rates, rad/s.
     pub step_radps: f64,

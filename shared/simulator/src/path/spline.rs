@@ -17,7 +17,6 @@ pub struct Sample<const D: usize> {
     pub at: f64,
     /// The coordinates there.
     pub value: [f64; D],
-    /// The weight in the fit.
     pub weight: f64,
 }
 
@@ -162,7 +161,6 @@ fn factorise(band: &mut [[f64; BAND]]) {
     }
 }
 
-/// Solves the factorised equations in place.
 fn solve<const D: usize>(factors: &[[f64; BAND]], right: &mut [[f64; D]]) {
     let reach = |row: usize| BAND.min(factors.len() - row);
     let subtract = |from: [f64; D], factor: f64, what: [f64; D]| {

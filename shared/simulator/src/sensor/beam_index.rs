@@ -17,7 +17,6 @@ pub(super) struct BeamIndex {
 }
 
 impl BeamIndex {
-    /// Sorts the echoes of a sweep.
     pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, sweep_poses: &SweepPoses) {
         let (azimuths, step_rad) = (sweep_poses.azimuths(), sweep_poses.step_rad());
         let span = |echo: &Echo| {

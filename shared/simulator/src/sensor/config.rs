@@ -53,7 +53,6 @@ pub struct SensorConfig {
 }
 
 impl SensorConfig {
-    /// Checks that all values can be simulated.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         let sampling = self.sampling();
         let (bins, azimuths) = (sampling.bins as f64, sampling.azimuths as f64);
@@ -89,7 +88,6 @@ impl SensorConfig {
         }
     }
 
-    /// The sampling of the radar.
     pub fn sampling(&self) -> Sampling {
         let mut sampling = self.profile.sampling();
         if let Some(azimuths) = self.azimuths.filter(|count| *count != sampling.azimuths) {

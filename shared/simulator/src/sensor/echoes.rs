@@ -38,13 +38,11 @@ pub(super) struct View<'a> {
     pub sweep_poses: &'a SweepPoses,
     pub line_of_sight: &'a LineOfSight,
     pub receiver: &'a Receiver,
-    /// True if echoes fluctuate with the direction.
     pub fluctuates: bool,
     pub reach_m: f64,
 }
 
 impl View<'_> {
-    /// Adds the echoes of the static world.
     pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
         let centre = self.sweep_poses.middle().position;
         for scatterer in world.around(centre, self.reach_m).flatten() {
@@ -52,7 +50,6 @@ impl View<'_> {
         }
     }
 
-    /// Adds the echoes of the moving bodies.
     pub fn moving(&self, moving: &[Moving<'_>], echoes: &mut Vec<Echo>) {
         for mover in moving {
             for scatterer in &mover.body.scatterers {

@@ -27,7 +27,6 @@ pub struct RangeSpectrum {
 }
 
 impl RangeSpectrum {
-    /// An empty spectrum of `bins` range bins of `bin_m` metres.
     pub fn new(bins: usize, bin_m: f64, receiver: &Receiver) -> Self {
         let bins_per_cell = receiver.cell_m / bin_m;
         let half = (bins_per_cell * CELLS_KEPT).ceil() as usize;

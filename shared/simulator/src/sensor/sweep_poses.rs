@@ -11,7 +11,6 @@ use crate::profile::Sampling;
 /// Additional azimuths before the first and after the last, whose beams reach into the sweep.
 pub(super) const MARGIN: usize = 16;
 
-/// The sensor at one azimuth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AzimuthPose {
     pub position: Point2<f64>,
@@ -79,7 +78,6 @@ impl SweepPoses {
         ((azimuth + MARGIN as f64 + 0.5) as usize).min(self.all.len() - 1)
     }
 
-    /// The sensor at the middle of the sweep.
     pub fn middle(&self) -> &AzimuthPose {
         self.at((self.azimuths / 2) as f64)
     }
@@ -116,7 +114,6 @@ impl SweepPoses {
         }
     }
 
-    /// Iterates from an initial guess of the azimuth.
     fn beam_pass(&self, guess: f64, place: &impl Fn(&AzimuthPose) -> Point2<f64>) -> f64 {
         let mut azimuth = guess;
         for _ in 0..4 {

@@ -1,6 +1,5 @@
 //! The time of a sweep.
 
-/// The time of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SweepTime {
     /// The first azimuth's stamp, microseconds since 1970.

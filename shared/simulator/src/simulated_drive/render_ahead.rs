@@ -38,7 +38,6 @@ impl Ahead {
     }
 }
 
-/// The threads that render.
 struct Crew {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
@@ -52,11 +51,9 @@ struct Shared {
 /// The rendered scans, and the next scans to render and to read.
 #[derive(Default)]
 struct Queue {
-    /// All images.
     images: usize,
     /// The image that is asked for next.
     wanted: usize,
-    /// The image that is rendered next.
     next: usize,
     ready: BTreeMap<usize, Vec<u8>>,
     spare: Vec<Vec<u8>>,
@@ -161,7 +158,6 @@ impl Crew {
         }
     }
 
-    /// Copies image `index` to `pixels` as soon as it is rendered.
     fn take(&self, index: usize, pixels: &mut [u8]) {
         let mut queue = self.shared.lock();
         queue.turn_to(index);

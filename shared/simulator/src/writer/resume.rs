@@ -22,7 +22,6 @@ const MAX_IMAGE_BYTES: u64 = 64 << 20;
 /// The file with the options to read it; see [`gyre_datasets::open`].
 pub(super) const DATASET_OPTIONS: &str = "dataset.toml";
 
-/// Content of [`MADE_BY`].
 pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorError> {
     Ok(format!(
         "# The configuration that made this dataset.\n{}",
@@ -30,7 +29,6 @@ pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorErro
     ))
 }
 
-/// Content of [`DATASET_OPTIONS`].
 pub(super) fn dataset_options(drive: &SimulatedDrive) -> Result<String, SimulatorError> {
     to_toml(&drive.dataset_options())
 }

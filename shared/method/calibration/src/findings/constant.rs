@@ -19,9 +19,7 @@ pub(super) type Label = (&'static str, &'static str, &'static str, f64);
 pub struct Constant {
     /// The key of the section `[dataset]`.
     pub key: &'static str,
-    /// The name for a person.
     pub name: &'static str,
-    /// The unit for printing it.
     pub unit: &'static str,
     /// The factor to the printed unit.
     pub scale: f64,

@@ -15,9 +15,7 @@ const DRIFT_SIGMAS: f64 = 3.0;
 /// The clock and the axes of a gyro, by the turns of the radar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GyroCalibration {
-    /// The axis that points up.
     pub up: UpAxis,
-    /// The delay of the gyro's stamps, s.
     pub delay_s: Estimate,
     /// The delay in each half of the drive, if the half determines it, s.
     pub halves_s: [Option<f64>; 2],
@@ -96,7 +94,6 @@ impl GyroCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside the configured values if a gyro is used.
     pub fn table(&self, configured: &GyroConfig) -> String {
         let used = |value: f64| configured.is_used().then_some(value);
         let up = configured.up.unwrap_or(self.up);

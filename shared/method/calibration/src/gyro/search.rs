@@ -33,12 +33,10 @@ pub(crate) struct Peak {
     pub(crate) axis: usize,
     /// Of the radar's turns and the angles about the axis.
     pub(crate) correlation: f64,
-    /// The turns that it is of.
     turns: usize,
 }
 
 impl Peak {
-    /// Returns the axis that points up.
     pub(crate) fn up(&self) -> UpAxis {
         const AXES: [[UpAxis; 2]; 3] = [
             [UpAxis::X, UpAxis::MinusX],

@@ -52,7 +52,6 @@ impl Default for Simulated {
     }
 }
 
-/// A number from -1 to 1 that depends on the seed and the place.
 fn noise(seed: u64, place: u64) -> f64 {
     let mut x =
         seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ place.wrapping_mul(0xD1B5_4A32_D192_ED03);
@@ -135,7 +134,6 @@ fn simulated(change: impl FnOnce(&mut Simulated)) -> Simulated {
     drive
 }
 
-/// Asserts that a calibration is refused with one of these words.
 fn assert_refused(found: Result<GyroCalibration, ClockError>, expected: &[&str]) {
     let reason = found.unwrap_err().to_string();
     assert!(expected.iter().any(|it| reason.contains(it)), "{reason}");

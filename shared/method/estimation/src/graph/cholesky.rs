@@ -37,7 +37,6 @@ struct Entry {
     is_transposed: bool,
 }
 
-/// Lists, one after the other.
 struct Lists<T> {
     starts: Vec<usize>,
     items: Vec<T>,
@@ -224,7 +223,6 @@ fn fill(left: &Lists<Entry>) -> Lists<usize> {
     Lists { starts, items }
 }
 
-/// Returns the rows of each column from the columns of each row.
 fn transpose(columns: &Lists<usize>) -> Lists<usize> {
     let count = columns.starts.len() - 1;
     let starts = starts(count, columns.items.iter().copied());

@@ -56,7 +56,6 @@ impl Dogleg {
         &self.cauchy + share * along
     }
 
-    /// Returns the predicted decrease of the cost by a step.
     pub fn predicted(&self, system: &System, step: &DVector<f64>) -> f64 {
         2.0 * self.gradient.dot(step) - system.quadratic_form(step)
     }

@@ -5,7 +5,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::relative::Relative;
 
-/// The two poses of an edge.
 pub(super) type Ends = [usize; 2];
 
 /// A constraint with the inverse of its covariance.
@@ -34,7 +33,6 @@ impl Edge {
         innovation.dot(&(self.information * innovation))
     }
 
-    /// Linearises the cost at `poses`.
     pub fn linearise(&self, poses: &[Pose]) -> Linear {
         let [from, to] = self.ends;
         let relative = Relative::predict(&poses[from], &poses[to]);
@@ -61,6 +59,5 @@ pub(super) struct Linear {
     pub between: Matrix3<f64>,
     /// The right-hand sides of both poses.
     pub sides: [Vector3<f64>; 2],
-    /// The chi-square of the edge.
     pub chi_square: f64,
 }

@@ -39,7 +39,6 @@ impl System {
         })
     }
 
-    /// Returns a right-hand side of zeros.
     pub fn right_hand_side(&self) -> DVector<f64> {
         DVector::zeros(3 * self.diagonal.len())
     }

@@ -48,7 +48,6 @@ impl Default for Descriptor {
 }
 
 impl Descriptor {
-    /// Size of the sieve of a descriptor, bytes.
     pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
     /// Size of a descriptor in a file, bytes.
     pub const BYTES: usize = Self::SIEVE_BYTES + SPECTRUM_BYTES;

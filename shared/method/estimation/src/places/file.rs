@@ -50,7 +50,6 @@ impl PlaceIndex {
         Ok(gyre_storage::write(path, bytes)?)
     }
 
-    /// Reads the places of a file.
     pub fn load(path: &Path) -> Result<Self, PlaceFileError> {
         let bytes =
             gyre_storage::read_bytes(path, MAX_BYTES).map_err(StorageError::at("read", path))?;

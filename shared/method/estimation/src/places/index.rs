@@ -35,9 +35,7 @@ pub struct Candidate {
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
 )]
 pub struct OrderError {
-    /// Path up to the place, m.
     pub path_m: f64,
-    /// Path up to the last place, m.
     pub last_m: f64,
 }
 
@@ -46,7 +44,6 @@ pub struct OrderError {
 pub(super) struct PathPoint {
     /// Number that the caller gave it.
     pub id: u64,
-    /// Path up to the place, m.
     pub path_m: f64,
 }
 
@@ -122,7 +119,6 @@ impl PlaceIndex {
         self.places.len()
     }
 
-    /// Returns whether there is no place.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }

@@ -13,7 +13,6 @@ const UNKNOWN: u8 = u8::MAX;
 /// An occupancy grid in the frame of the map's tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// The side of a cell, m.
     pub cell_m: f64,
     /// Cells along x.
     pub columns: usize,

@@ -12,7 +12,6 @@ const OCCUPIED: u8 = 0;
 const FREE: u8 = 254;
 const UNKNOWN: u8 = 205;
 
-/// Writes `map.pgm` and `map.yaml` into `folder`.
 pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
     let extent = strips::extent(source, "PGM")?;
     let [columns, rows] = extent.cells();

@@ -14,7 +14,6 @@ pub struct Ground {
     pub cells: Vec<Cell>,
     /// Place of the upper left corner in the map frame, m.
     pub corner_m: Vector2<f64>,
-    /// Side of a pixel, m.
     pub pixel_m: f64,
 }
 

@@ -62,7 +62,6 @@ impl Vehicle {
     }
 }
 
-/// Tracks a vehicle for some scans, and returns the filter.
 fn tracked(
     vehicle: &mut Vehicle,
     scans: usize,

@@ -33,7 +33,6 @@ const TRACKED_CORRELATION: f64 = 0.35;
 const GATE: f64 = 16.27;
 /// Distance from the nearest keyframe of the map beyond which there is no fix, m.
 const REACH_M: f64 = 15.0;
-/// Time without a fix after which the localiser is lost, s.
 const LOST_AFTER_S: f64 = 3.0;
 
 /// A scan, with its motion by odometry.
@@ -41,7 +40,6 @@ const LOST_AFTER_S: f64 = 3.0;
 pub struct Observation<'a> {
     /// Time of the scan, ns.
     pub stamp_ns: i64,
-    /// The points as measured.
     pub points: &'a [SparsePoint],
     /// The velocity of the sensor.
     pub twist: Twist,
@@ -49,7 +47,6 @@ pub struct Observation<'a> {
     pub motion: UncertainMotion,
 }
 
-/// The state of the localisation of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     Lost,
@@ -269,7 +266,6 @@ impl Localiser {
         apart.translation.vector.norm() <= SAME_M && apart.rotation.angle().abs() <= SAME_RAD
     }
 
-    /// Aligns the scan with a keyframe from a pose on the map.
     fn align(&mut self, keyframe: usize, from: &Pose) -> Option<(UncertainMotion, f64)> {
         self.draw(keyframe);
         self.registration.set_place(&self.place);

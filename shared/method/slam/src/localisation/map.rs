@@ -13,7 +13,6 @@ use gyre_storage::LogError;
 use nalgebra::Point2;
 use thiserror::Error;
 
-/// The keyframes of a map, in its folder.
 const KEYFRAMES: &str = Keyframe::FILE;
 /// The file of descriptors of submaps, in its folder.
 const PLACES: &str = "places.index";

@@ -29,12 +29,10 @@ const NEAR_STRETCHES: u64 = 4;
 /// A keyframe of a drive that was found in the map.
 #[derive(Clone, Copy, Debug)]
 pub struct FoundKeyframe {
-    /// The number of the keyframe in its drive.
     pub keyframe: usize,
     pub fix: Fix,
 }
 
-/// The search for a drive in a map.
 #[derive(Clone, Debug, Default)]
 pub struct DriveSearch {
     found: Vec<FoundKeyframe>,
@@ -42,7 +40,6 @@ pub struct DriveSearch {
     stretches: Vec<u64>,
 }
 
-/// A drive with its place in a map.
 #[derive(Clone, Debug)]
 pub struct PlacedDrive {
     /// The poses of all keyframes in the map frame.
@@ -82,7 +79,6 @@ impl DriveSearch {
         }
     }
 
-    /// Returns the keyframes that were found.
     pub fn found(&self) -> &[FoundKeyframe] {
         &self.found
     }

@@ -51,13 +51,11 @@ impl Registration {
         })
     }
 
-    /// Takes the scan that is registered from now on.
     pub fn set_scan(&mut self, scan: &Submap) {
         draw(scan, &mut self.scan);
         self.sight.look(scan);
     }
 
-    /// Takes the submap that it is registered with.
     pub fn set_place(&mut self, place: &Submap) {
         draw(place, &mut self.place);
     }
