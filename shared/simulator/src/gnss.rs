@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::episodes::Episodes;
 use crate::stream::Stream;
-use crate::{error::SimulatorError, limits::require_within, path::Path};
+use crate::{error::SimulatorError, limits::require_within, simulator::Simulator};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "gnss.csv";
@@ -48,14 +48,10 @@ impl SimulatedGnssConfig {
     }
 }
 
-/// The fixes during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps. `None` without a receiver.
-pub(crate) fn fixes(
-    config: &SimulatedGnssConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
+/// The fixes during a drive, by their stamps. `None` without a receiver.
+pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
+    let (config, seed) = (&simulator.config().gnss, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
         let mut rng = Stream::GNSS_ERRORS.generator(seed);
@@ -101,7 +97,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SimulationConfig, Simulator};
+    use crate::SimulationConfig;
 
     #[test]
     fn fixes_err_by_as_much_as_they_say_and_holes_have_none() {

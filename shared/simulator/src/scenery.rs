@@ -41,19 +41,20 @@ const FENCE_TRANSMISSION: f64 = 0.6;
 
 pub(crate) fn build(route: &Route, seed: u64) -> Body {
     let mut site = Site {
+        route,
         built: Body::default(),
         bodies: NO_BODY,
         taken: lanes(route),
         rng: Stream::SCENERY.generator(seed),
     };
     for side in Side::BOTH {
-        site.furnish_kerb(route, side);
+        site.furnish_kerb(side);
     }
     for side in Side::BOTH {
-        site.line_with_houses(route, side);
+        site.line_with_houses(side);
     }
     for side in Side::BOTH {
-        site.fill_behind(route, side);
+        site.fill_behind(side);
     }
     site.built
 }
@@ -84,20 +85,21 @@ fn square(place: Point2<f64>) -> Square {
     (at.x.floor() as i64, at.y.floor() as i64)
 }
 
-struct Site {
+struct Site<'a> {
+    route: &'a Route,
     built: Body,
     bodies: u32,
     taken: HashSet<Square>,
     rng: ChaCha8Rng,
 }
 
-impl Site {
+impl Site<'_> {
     /// Lamp posts, trees and parked cars.
-    fn furnish_kerb(&mut self, route: &Route, side: Side) {
-        let length_m = route.length_m();
+    fn furnish_kerb(&mut self, side: Side) {
+        let length_m = self.route.length_m();
         let mut at_m = self.rng.random_range(0.0..10.0);
         while at_m < length_m {
-            if let Some(frame) = route.beside(side, at_m, PARKED_M)
+            if let Some(frame) = self.route.beside(side, at_m, PARKED_M)
                 && self.rng.random_bool(0.5)
                 && self.take(&frame, [-2.5, 2.5], [-1.0, 1.0])
             {
@@ -112,7 +114,7 @@ impl Site {
         }
         let mut at_m = self.rng.random_range(0.0..20.0);
         while at_m < length_m {
-            if let Some(frame) = route.beside(side, at_m, POSTS_M)
+            if let Some(frame) = self.route.beside(side, at_m, POSTS_M)
                 && self.take(&frame, [-0.4, 0.4], [-0.4, 0.4])
             {
                 match self.rng.random_bool(0.5) {
@@ -146,20 +148,20 @@ impl Site {
     }
 
     /// Houses, in rows and alone, with fences and gardens between them.
-    fn line_with_houses(&mut self, route: &Route, side: Side) {
+    fn line_with_houses(&mut self, side: Side) {
         let mut at_m = 0.0;
         let mut setback_m = self.rng.random_range(GARDENS_M);
-        while at_m < route.length_m() {
+        while at_m < self.route.length_m() {
             let [width_m, depth_m] = HOUSE_M.map(|range| self.rng.random_range(range));
-            if !self.house(route, side, [at_m, setback_m], [width_m, depth_m]) {
+            if !self.house(side, [at_m, setback_m], [width_m, depth_m]) {
                 at_m += 2.0;
                 continue;
             }
-            self.garden(route, side, [at_m, at_m + width_m], setback_m);
+            self.garden(side, [at_m, at_m + width_m], setback_m);
             at_m += width_m;
             if self.rng.random_bool(0.5) {
                 let gap_m = self.rng.random_range(3.0..12.0);
-                self.fence(route, side, [at_m, at_m + gap_m]);
+                self.fence(side, [at_m, at_m + gap_m]);
                 at_m += gap_m;
                 setback_m = self.rng.random_range(GARDENS_M);
             }
@@ -167,26 +169,21 @@ impl Site {
     }
 
     /// Larger buildings behind the houses, which are seen through the gaps.
-    fn fill_behind(&mut self, route: &Route, side: Side) {
+    fn fill_behind(&mut self, side: Side) {
         let mut at_m = self.rng.random_range(0.0..20.0);
-        while at_m < route.length_m() {
+        while at_m < self.route.length_m() {
             let [width_m, depth_m] = HALL_M.map(|range| self.rng.random_range(range));
             let setback_m = self.rng.random_range(HALLS_M);
-            self.house(route, side, [at_m, setback_m], [width_m, depth_m]);
+            self.house(side, [at_m, setback_m], [width_m, depth_m]);
             at_m += self.rng.random_range(6.0..16.0);
         }
     }
 
     /// Builds a house, if there is room for it: its place along the street and beyond the kerb, its
     /// width and depth, metres.
-    fn house(
-        &mut self,
-        route: &Route,
-        side: Side,
-        [at_m, setback_m]: [f64; 2],
-        [width_m, depth_m]: [f64; 2],
-    ) -> bool {
-        let Some(middle) = route.beside(side, at_m + width_m / 2.0, setback_m) else {
+    fn house(&mut self, side: Side, at: [f64; 2], [width_m, depth_m]: [f64; 2]) -> bool {
+        let [at_m, setback_m] = at;
+        let Some(middle) = self.route.beside(side, at_m + width_m / 2.0, setback_m) else {
             return false;
         };
         let half_m = width_m / 2.0;
@@ -213,11 +210,11 @@ impl Site {
     }
 
     /// Bushes, steps and bins before a house.
-    fn garden(&mut self, route: &Route, side: Side, [from_m, to_m]: [f64; 2], setback_m: f64) {
+    fn garden(&mut self, side: Side, [from_m, to_m]: [f64; 2], setback_m: f64) {
         for _ in 0..((to_m - from_m) / 2.5) as usize {
             let at_m = self.rng.random_range(from_m..to_m);
             let beyond_m = self.rng.random_range(FENCES_M..setback_m);
-            let Some(frame) = route.beside(side, at_m, beyond_m) else {
+            let Some(frame) = self.route.beside(side, at_m, beyond_m) else {
                 continue;
             };
             if self.take(&frame, [-0.1, 0.1], [-0.1, 0.1]) {
@@ -232,8 +229,8 @@ impl Site {
     }
 
     /// A fence or a hedge between houses.
-    fn fence(&mut self, route: &Route, side: Side, [from_m, to_m]: [f64; 2]) {
-        let Some(frame) = route.beside(side, 0.5 * (from_m + to_m), FENCES_M) else {
+    fn fence(&mut self, side: Side, [from_m, to_m]: [f64; 2]) {
+        let Some(frame) = self.route.beside(side, 0.5 * (from_m + to_m), FENCES_M) else {
             return;
         };
         let half_m = 0.5 * (to_m - from_m) - 0.5;

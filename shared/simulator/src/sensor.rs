@@ -138,8 +138,7 @@ impl Sensor {
         self.sweep_poses
             .sample(scene.path, time, &self.sampling, error_rad);
         let reach_m = self.sampling.reach_m();
-        self.line_of_sight
-            .cast(scene.world, scene.movers, &self.sweep_poses, reach_m);
+        self.line_of_sight.cast(&scene, &self.sweep_poses, reach_m);
         self.echoes.clear();
         if !scene.blind {
             let view = View {

@@ -120,20 +120,17 @@ impl Simulator {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
     /// without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        let Self { config, .. } = self;
-        log::samples(&config.gyro, config.seed, self.path(), self.span())
+        log::samples(self)
     }
 
     /// The samples of the wheels, by their stamps. `None` without wheels that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        let Self { config, .. } = self;
-        wheels::samples(&config.wheels, config.seed, self.path(), self.span())
+        wheels::samples(self)
     }
 
     /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
     pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
-        let Self { config, .. } = self;
-        gnss::fixes(&config.gnss, config.seed, self.path(), self.span())
+        gnss::fixes(self)
     }
 
     pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {

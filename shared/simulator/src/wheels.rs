@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use crate::{episodes::Episodes, error::SimulatorError, limits::require_within};
-use crate::{path::Path, stream::Stream};
+use crate::{path::Path, simulator::Simulator, stream::Stream};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "wheels.csv";
@@ -50,16 +50,13 @@ impl SimulatedWheelsConfig {
     }
 }
 
-/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps: each is the mean over its period, stamped at its middle. `None` without wheels.
-pub(crate) fn samples(
-    config: &SimulatedWheelsConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<Sample>> {
+/// The samples during a drive, by their stamps: each is the mean over its period, stamped at its
+/// middle. `None` without wheels.
+pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
+    let config = &simulator.config().wheels;
+    let (start_ns, end_s) = simulator.span();
     (config.rate_hz > 0.0).then(|| {
-        let mut wheels = Wheels::new(config, seed, path);
+        let mut wheels = Wheels::new(config, simulator.config().seed, simulator.path());
         let count = (end_s * config.rate_hz).ceil() as usize;
         let sample = |index: usize| {
             let span_s = [index, index + 1].map(|index| index as f64 / config.rate_hz);
@@ -127,7 +124,7 @@ impl<'a> Wheels<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SimulationConfig, Simulator};
+    use crate::SimulationConfig;
 
     fn simulated(faults: bool) -> (Simulator, Vec<Sample>) {
         let config = SimulationConfig {

@@ -133,12 +133,21 @@ fn write_images(
     folder: &Path,
     progress: &mut dyn FnMut(usize),
 ) -> Result<(), SimulatorError> {
-    let next = AtomicUsize::new(0);
+    let (next, size) = (AtomicUsize::new(0), drive.image_size());
     let (sender, results) = mpsc::channel();
     std::thread::scope(|scope| {
         for _ in 0..threads.min(missing.len()) {
             let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || work(drive, folder, missing, next, &sender));
+            scope.spawn(move || {
+                let mut renderer = drive.renderer();
+                let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
+                while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    renderer.draw(index, &mut pixels);
+                    let path = folder.join(drive.image_name(index));
+                    // The receiver outlives the threads.
+                    let _ = sender.send(write_image(&path, size, &pixels, &mut encoded));
+                }
+            });
         }
         drop(sender);
         let mut outcome = Ok(());
@@ -153,27 +162,4 @@ fn write_images(
         outcome
     })?;
     Ok(gyre_storage::sync_folder(folder)?)
-}
-
-fn work(
-    drive: &SimulatedDrive,
-    folder: &Path,
-    missing: &[usize],
-    next: &AtomicUsize,
-    results: &mpsc::Sender<Result<(), SimulatorError>>,
-) {
-    let (mut renderer, size) = (drive.renderer(), drive.image_size());
-    let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
-    while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-        renderer.draw(index, &mut pixels);
-        let written = write_image(
-            &folder.join(drive.image_name(index)),
-            size,
-            &pixels,
-            &mut encoded,
-        );
-        if results.send(written).is_err() {
-            return;
-        }
-    }
 }

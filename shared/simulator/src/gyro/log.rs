@@ -4,11 +4,10 @@ use std::fmt::Write as _;
 
 use gyre_samples::{Sample, SampleKind};
 
-use super::SimulatedGyroConfig;
 use super::attitude::MeanMotion;
 use super::clock::Clock;
 use super::errors::Errors;
-use crate::path::Path;
+use crate::simulator::Simulator;
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
@@ -16,14 +15,11 @@ pub(crate) const FILE: &str = "imu.csv";
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
-/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
-pub(crate) fn samples(
-    config: &SimulatedGyroConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<Sample>> {
+/// The samples during a drive, by their stamps: rates and accelerations in the gyro's own axes.
+/// `None` without a gyro.
+pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
+    let (config, seed) = (&simulator.config().gyro, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     let figures = config.profile.figures()?;
     let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);
