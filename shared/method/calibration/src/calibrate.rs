@@ -7,7 +7,7 @@ use crate::{
     CalibrationError, Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
     drift::{self, MAX_REVISITS},
     facts::FACTS,
-    overlap::{Pair, System, along, overlaps, slopes},
+    overlap::{System, along, overlaps, slopes},
     revisits,
 };
 
@@ -77,40 +77,27 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    pub fn change(&self) -> FactVector {
-        change_of(&self.facts, &self.proposed)
-    }
-
     /// Returns the mean overlap of the pairs as configured, and with these changes of the facts.
     pub(crate) fn overlap_with(
         &self,
         drive: &Drive,
         change: &FactVector,
     ) -> Result<[f64; 2], CalibrationError> {
-        let (none, after) = (FactVector::zeros(), drive.mean_track_with(change)?);
+        let after = drive.mean_track_with(change)?;
         let pairs = pairs(&self.before, &self.revisits);
-        Ok(overlaps(
-            drive,
-            &pairs,
-            [(&self.before, &none), (&after, change)],
-        ))
+        Ok(overlaps(drive, &pairs, [&self.before, &after]))
     }
-}
-
-fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
-    let mut change = FactVector::zeros();
-    for &fact in corrected {
-        change[fact as usize] = facts[fact as usize].change.value;
-    }
-    change
 }
 
 /// Finds the facts of a drive.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
-    let none = FactVector::zeros();
-    let before = drive.mean_track_with(&none)?;
-    require_motion(drive, &before)?;
-    let revisits = evenly(revisits::find(drive, &before, &none)?, &before);
+    let before = drive.mean_track()?;
+    let path_m = before.path_m().last().copied().unwrap_or_default();
+    if path_m < 100.0 {
+        let scans = drive.sweeps.len();
+        return Err(CalibrationError::TooShort { scans, path_m });
+    }
+    let revisits = evenly(revisits::find(drive, &before)?, &before);
     let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
     let mut facts = solution.facts;
     let mut proposed = solution.determined();
@@ -123,10 +110,13 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         }
         proposed = solution.determined();
     }
-    let change = change_of(&facts, &proposed);
+    let mut change = FactVector::zeros();
+    for &fact in &proposed {
+        change[fact as usize] = facts[fact as usize].change.value;
+    }
     let mut after = drive.mean_track_with(&change)?;
     let pairs = pairs(&before, &revisits);
-    let overlap = overlaps(drive, &pairs, [(&before, &none), (&after, &change)]);
+    let overlap = overlaps(drive, &pairs, [&before, &after]);
     if overlap[1] < overlap[0] {
         proposed.clear();
         after = before.clone();
@@ -158,23 +148,22 @@ impl Solution {
         revisits: &[Revisit],
         free: &[Fact],
     ) -> Result<Self, CalibrationError> {
-        let (mut at, mut change) = (before.clone(), FactVector::zeros());
-        let mut found = round(drive, &at, revisits, &change, free)?;
+        let mut at = before.clone();
+        let mut found = round(drive, &at, revisits, free)?;
         for _ in 1..ROUNDS {
             if found.has_converged() {
                 break;
             }
-            change += found.step();
-            at = drive.mean_track_with(&change)?;
-            found = round(drive, &at, revisits, &change, free)?;
+            at = drive.mean_track_with(&(at.change + found.step()))?;
+            found = round(drive, &at, revisits, free)?;
         }
         let by_drift = match free.contains(&Fact::EccentricityCos) {
-            true => drift_of(drive, &at, revisits, &change)?,
+            true => drift_of(drive, &at, revisits)?,
             false => None,
         };
         Ok(Self {
             free: free.to_vec(),
-            facts: facts(drive, &found, &change, by_drift),
+            facts: facts(drive, &found, &at.change, by_drift),
             round: found,
         })
     }
@@ -186,17 +175,6 @@ impl Solution {
             true => self.free.iter().filter(is_useful).copied().collect(),
             false => Vec::new(),
         }
-    }
-}
-
-fn require_motion(drive: &Drive, track: &Track) -> Result<(), CalibrationError> {
-    let path_m = track.path_m().last().copied().unwrap_or_default();
-    match path_m < 100.0 {
-        true => Err(CalibrationError::TooShort {
-            scans: drive.sweeps.len(),
-            path_m,
-        }),
-        false => Ok(()),
     }
 }
 
@@ -227,9 +205,9 @@ fn evenly(mut revisits: Vec<Revisit>, track: &Track) -> Vec<Revisit> {
     revisits.into_iter().step_by(stride).collect()
 }
 
-fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Pair> {
+fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
     let mut pairs = along(track);
-    pairs.extend(revisits.iter().map(Pair::from));
+    pairs.extend_from_slice(revisits);
     pairs
 }
 
@@ -237,17 +215,14 @@ fn round(
     drive: &Drive,
     track: &Track,
     revisits: &[Revisit],
-    change: &FactVector,
     free: &[Fact],
 ) -> Result<Round, CalibrationError> {
-    let system = System::measure(drive, track, &pairs(track, revisits), change);
-    let solved = system.solve(free).ok_or(CalibrationError::Undetermined)?;
+    let system = System::measure(drive, track, &pairs(track, revisits));
     let unknown = [Estimate::UNKNOWN; FACTS];
-    let checked = system.solve(&Fact::ALL).unwrap_or(unknown);
     Ok(Round {
         free: free.to_vec(),
-        solved,
-        checked,
+        solved: system.solve(free).ok_or(CalibrationError::Undetermined)?,
+        checked: system.solve(&Fact::ALL).unwrap_or(unknown),
         pairs: system.len(),
     })
 }
@@ -258,37 +233,26 @@ fn drift_of(
     drive: &Drive,
     at: &Track,
     revisits: &[Revisit],
-    change: &FactVector,
 ) -> Result<Option<Estimate>, ConfigError> {
     if revisits.len() < MIN_REVISITS {
         return Ok(None);
     }
     let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
-        let mut shifted = *change;
+        let mut shifted = at.change;
         shifted[Fact::EccentricityCos as usize] += by_rad;
         let track = drive.mean_track_with(&shifted)?;
-        Ok(drift::residuals(
-            &track,
-            &aligned(drive, &track, revisits, &shifted),
-        ))
+        Ok(drift::residuals(&track, &aligned(drive, &track, revisits)))
     };
     let slopes = (shifted(DRIFT_STEP_RAD)? - shifted(-DRIFT_STEP_RAD)?) / (2.0 * DRIFT_STEP_RAD);
-    let here = aligned(drive, at, revisits, change);
+    let here = aligned(drive, at, revisits);
     let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
-    let configured = change[Fact::EccentricityCos as usize];
+    let configured = at.change[Fact::EccentricityCos as usize];
     Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
-/// The revisits with their poses aligned under a change of the facts.
-fn aligned(
-    drive: &Drive,
-    track: &Track,
-    revisits: &[Revisit],
-    change: &FactVector,
-) -> Vec<Revisit> {
-    let pairs: Vec<Pair> = revisits.iter().map(Pair::from).collect();
-    let slopes = slopes(drive, track, &pairs, change);
-    let poses = revisits.iter().zip(slopes);
+/// The revisits with their poses aligned under the facts of a track.
+fn aligned(drive: &Drive, track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
+    let poses = revisits.iter().zip(slopes(drive, track, revisits));
     poses
         .map(|(revisit, slope)| Revisit {
             pose: slope.map_or(revisit.pose, |slope| slope.pose),

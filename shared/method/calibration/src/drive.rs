@@ -64,6 +64,8 @@ pub struct Track {
     pub twists: Vec<Twist>,
     /// True if the chain of motions starts with a scan.
     starts: Vec<bool>,
+    /// The change of the configured facts.
+    pub(crate) change: FactVector,
 }
 
 impl Drive {
@@ -158,7 +160,7 @@ impl Drive {
         self.sweeps.iter().map(|it| it.interval_s <= 0.0).collect()
     }
 
-    pub fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
+    pub(crate) fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
         let points = self.sweeps[scan].points.iter();
         points
             .map(|point| correct(point, change, self.sense, self.alternates))
@@ -184,7 +186,7 @@ impl Drive {
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.
-    pub fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
+    fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
         let mut motions = vec![UncertainMotion::identity(); count];
@@ -204,10 +206,9 @@ impl Drive {
                 if sweep.interval_s <= 0.0 {
                     refiner.reset();
                 } else {
-                    let searched = if reversed {
-                        sweep.searched.inverse()
-                    } else {
-                        sweep.searched
+                    let searched = match reversed {
+                        true => sweep.searched.inverse(),
+                        false => sweep.searched,
                     };
                     let refined =
                         refiner.refine(number as u64, &points, from, &searched, sweep.interval_s);
@@ -219,12 +220,12 @@ impl Drive {
             }
             earlier = Some((scan, points));
         }
-        Ok(Track::new(motions, self))
+        Ok(Track::new(motions, self, *change))
     }
 }
 
 impl Track {
-    fn new(motions: Vec<UncertainMotion>, drive: &Drive) -> Self {
+    fn new(motions: Vec<UncertainMotion>, drive: &Drive, change: FactVector) -> Self {
         let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
         for motion in &motions {
             let before = poses.last().copied().unwrap_or_else(Pose::identity);
@@ -241,6 +242,7 @@ impl Track {
             motions,
             twists,
             starts,
+            change,
         }
     }
 
@@ -258,13 +260,13 @@ impl Track {
         self.starts[earlier + 1..=later].contains(&true)
     }
 
-    pub fn mean(&self, other: &Self, drive: &Drive) -> Self {
+    fn mean(&self, other: &Self, drive: &Drive) -> Self {
         let motions = self.motions.iter().zip(&other.motions);
         let motions = motions.map(|(a, b)| UncertainMotion {
             motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
             covariance: a.covariance,
         });
-        Self::new(motions.collect(), drive)
+        Self::new(motions.collect(), drive, self.change)
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::convert::Infallible;
 
-use gyre_geometry::{OdometryMotion, Pose, SparsePoint, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, UncertainMotion};
 use gyre_slam::{
     ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose,
 };
 
-use crate::{CalibrationError, Drive, Track, facts::FactVector};
+use crate::{CalibrationError, Drive, Track};
 
 /// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
@@ -29,14 +29,9 @@ impl KeyframeSource for &Keyframes {
 }
 
 /// Finds the revisits of a drive along its track.
-pub fn find(
-    drive: &Drive,
-    track: &Track,
-    change: &FactVector,
-) -> Result<Vec<Revisit>, CalibrationError> {
-    let options = LoopOptions::default();
-    let keyframes = Keyframes(keyframes(drive, track, change));
-    let config = drive.config();
+pub fn find(drive: &Drive, track: &Track) -> Result<Vec<Revisit>, CalibrationError> {
+    let keyframes = Keyframes(keyframes(drive, track));
+    let (options, config) = (LoopOptions::default(), drive.config());
     let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
     for keyframe in &keyframes.0 {
         closer.push(keyframe).map_err(ClosingError::from)?;
@@ -57,7 +52,7 @@ pub fn find(
     Ok(found)
 }
 
-fn keyframes(drive: &Drive, track: &Track, change: &FactVector) -> Vec<Keyframe> {
+fn keyframes(drive: &Drive, track: &Track) -> Vec<Keyframe> {
     let mut builder = KeyframeBuilder::default();
     let mut pose = UncertainMotion::identity();
     let mut keyframes = Vec::new();
@@ -73,8 +68,7 @@ fn keyframes(drive: &Drive, track: &Track, change: &FactVector) -> Vec<Keyframe>
             interval_s: sweep.interval_s,
         });
         if let Some(mut keyframe) = made {
-            let points: Vec<SparsePoint> = drive.points(scan, change);
-            keyframe.points = points;
+            keyframe.points = drive.points(scan, &track.change);
             keyframe.twist = track.twists[scan];
             keyframes.push(keyframe);
         }

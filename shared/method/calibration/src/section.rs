@@ -15,7 +15,7 @@ pub fn toml(found: &Found) -> String {
         let _ = writeln!(
             text,
             "{} = {:.digits$} # \u{b1} {:.digits$}: {}",
-            constant.key, constant.found.value, constant.found.sigma, constant.basis
+            constant.label.0, constant.found.value, constant.found.sigma, constant.basis
         );
     }
     for constant in found.kept() {
@@ -26,7 +26,7 @@ pub fn toml(found: &Found) -> String {
         let _ = writeln!(
             text,
             "# {} stays as configured: {:.5} \u{b1} {:.5} {reason}",
-            constant.key, constant.found.value, constant.found.sigma
+            constant.label.0, constant.found.value, constant.found.sigma
         );
     }
     // Last, since a section begins: the keys before are of the dataset.

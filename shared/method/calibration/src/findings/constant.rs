@@ -12,17 +12,13 @@ const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 const PATH_ERROR: f64 = 1e-3;
 
 /// Key, name, unit for printing, and factor to that unit.
-pub(super) type Label = (&'static str, &'static str, &'static str, f64);
+pub(crate) type Label = (&'static str, &'static str, &'static str, f64);
 
 /// A constant that the configuration has a key for.
 #[derive(Clone)]
 pub struct Constant {
-    /// The key of the section `[dataset]`.
-    pub key: &'static str,
-    pub name: &'static str,
-    pub unit: &'static str,
-    /// The factor to the printed unit.
-    pub scale: f64,
+    /// Key in the section `[dataset]`, name, unit for printing, and factor to that unit.
+    pub(crate) label: Label,
     pub configured: f64,
     /// The value by the drive.
     pub found: Estimate,
@@ -51,7 +47,7 @@ impl Constant {
             .iter()
             .fold(self.found, |all, next| all.combined(&next.found));
         let basis = drives().map(|it| {
-            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.scale);
+            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.label.3);
             format!("{value:.4} \u{b1} {sigma:.4}")
         });
         let mut mean = Self {
@@ -68,7 +64,7 @@ impl Constant {
 
 /// Puts the estimate of a fact beside its configured value.
 pub(super) fn constant(
-    (key, name, unit, scale): Label,
+    label: Label,
     configured: f64,
     fact: &FactEstimate,
     calibration: &Calibration,
@@ -77,8 +73,8 @@ pub(super) fn constant(
     let part = |estimate: &Estimate| {
         format!(
             "{:.3} \u{b1} {:.3}",
-            (configured + estimate.value) * scale,
-            estimate.sigma * scale
+            (configured + estimate.value) * label.3,
+            estimate.sigma * label.3
         )
     };
     let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
@@ -99,10 +95,7 @@ pub(super) fn constant(
         ),
     };
     Constant {
-        key,
-        name,
-        unit,
-        scale,
+        label,
         configured,
         found,
         useful_sigma: fact.fact.useful_sigma(),
@@ -131,10 +124,7 @@ pub(super) fn resolution(
     }
     let value = resolution_m * ratio;
     Ok(Ok(Constant {
-        key: "range_resolution_m",
-        name: "range resolution",
-        unit: "m",
-        scale: 1.0,
+        label: ("range_resolution_m", "range resolution", "m", 1.0),
         configured: resolution_m,
         found: Estimate::new(value, value * PATH_ERROR),
         useful_sigma: f64::INFINITY,
@@ -154,12 +144,13 @@ impl fmt::Display for Constant {
             _ if self.found.contradicts(self.configured) => "CONTRADICTS the configured value",
             _ => "agrees with the configured value",
         };
+        let (_, name, unit, scale) = self.label;
         let [value, sigma, configured] =
-            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * self.scale);
+            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * scale);
         write!(
             f,
-            "{:<21} {value:.4} \u{b1} {sigma:.4} {}, configured {configured:.4}: {verdict}\n{:<21} {}",
-            self.name, self.unit, "", self.basis
+            "{name:<21} {value:.4} \u{b1} {sigma:.4} {unit}, configured {configured:.4}: {verdict}\n{:<21} {}",
+            "", self.basis
         )
     }
 }
