@@ -140,7 +140,6 @@ impl SimulatedDrive {
             add("Navtech_Polar.txt", stamps.into_bytes());
         }
         add("ground_truth.tum", self.ground_truth_tum());
-        add("azimuth_poses.npy", truth::azimuth_poses_npy(simulator));
         add(cars::FILE, truth::objects_csv(simulator, &self.stamps_ns()));
         if let Some(samples) = self.gyro_samples() {
             add(log::FILE, log::csv(&samples));

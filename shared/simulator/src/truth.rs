@@ -1,8 +1,4 @@
-//! Exact ground truth beside a dataset of any format: `ground_truth.tum`, the pose at the time of
-//! each scan, and `azimuth_poses.npy`, the pose at the time of each azimuth.
-//!
-//! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the
-//! first azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise.
+//! Exact ground truth beside a dataset of any format.
 
 use std::fmt::Write;
 
@@ -25,37 +21,6 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
     // Writing to memory cannot fail, and there are stamps.
     let _ = gyre_datasets::write_tum(&Trajectory { stamp_ns, poses }, &mut text);
     text
-}
-
-pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
-    let (scans, azimuths) = (simulator.scans(), simulator.sampling().azimuths);
-    let mut bytes = npy_header(scans, azimuths);
-    bytes.reserve(scans * azimuths * 4 * size_of::<f64>());
-    for index in 0..scans {
-        let time = simulator.time(index);
-        for azimuth in 0..azimuths {
-            let time_s = time.drive_time_s(time.stamp_us(azimuth));
-            let pose = simulator.path().pose(time_s);
-            let [x, y, yaw] = xy_yaw(&pose);
-            for value in [time_s, x, y, yaw] {
-                bytes.extend(value.to_le_bytes());
-            }
-        }
-    }
-    bytes
-}
-
-/// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64
-/// bytes.
-fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
-    let dictionary =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");
-    let before = 10;
-    let padded = (before + dictionary.len() + 1).next_multiple_of(64) - before;
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    header.extend((padded as u16).to_le_bytes());
-    header.extend(format!("{dictionary:<width$}\n", width = padded - 1).into_bytes());
-    header
 }
 
 /// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.

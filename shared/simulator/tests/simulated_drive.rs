@@ -188,39 +188,6 @@ fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
 }
 
 #[test]
-fn azimuth_poses_are_an_array_that_numpy_reads() {
-    let config = config(OutputFormat::Oxford, 2);
-    let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
-    let bytes = fs::read(folder.path().join("azimuth_poses.npy")).unwrap();
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
-    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    assert_eq!(header % 64, 0);
-    let dictionary = String::from_utf8(bytes[10..header].to_vec()).unwrap();
-    assert!(
-        dictionary.contains("'shape': (2, 400, 4)") && dictionary.ends_with('\n'),
-        "{dictionary}"
-    );
-    let values: Vec<f64> = bytes[header..]
-        .chunks_exact(8)
-        .map(|value| f64::from_le_bytes(value.try_into().unwrap()))
-        .collect();
-    assert_eq!(values.len(), 2 * 400 * 4);
-    for (scan, azimuth) in [(0, 0), (0, 399), (1, 17)] {
-        let simulator = drive.simulator();
-        let time = simulator.time(scan);
-        let time_s = time.drive_time_s(time.stamp_us(azimuth));
-        let pose = simulator.path().pose(time_s);
-        let expected = [
-            time_s,
-            pose.translation.x,
-            pose.translation.y,
-            pose.rotation.angle(),
-        ];
-        assert_eq!(values[(scan * 400 + azimuth) * 4..][..4], expected);
-    }
-}
-
-#[test]
 fn the_number_of_threads_does_not_change_a_byte() {
     let config = config(OutputFormat::Oxford, 7);
     let on = |threads| {

@@ -43,7 +43,8 @@ fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
     let beside = drive.side_files().into_iter().map(|(name, _)| name);
     images
         .chain(beside)
-        .chain([MADE_BY.into(), DATASET_OPTIONS.into()])
+        // Earlier builds wrote the poses of all azimuths too.
+        .chain([MADE_BY, DATASET_OPTIONS, "azimuth_poses.npy"].map(PathBuf::from))
         .collect()
 }
 
