@@ -7,7 +7,7 @@
 //! model is linearised, and a vehicle that stops has no heading to lose. The prediction errors
 //! determine the turn rate, and the covariance contains its uncertainty.
 
-use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, SMatrix, SVector, Vector2, Vector4};
 
 /// Turn rates of the models over the largest one.
 const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
@@ -75,10 +75,7 @@ pub(crate) struct Innovation {
 impl Innovation {
     /// Returns the squared Mahalanobis distance; infinite for a covariance that is singular.
     pub fn chi_square(&self) -> f64 {
-        let inverse = self.covariance.try_inverse();
-        inverse.map_or(f64::INFINITY, |inverse| {
-            (self.difference.transpose() * inverse * self.difference)[0]
-        })
+        mahalanobis(self.difference, self.covariance)
     }
 
     /// Returns minus twice the logarithm of the likelihood, but for a constant: with it a track
@@ -142,13 +139,6 @@ impl Filter {
         let along = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         let variance = (along.transpose() * self.velocity_covariance() * along)[0];
         (velocity.norm(), variance.max(0.0).sqrt())
-    }
-
-    /// Returns the mean turn rate of the models over their largest, -1 to 1.
-    #[cfg(test)]
-    pub fn turn(&self) -> f64 {
-        let models = self.models.iter().zip(TURNS);
-        models.map(|(model, turn)| model.probability * turn).sum()
     }
 
     /// Predicts the state some seconds later. `heading` is a unit vector, along and across which
@@ -216,10 +206,7 @@ impl Filter {
     /// Returns the squared Mahalanobis distance of another state from this one.
     pub fn apart(&self, other: &Self) -> f64 {
         let difference = self.mean.state - other.mean.state;
-        let covariance = self.mean.covariance + other.mean.covariance;
-        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
-            (difference.transpose() * inverse * difference)[0]
-        })
+        mahalanobis(difference, self.mean.covariance + other.mean.covariance)
     }
 
     /// Returns the squared Mahalanobis distance between this object, which stood, and the place
@@ -238,9 +225,7 @@ impl Filter {
         let covariance = self.position_covariance()
             + started.position_covariance()
             + way * way.transpose() * 0.25;
-        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
-            (difference.transpose() * inverse * difference)[0]
-        })
+        mahalanobis(difference, covariance)
     }
 
     /// Weighs the models by minus twice the logarithms of their likelihoods.
@@ -330,6 +315,16 @@ fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Esti
         covariance + (part.covariance + apart * apart.transpose()) * (weight / sum)
     });
     Estimate { state, covariance }
+}
+
+/// Returns the squared Mahalanobis distance; infinite for a covariance that is singular.
+pub(crate) fn mahalanobis<const N: usize>(
+    difference: SVector<f64, N>,
+    covariance: SMatrix<f64, N, N>,
+) -> f64 {
+    covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
+        (difference.transpose() * inverse * difference)[0]
+    })
 }
 
 /// The covariance of an acceleration that is constant for some seconds.

@@ -54,20 +54,13 @@ impl ObjectTracker {
         self.predict(scan.stamp_ns);
         let found = self.detector.detect(scan, points, LEAST_LIKELY)?;
         let rest = self.assign(found);
-        self.begin(&rest);
+        let begun = rest.iter().map(|it| Track::new(it, &self.config));
+        self.tracks.extend(begun);
         self.judge();
         let objects = self.tracks.iter().filter_map(|it| it.object(&self.config));
         self.objects.clear();
         self.objects.extend(objects);
         Ok(&self.objects)
-    }
-
-    /// Forgets all objects and all that was seen; identities are not given again.
-    fn restart(&mut self) {
-        self.detector.clear();
-        self.tracks.clear();
-        self.objects.clear();
-        self.stamp_ns = None;
     }
 
     /// Predicts all tracks at the scan's time.
@@ -76,7 +69,11 @@ impl ObjectTracker {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
             match dt_s > 0.0 && dt_s <= MAX_GAP_S {
                 true => self.tracks.iter_mut().for_each(|track| track.predict(dt_s)),
-                false => self.restart(),
+                // Identities are not given again.
+                false => {
+                    self.detector.clear();
+                    self.tracks.clear();
+                }
             }
         }
         self.stamp_ns = Some(stamp_ns);
@@ -86,7 +83,7 @@ impl ObjectTracker {
     /// detections.
     fn assign(&mut self, found: Vec<Detection>) -> Vec<Detection> {
         let (objects, others): (Vec<usize>, Vec<usize>) = (0..self.tracks.len())
-            .filter(|index| !self.tracks[*index].is_lost())
+            .filter(|index| !self.tracks[*index].lost)
             .partition(|index| self.tracks[*index].is_object());
         let rest = self.assign_to(&objects, found);
         self.assign_to(&others, rest)
@@ -118,11 +115,6 @@ impl ObjectTracker {
             .collect()
     }
 
-    fn begin(&mut self, rest: &[Detection]) {
-        let tracks = rest.iter().map(|it| Track::new(it, &self.config));
-        self.tracks.extend(tracks);
-    }
-
     /// Ends tracks, including later tracks of the same vehicle, and decides which move. An object
     /// keeps its identity: two close vehicles may have been confused.
     fn judge(&mut self) {
@@ -130,8 +122,8 @@ impl ObjectTracker {
         self.tracks.sort_by_key(|track| !track.is_object());
         for index in 0..self.tracks.len() {
             let (first, rest) = self.tracks.split_at_mut(index);
-            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0]);
-            if !rest[0].is_lost() && first.iter().any(is_known) {
+            let is_known = |first: &Track| !first.lost && first.is_same(&rest[0]);
+            if !rest[0].lost && first.iter().any(is_known) {
                 rest[0].lose();
             }
         }
@@ -151,7 +143,7 @@ impl ObjectTracker {
         match lost.min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((lost, _)) => found.take_over(&mut self.tracks[lost]),
             None => {
-                found.confirm(self.next_id);
+                found.id = Some(self.next_id);
                 self.next_id += 1;
             }
         }
