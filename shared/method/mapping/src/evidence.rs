@@ -12,7 +12,7 @@ use nalgebra::Point2;
 
 use crate::{
     MapOptions, OptionError,
-    store::{BLOCK, BLOCKS, ONE, Tile, TileStore},
+    store::{BLOCK, BLOCKS, ONE, TileStore},
     tile::{Cell, TILE_CELLS, TileImage, TileIndex},
     view::View,
 };
@@ -122,6 +122,7 @@ impl Evidence {
         let tiles = TileIndex::around(&centre, options.reach_m, options.cell_m);
         let tiles: Vec<TileIndex> = tiles.collect();
         self.collect_returns(&tiles, pose);
+        let map_to_keyframe = pose.inverse();
         for &index in &tiles {
             if change == Change::Draw {
                 self.store.enter(index);
@@ -130,12 +131,17 @@ impl Evidence {
                 for &(cell, amount) in &self.returned[&index] {
                     change.apply(&mut tile.returned[cell as usize], amount);
                 }
-                let looks = Looks {
-                    view: &self.view,
-                    map_to_keyframe: pose.inverse(),
-                    cell_m: self.options.cell_m,
+                let look = |place: Point2<f64>| self.view.look(&(map_to_keyframe * place).coords);
+                let [x, y] = index.corner();
+                let middle_m = |corner: i64, block: usize| {
+                    (corner as f64 + (block as f64 + 0.5) * BLOCK as f64) * self.options.cell_m
                 };
-                looks.change(index, tile, change);
+                for (row, looked) in tile.looked.chunks_exact_mut(BLOCKS).enumerate() {
+                    for (column, looked) in looked.iter_mut().enumerate() {
+                        let look = look(Point2::new(middle_m(x, column), middle_m(y, row)));
+                        change.apply(looked, (look * f64::from(ONE)).round() as u32);
+                    }
+                }
             }
             if change == Change::Erase {
                 self.store.leave(index);
@@ -203,28 +209,5 @@ fn quantise(returned: u32, looked: u32) -> Cell {
     Cell {
         evidence: (255.0 * share.sqrt()).round() as u8,
         looked: (255.0 * (looked / WELL_KNOWN).min(1.0)).round() as u8,
-    }
-}
-
-/// The visibility of the blocks of a tile from a keyframe.
-struct Looks<'a> {
-    view: &'a View,
-    map_to_keyframe: Pose,
-    cell_m: f64,
-}
-
-impl Looks<'_> {
-    fn change(&self, index: TileIndex, tile: &mut Tile, change: Change) {
-        let [x, y] = index.corner();
-        let middle_m = |corner: i64, block: usize| {
-            (corner as f64 + (block as f64 + 0.5) * BLOCK as f64) * self.cell_m
-        };
-        for (row, looked) in tile.looked.chunks_exact_mut(BLOCKS).enumerate() {
-            for (column, looked) in looked.iter_mut().enumerate() {
-                let place = Point2::new(middle_m(x, column), middle_m(y, row));
-                let look = self.view.look(&(self.map_to_keyframe * place).coords);
-                change.apply(looked, (look * f64::from(ONE)).round() as u32);
-            }
-        }
     }
 }

@@ -1,13 +1,5 @@
 //! Maps of keyframes: how often each place returned power of how often it was looked at.
 //!
-//! Reading order:
-//! - [`Evidence`]: keyframes drawn at their poses, taken out again and drawn elsewhere;
-//! - [`TileImage`]: a square of 256 x 256 cells, as it is stored; [`TileSource`]: a map as its
-//!   tiles;
-//! - [`write_map`], [`Map`]: a map as a folder;
-//! - [`map_png`]: a map as one picture with the trajectory in it; [`legible`]: cells for it;
-//! - [`write_pgm`], [`write_geotiff`], [`write_web_tiles`]: a map in the forms of other programs.
-//!
 //! # Method
 //! 1. The points of a keyframe are deskewed and freed of the Doppler shift by its velocity.
 //! 2. A sector of one degree was looked at as far as the farthest return within the beam. A radar
@@ -31,7 +23,6 @@ mod evidence;
 mod export;
 mod georeference;
 mod map;
-mod occupancy;
 mod options;
 mod picture;
 mod pixels;
@@ -46,7 +37,6 @@ pub use evidence::Evidence;
 pub use export::{Grid, grid, write_geotiff, write_pgm, write_web_tiles};
 pub use georeference::{Origin, OriginError};
 pub use map::{Map, require_tiles_only, write_map};
-pub use occupancy::Occupancy;
 pub use options::{MapOptions, OptionError};
 pub use picture::{Overlay, legible, map_png};
 pub use source::{MapError, TileSource};

@@ -22,16 +22,11 @@ pub enum MapError {
     Tile { path: PathBuf, reason: String },
     #[error("the map is empty: no keyframe was drawn")]
     Empty,
+    /// Cells along x and along y, and the form.
     #[error(
-        "the map has {columns} x {rows} cells, too many for {form}: choose larger cells, or the map's folder"
+        "the map has {} x {} cells, too many for {}: choose larger cells, or the map's folder", .0[0], .0[1], .1
     )]
-    TooLarge {
-        /// Cells along x.
-        columns: usize,
-        /// Cells along y.
-        rows: usize,
-        form: &'static str,
-    },
+    TooLarge([usize; 2], &'static str),
     #[error("cannot encode a picture: {0}")]
     Encode(String),
 }

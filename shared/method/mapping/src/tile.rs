@@ -57,6 +57,23 @@ pub struct Cell {
     pub looked: u8,
 }
 
+/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a
+/// sixteenth of the power it might have.
+const KNOWN_LOOKED: u8 = 16;
+const OCCUPIED_EVIDENCE: u8 = 64;
+
+impl Cell {
+    /// Returns the first value for a cell that was hardly looked at, the second for a free one, and
+    /// the third for an occupied one.
+    pub(crate) fn occupancy(self, [unknown, free, occupied]: [u8; 3]) -> u8 {
+        match self {
+            cell if cell.looked < KNOWN_LOOKED => unknown,
+            cell if cell.evidence >= OCCUPIED_EVIDENCE => occupied,
+            _ => free,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileImage {
     /// Row after row, from the highest y down; in each row the lowest x first.

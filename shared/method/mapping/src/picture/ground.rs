@@ -23,11 +23,7 @@ impl Ground {
         // A power of two, so that a tile has a whole number of blocks.
         let block = columns.max(rows).div_ceil(MAX_SIDE).next_power_of_two();
         if block > TILE_CELLS {
-            return Err(MapError::TooLarge {
-                columns,
-                rows,
-                form: "a picture",
-            });
+            return Err(MapError::TooLarge([columns, rows], "a picture"));
         }
         let (width, side) = (columns / block, TILE_CELLS / block);
         let mut cells = vec![Cell::default(); width * (rows / block)];

@@ -80,18 +80,6 @@ fn something_seen_by_one_of_many_views_fades() {
 }
 
 #[test]
-fn a_street_driven_often_is_no_brighter() {
-    let once = drive(40, &wall());
-    let again = once.iter().cloned().map(|(at, mut keyframe)| {
-        keyframe.seq += 40;
-        (at, keyframe)
-    });
-    let twice: Vec<_> = once.iter().cloned().chain(again).collect();
-    let [once, twice] = [once, twice].map(|drive| cell(&mut drawn(&drive), 0.1, 20.1).evidence);
-    assert!(once.abs_diff(twice) <= 4, "{once} and {twice}");
-}
-
-#[test]
 fn a_cell_beyond_the_farthest_return_was_not_looked_at() {
     let mut evidence = drawn(&drive(1, &wall()));
     assert!(cell(&mut evidence, -0.5, 15.0).looked > 0);
@@ -155,14 +143,4 @@ fn a_point_that_is_nowhere_is_left_out() {
             .push(SparsePoint::from([x_m, 0.0, 0.0, weight, 0.0]));
     }
     assert_eq!(images(&mut drawn(&[(at, strange)])), whole);
-}
-
-#[test]
-fn an_option_out_of_bounds_is_refused_by_name() {
-    let options = MapOptions {
-        cell_m: 0.0,
-        ..MapOptions::default()
-    };
-    let refused = options.validate().unwrap_err().to_string();
-    assert_eq!(refused, "the map's cell_m is 0, but must be 0.05 to 5");
 }
