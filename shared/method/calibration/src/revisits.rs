@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use gyre_geometry::{OdometryMotion, Pose, UncertainMotion};
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose,
+    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, SUBMAP_REACH_M, ScanPose,
 };
 
 use crate::{CalibrationError, Drive, Track};
@@ -31,8 +31,8 @@ impl KeyframeSource for &Keyframes {
 /// Finds the revisits of a drive along its track.
 pub fn find(drive: &Drive, track: &Track) -> Result<Vec<Revisit>, CalibrationError> {
     let keyframes = Keyframes(keyframes(drive, track));
-    let (options, config) = (LoopOptions::default(), drive.config());
-    let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
+    let config = drive.config();
+    let mut closer = LoopCloser::new(SUBMAP_REACH_M, &config.refinement, config.points.capacity)?;
     for keyframe in &keyframes.0 {
         closer.push(keyframe).map_err(ClosingError::from)?;
     }

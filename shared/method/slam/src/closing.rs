@@ -5,7 +5,7 @@ mod cache;
 
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
-    SUBMAP_REACH_M, neighbours,
+    neighbours,
 };
 use gyre_estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
@@ -33,21 +33,6 @@ const GAP_M: f64 = 100.0;
 const CANDIDATES: usize = 3;
 const APART_M: f64 = 15.0;
 
-/// Options of [`LoopCloser`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoopOptions {
-    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
-    pub submap_reach_m: f64,
-}
-
-impl Default for LoopOptions {
-    fn default() -> Self {
-        Self {
-            submap_reach_m: SUBMAP_REACH_M,
-        }
-    }
-}
-
 /// Errors of [`LoopCloser`].
 #[derive(Debug, Error)]
 pub enum ClosingError<E> {
@@ -65,7 +50,7 @@ pub enum ClosingError<E> {
 /// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
 /// they are read again where a submap is drawn.
 pub struct LoopCloser {
-    options: LoopOptions,
+    submap_reach_m: f64,
     describer: Describer,
     verifier: LoopVerifier,
     index: PlaceIndex,
@@ -81,10 +66,11 @@ pub struct LoopCloser {
 }
 
 impl LoopCloser {
-    /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
-    /// the odometry's.
+    /// Plans the closing of loops between keyframes of at most `capacity` points, whose submaps are
+    /// made of the keyframes up to `submap_reach_m` of the path to each side. `refinement` is the
+    /// odometry's.
     pub fn new(
-        options: LoopOptions,
+        submap_reach_m: f64,
         refinement: &RefinementConfig,
         capacity: usize,
     ) -> Result<Self, ConfigError> {
@@ -99,7 +85,7 @@ impl LoopCloser {
             next_query: 0,
             cache: Cache::new(),
             submaps: [submap(), submap()],
-            options,
+            submap_reach_m,
         })
     }
 
@@ -207,7 +193,7 @@ impl LoopCloser {
     }
 
     fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
-        neighbours(&self.path_m, middle, self.options.submap_reach_m)
+        neighbours(&self.path_m, middle, self.submap_reach_m)
     }
 
     /// The places that look most similar to a keyframe's place.

@@ -24,23 +24,9 @@ pub enum EstimatorKind {
     Filter,
 }
 
-/// Options of [`TrajectoryEstimator`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrajectoryOptions {
-    pub kind: EstimatorKind,
-    /// Loops between two stretches of the path of this length count as one: their errors are
-    /// dependent, m.
-    pub group_m: f64,
-}
-
-impl Default for TrajectoryOptions {
-    fn default() -> Self {
-        Self {
-            kind: EstimatorKind::Graph,
-            group_m: 5.0,
-        }
-    }
-}
+/// Loops between two stretches of the path of this length count as one: their errors are dependent,
+/// m.
+const GROUP_M: f64 = 5.0;
 
 /// Estimates the poses of all keyframes from their motions and loops.
 ///
@@ -49,7 +35,7 @@ impl Default for TrajectoryOptions {
 /// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of
 ///   the time. Its result may depend a little on when loops came.
 pub struct TrajectoryEstimator {
-    options: TrajectoryOptions,
+    kind: EstimatorKind,
     keyframes: Vec<Corrected>,
     odometry: DeadReckoning,
     /// By the later keyframe, then by the earlier one.
@@ -127,10 +113,10 @@ impl Estimator {
 }
 
 impl TrajectoryEstimator {
-    pub fn new(options: TrajectoryOptions) -> Self {
+    pub fn new(kind: EstimatorKind) -> Self {
         Self {
-            estimator: Estimator::new(Pose::identity(), options.kind),
-            options,
+            estimator: Estimator::new(Pose::identity(), kind),
+            kind,
             keyframes: Vec::new(),
             odometry: DeadReckoning::default(),
             loops: Vec::new(),
@@ -178,7 +164,7 @@ impl TrajectoryEstimator {
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         match self.keyframes.len().checked_sub(1) {
             None => {
-                self.estimator = Estimator::new(keyframe.pose.motion, self.options.kind);
+                self.estimator = Estimator::new(keyframe.pose.motion, self.kind);
             }
             Some(last) => {
                 let motion = Constraint::odometry(last, keyframe.motion);
@@ -223,7 +209,7 @@ impl TrajectoryEstimator {
 
     /// Moves all poses to where they fit best, and judges all loops again.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
-        match self.options.kind {
+        match self.kind {
             EstimatorKind::Graph => {
                 self.judge_all();
                 self.compare_clocks();
@@ -237,7 +223,7 @@ impl TrajectoryEstimator {
     /// to where they fit best. All loops are judged again from time to time, and if one was wrong
     /// the poses begin at the odometry.
     pub fn update(&mut self) -> Result<(), EstimationError> {
-        match self.options.kind {
+        match self.kind {
             EstimatorKind::Graph => self.update_graph(),
             EstimatorKind::Filter => self.update_filter(),
         }
@@ -322,7 +308,7 @@ impl TrajectoryEstimator {
     fn start(&self) -> Estimator {
         let start = self.keyframes.first();
         let start = start.map_or(Pose::identity(), |first| first.at.odometry);
-        Estimator::new(start, self.options.kind)
+        Estimator::new(start, self.kind)
     }
 
     fn insert(&mut self, closing: &Constraint, chi_square: f64) -> Result<(), EstimationError> {
@@ -335,8 +321,7 @@ impl TrajectoryEstimator {
                 keyframes,
             });
         }
-        let stretch =
-            |keyframe: usize| (self.keyframes[keyframe].path_m / self.options.group_m) as u64;
+        let stretch = |keyframe: usize| (self.keyframes[keyframe].path_m / GROUP_M) as u64;
         let group = Some(stretch(from) << 32 | stretch(to));
         let judged = JudgedLoop::new(
             Constraint {

@@ -3,7 +3,7 @@
 
 use gyre_geometry::{Pose, Twist, UncertainMotion, interpolate, pose};
 use gyre_samples::{GnssConfig, GnssFix};
-use gyre_slam::{FixRefusal, Fixes, Keyframe, TrajectoryEstimator, TrajectoryOptions};
+use gyre_slam::{EstimatorKind, FixRefusal, Fixes, Keyframe, TrajectoryEstimator};
 use nalgebra::{Matrix3, Point2, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -103,7 +103,7 @@ impl Drive {
     }
 
     fn with(&self, fixes: Vec<GnssFix>) -> TrajectoryEstimator {
-        let estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
+        let estimator = TrajectoryEstimator::new(EstimatorKind::Graph);
         estimator.with_fixes(of_receiver(fixes))
     }
 
@@ -329,7 +329,7 @@ fn the_solution_does_not_depend_on_when_it_was_asked_for() {
 fn without_fixes_nothing_changes() {
     let drive = Drive::new(100, 15);
     let plain = {
-        let mut estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
+        let mut estimator = TrajectoryEstimator::new(EstimatorKind::Graph);
         drive
             .keyframes
             .iter()

@@ -3,7 +3,7 @@
 use crate::common::{AROUND, Drive};
 use gyre_estimation::Constraint;
 use gyre_geometry::{Pose, UncertainMotion, pose};
-use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions};
+use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,11 +51,7 @@ fn wrong(drive: &Drive, length: usize) -> Vec<Constraint> {
 }
 
 fn odometry(drive: &Drive, kind: EstimatorKind) -> TrajectoryEstimator {
-    let options = TrajectoryOptions {
-        kind,
-        ..TrajectoryOptions::default()
-    };
-    let mut estimator = TrajectoryEstimator::new(options);
+    let mut estimator = TrajectoryEstimator::new(kind);
     drive
         .keyframes
         .iter()

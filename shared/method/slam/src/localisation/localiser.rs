@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use gyre_estimation::places::{Candidate, Describer, Descriptor};
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
-use nalgebra::{Matrix3, Point2, Vector3};
+use nalgebra::{Matrix3, Point2};
 
 use crate::localisation::{Map, registration::Registration};
 
@@ -159,12 +159,6 @@ impl Localiser {
     /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of
     /// the map look like it.
     pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
-        let fix = self.most_similar(points, twist);
-        fix.filter(|fix| self.is_accepted(fix))
-    }
-
-    /// Finds the pose with the highest similarity of a scan to the map, however low.
-    pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         self.scan.start(points, twist);
         self.registration.set_scan(&self.scan);
         self.describer.describe(&self.scan, &mut self.descriptor);
@@ -175,7 +169,7 @@ impl Localiser {
         let fix = self.best().filter(|fix| self.is_accepted(fix));
         fix.or_else(|| {
             (few..self.candidates.len()).for_each(|k| self.search(k));
-            self.best()
+            self.best().filter(|fix| self.is_accepted(fix))
         })
     }
 
@@ -237,16 +231,10 @@ impl Localiser {
         let mut best: Option<Fix> = None;
         for k in 0..self.hypotheses.len().min(ALIGNED) {
             let Hypothesis { pose, keyframe, .. } = self.hypotheses[k];
-            if let Some((pose, correlation)) = self.align(keyframe, &pose) {
-                let fix = Fix {
-                    pose,
-                    correlation,
-                    margin: 0.0,
-                    keyframe,
-                };
-                if best.is_none_or(|best| correlation > best.correlation) {
-                    best = Some(fix);
-                }
+            if let Some(fix) = self.align(keyframe, &pose)
+                && best.is_none_or(|best| fix.correlation > best.correlation)
+            {
+                best = Some(fix);
             }
         }
         let best = best.filter(|best| best.pose.has_covariance())?;
@@ -266,7 +254,8 @@ impl Localiser {
         apart.translation.vector.norm() <= SAME_M && apart.rotation.angle().abs() <= SAME_RAD
     }
 
-    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<(UncertainMotion, f64)> {
+    /// Aligns the scan with the submap of a keyframe; the fix has no margin.
+    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<Fix> {
         self.draw(keyframe);
         self.registration.set_place(&self.place);
         let initial = self.map.pose(keyframe).inv_mul(from);
@@ -275,7 +264,12 @@ impl Localiser {
             motion: self.map.pose(keyframe),
             covariance: Matrix3::zeros(),
         };
-        Some((of_keyframe.then(&motion), correlation))
+        Some(Fix {
+            pose: of_keyframe.then(&motion),
+            correlation,
+            margin: 0.0,
+            keyframe,
+        })
     }
 
     /// Tracks the next scan from the last known place.
@@ -319,15 +313,13 @@ impl Localiser {
     /// Registers the scan with a keyframe, and updates the prediction with the result; `None`
     /// unless both agree.
     fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
-        let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
-        if correlation < TRACKED_CORRELATION {
+        let measured = self.align(keyframe, &predicted.motion)?;
+        if measured.correlation < TRACKED_CORRELATION {
             return None;
         }
         Some(Fix {
-            pose: fused(predicted, &measured)?,
-            correlation,
-            margin: 0.0,
-            keyframe,
+            pose: fused(predicted, &measured.pose)?,
+            ..measured
         })
     }
 
@@ -352,15 +344,10 @@ fn fused(predicted: &UncertainMotion, measured: &UncertainMotion) -> Option<Unce
     }
     let gain = predicted.covariance * inverse;
     let rest = Matrix3::identity() - gain;
+    let ([x, y, yaw], by) = (xy_yaw(&predicted.motion), gain * innovation);
     Some(UncertainMotion {
-        motion: moved(&predicted.motion, &(gain * innovation)),
+        motion: pose(x + by.x, y + by.y, yaw + by.z),
         covariance: rest * predicted.covariance * rest.transpose()
             + gain * measured.covariance * gain.transpose(),
     })
-}
-
-/// A pose moved by (x, y, yaw) along the map's axes.
-fn moved(from: &Pose, by: &Vector3<f64>) -> Pose {
-    let [x, y, yaw] = gyre_geometry::xy_yaw(from);
-    pose(x + by.x, y + by.y, yaw + by.z)
 }
