@@ -372,11 +372,4 @@ mod tests {
             assert!(near(side) > 0.9 * route.length_m(), "{}", near(side));
         }
     }
-
-    #[test]
-    fn the_scenery_is_the_one_of_its_seed() {
-        let route = Route::along(&BlockLoop::new(40.0, 32.0, 9.5, 5.0));
-        let of = |seed| build(&route, seed).scatterers;
-        assert!(of(1) == of(1) && of(1) != of(2));
-    }
 }

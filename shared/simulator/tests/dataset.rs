@@ -97,36 +97,6 @@ fn another_seed_gives_other_streets_and_another_one_of_the_radar_the_same() {
 }
 
 #[test]
-fn csv_names_images_by_sweep_start_and_motions_by_sweep_middle() {
-    let folder = generate(&config(3));
-    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    let listed = read("radar.timestamps");
-    let names: Vec<i64> = listed
-        .lines()
-        .map(|line| line.strip_suffix(" 1").unwrap().parse().unwrap())
-        .collect();
-    let motions = read("gt/radar_odometry.csv");
-    assert!(motions.starts_with("source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,"));
-    for (index, row) in motions.lines().skip(1).enumerate() {
-        let fields: Vec<&str> = row.split(',').collect();
-        let stamps = [0, 1, 8, 9].map(|k| fields[k].parse::<i64>().unwrap());
-        // The source is the newer scan.
-        assert_eq!(stamps[2..], [names[index + 1], names[index]]);
-        let half_sweep_us = 250_000 * 399 / 400 / 2;
-        assert_eq!(
-            stamps[..2],
-            [stamps[2], stamps[3]].map(|it| it + half_sweep_us)
-        );
-        assert!(
-            folder
-                .path()
-                .join(format!("radar/{}.png", stamps[2]))
-                .exists()
-        );
-    }
-}
-
-#[test]
 fn invalid_configuration_names_its_key() {
     let error = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
     assert!(error(config(0)).contains("`scans`"));

@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use crate::common::all_files;
-use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, inspect, read_trajectory};
+use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, read_trajectory};
 use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
 use gyre_simulator::output::OutputConfig;
@@ -155,19 +155,6 @@ fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Pose {
         .simulator()
         .path()
         .pose((stamp_ns - epoch_ns) as f64 * 1e-9)
-}
-
-#[test]
-fn inspection_finds_nothing_odd_in_any_format() {
-    for format in FORMATS {
-        let config = config(format, 4);
-        let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
-        let report = inspect(folder.path(), &options(&drive), None)
-            .unwrap()
-            .to_string();
-        assert!(report.contains(drive.format().name()), "{report}");
-        assert!(report.contains("ground_truth.tum"), "{report}");
-    }
 }
 
 #[test]

@@ -176,15 +176,6 @@ mod tests {
     }
 
     #[test]
-    fn loop_closes_after_one_lap() {
-        let path = default_loop();
-        let (start, end) = (path.pose(0.0), path.nodes[path.nodes.len() - 1]);
-        assert!((start.translation.x - end.x_m).abs() < 1e-4, "{end:?}");
-        assert!((start.translation.y - end.y_m).abs() < 1e-4, "{end:?}");
-        assert!((end.heading_rad - TAU).abs() < 1e-9);
-    }
-
-    #[test]
     fn pose_moves_along_its_heading_and_never_jumps() {
         let path = default_loop();
         for i in 0..3000 {

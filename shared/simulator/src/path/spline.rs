@@ -197,15 +197,6 @@ mod tests {
     }
 
     #[test]
-    fn basis_functions_sum_to_one_and_their_slopes_to_zero() {
-        for i in 0..=10 {
-            let share = f64::from(i) / 10.0;
-            assert!((basis(share).iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            assert!(basis_slope(share).iter().sum::<f64>().abs() < 1e-13);
-        }
-    }
-
-    #[test]
     fn low_frequencies_pass_and_high_ones_do_not() {
         let amplitude = |periods: f64| {
             let wave = |at: f64| (TAU * periods * at).sin();
