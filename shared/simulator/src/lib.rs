@@ -1,19 +1,6 @@
-//! Simulated drives of a spinning FMCW radar, with exact truth.
-//!
-//! A vehicle with a radar drives around a block of houses or along a trajectory. The result is a
-//! dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed into a pipeline.
-//! [`simulator`] renders single scans with their exact poses, [`sensor`] measures one sweep.
-//!
-//! ```
-//! use gyre_simulator::{SimulationConfig, Simulator};
-//!
-//! let simulator = Simulator::new(&SimulationConfig { scans: Some(2), ..SimulationConfig::default() })?;
-//! let first = simulator.render_scan(0);
-//! assert_eq!(first.scan.view().geometry.azimuths, 400);
-//! let motion = simulator.pose(0).inverse() * simulator.pose(1);
-//! assert!(motion.translation.x > 1.0, "metres ahead in a quarter of a second");
-//! # Ok::<(), gyre_simulator::SimulatorError>(())
-//! ```
+//! Simulated drives of a spinning FMCW radar, with exact truth: around a block of houses or along a
+//! trajectory, as a dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed
+//! into a pipeline. [`simulator`] renders single scans, [`sensor`] measures one sweep.
 
 pub mod body;
 mod cars;

@@ -2,10 +2,8 @@
 //! and parked cars. One seed determines all of it.
 //!
 //! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a
-//! front consists of bays, each with its own strength: rough wall (many weak scatterers, whose
-//! echoes interfere), relief between the bays, which appears as a row of dots along a street, and
-//! windows (reveals that face along the street, a pane that flashes at normal incidence, a room
-//! that extends the echo in range).
+//! front consists of bays, each with its own strength: rough wall, relief between the bays, and
+//! windows (reveals that face along the street, a pane that flashes, a room that extends the echo).
 
 use std::collections::HashSet;
 

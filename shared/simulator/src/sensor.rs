@@ -1,14 +1,5 @@
 //! A sweep of a spinning FMCW radar, each azimuth measured at its own time from its own pose.
 //!
-//! In the order of a measurement:
-//!
-//! - `sweep_poses`: the sensor's pose at each azimuth, and the times when its beam passes a place,
-//! - `line_of_sight`: rays in all directions, and the walls along each,
-//! - `echoes`: the echoes with their amplitudes; `scintillation`: their fluctuation with the
-//!   direction,
-//! - `antenna`: the beam's pattern; `beam_index`: the echoes of each azimuth,
-//! - `spectrum`: range processing and quantisation.
-//!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so scatterers in one
 //! resolution cell interfere (speckle), differently from each pose. Noise is the receiver's alone.
 

@@ -1,8 +1,5 @@
-//! A tunnel: walls without structure along a stretch of the drive.
-//!
-//! Inside a radar sees two smooth lines and nothing else, until a portal comes into its range: how
-//! far the vehicle drives is not determined. The lining is rough to the radar and everywhere the
-//! same: its echoes are speckle, which is new at every place of the vehicle.
+//! A tunnel: walls without structure along a stretch of the drive. Inside a radar sees two smooth
+//! lines and nothing else until a portal comes into its range: how far it drives is not determined.
 
 use nalgebra::{Point2, Vector2};
 use rand::Rng;

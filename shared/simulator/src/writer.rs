@@ -48,11 +48,9 @@ pub fn write_dataset(
 }
 
 /// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls
-/// `progress(done, total)` for each image.
-///
-/// The files are the same, byte for byte, for the same configuration and any number of threads.
-/// Images of an earlier call with the same configuration are kept, if it was interrupted or had
-/// fewer scans; the first and the last of them are compared with newly rendered ones.
+/// `progress(done, total)` for each image. The files do not depend on the number of threads. Images
+/// of an earlier call with the same configuration are kept; the first and the last of them are
+/// compared with newly rendered ones.
 pub fn write_dataset_on(
     threads: NonZeroUsize,
     config: &SimulationConfig,

@@ -1,8 +1,6 @@
-//! The clock and the axes of a gyro, from the turns of the radar.
-//!
-//! Both turn together, so the log fits where the radar's turns correlate with it best: over all
-//! three axes and all offsets of its clock, first coarsely, then by least squares for the offset,
-//! the scale and the bias at once. The radar's turns come from the track, by radar alone.
+//! The clock and the axes of a gyro, from the turns of the radar's track: the log fits where they
+//! correlate best, over all three axes and all offsets of its clock, first coarsely, then by least
+//! squares for the offset, the scale and the bias at once.
 
 pub(crate) mod angles;
 pub(crate) mod fit;

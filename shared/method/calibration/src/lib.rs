@@ -1,14 +1,10 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
 //! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
-//! So two scans of one place from different poses cannot coincide, whatever their relative pose:
-//! the slope of their overlap by each constant, at the relative pose that is best for it, shows the
-//! direction of the right one. Wrong constants also make the track drift, and a road that is driven
-//! twice lies twice. Both are residuals of the constants, and [`calibrate`] solves them.
-//!
-//! [`calibrate`] is the method on one page; [`Study`] a drive with all its results, and the joint
-//! conclusion from several drives of one radar. [`calibrate_gyro`] and [`calibrate_wheels`] find the
-//! clocks of the other sensors by the same track.
+//! So two scans of one place from different poses cannot coincide: the slope of their overlap by each
+//! constant, at the relative pose that is best for it, shows the direction of the right one. Wrong
+//! constants also make the track drift. [`calibrate`] solves both; [`calibrate_gyro`] and
+//! [`calibrate_wheels`] find the clocks of the other sensors by the same track.
 
 mod calibrate;
 mod delay;

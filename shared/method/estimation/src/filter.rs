@@ -32,18 +32,14 @@ impl Default for FilterOptions {
     }
 }
 
-/// The extended Kalman filter over the poses of all keyframes.
+/// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
+/// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number
+/// of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long trajectories.
 ///
-/// The state is the pose of each keyframe, and there is no map (Checchin et al., Sec. 4.1). The
-/// first pose is known exactly. A new keyframe costs time in proportion to the number of keyframes,
-/// a loop to its square, and no measurement is linearised again after later ones: use
-/// [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
-///
-/// The paper's filter keeps the covariance of x, y and yaw of each pose. This filter keeps the
-/// covariance of a small motion of the world that takes the estimated pose to the true one. To
-/// first order both are the same, and [`TrajectoryFilter::pose`] converts. But here an error of yaw
-/// moves the poses after it around an arc instead of along its tangent, so a correction after a
-/// long drift is as good as the graph's, and the Jacobians of Eqs. 2 and 3 are simpler.
+/// The paper's filter keeps the covariance of x, y and yaw of each pose, this filter the covariance
+/// of a small motion of the world that takes the estimated pose to the true one: to first order the
+/// same. An error of yaw moves the poses after it around an arc instead of along its tangent, and
+/// the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
     options: FilterOptions,
@@ -76,11 +72,7 @@ impl TrajectoryFilter {
     }
 
     /// Takes a constraint: an odometry constraint adds a keyframe, a loop is tested and corrects
-    /// all poses.
-    ///
-    /// The result depends a little on the order of loops, as each is linearised at the estimate
-    /// that it finds. A filter cannot take information back: of a group of dependent loops only
-    /// the first counts.
+    /// all poses. Of a group of dependent loops only the first counts.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -111,11 +103,8 @@ impl TrajectoryFilter {
         })
     }
 
-    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2).
-    ///
-    /// The error of the last pose moves the new one along with it: the Jacobian of Eq. 2 is the
-    /// identity. Eq. 2 prints the covariance of the whole state beside it; its columns of the last
-    /// pose are meant.
+    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2). The error of the last
+    /// pose moves the new one along with it: the Jacobian of Eq. 2 is the identity.
     fn augment(&mut self, motion: &UncertainMotion) -> Result<(), EstimationError> {
         let count = self.poses.len();
         self.reserve(count + 1)?;

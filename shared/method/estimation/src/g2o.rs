@@ -1,10 +1,8 @@
 //! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2` and `FIX` of the first vertex.
 //!
-//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, and an edge
-//! carries its information matrix. The error of a [`Constraint`] lies along the axes of `from`, and
-//! it carries a covariance. Both give the same chi-square; reading and writing rotate and invert
-//! the matrix. A file has no groups and no kinds: the first edge from each keyframe to the next one
-//! is read as odometry, all others as independent loops.
+//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an information
+//! matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance. The first edge
+//! from each keyframe to the next one is read as odometry, all others as independent loops.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -49,11 +49,8 @@ impl Default for GraphOptions {
 }
 
 /// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least
-/// squares.
-///
-/// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it
-/// comes, so that the verdict does not depend on earlier loops, and all against each other by the
-/// kernel when the graph is solved.
+/// squares. Each loop is tested against the odometry alone when it comes, and all loops against each
+/// other by the kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     state: State,

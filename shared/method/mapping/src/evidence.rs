@@ -27,13 +27,8 @@ const PRIOR: f64 = 1.0;
 /// Looks from nearby of a cell that is well known.
 const WELL_KNOWN: f64 = 8.0;
 
-/// The evidence of keyframes at their poses about the cells of a map: how often each returned power
-/// of how often it was looked at.
-///
-/// It is independent of the order of drawing keyframes, and of the places where they were drawn
-/// before.
-///
-/// Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
+/// The evidence of keyframes at their poses about the cells of a map, in whatever order they were
+/// drawn. Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
 pub struct Evidence {
     options: MapOptions,
     view: View,

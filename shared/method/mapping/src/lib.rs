@@ -1,22 +1,14 @@
 //! Maps of keyframes: how often each place returned power of how often it was looked at.
 //!
-//! # Method
 //! 1. The points of a keyframe are deskewed and freed of the Doppler shift by its velocity.
-//! 2. A sector of one degree was looked at as far as the farthest return within the beam. A radar
-//!    sees past and over things, so that the nearest return hides nothing; beyond the farthest
-//!    return, open ground and ground hidden by a hill or a truck are indistinguishable.
-//! 3. A look weighs half at 30 m, and less beyond: nearby the beam is narrow.
-//! 4. A return is spread along its arc as its bearing is uncertain, and adds its weight to the
-//!    cells there.
-//! 5. The evidence of a cell is its returns divided by its looks, with one extra look that returned
+//! 2. A sector of one degree was looked at as far as the farthest return within the beam: a radar
+//!    sees past and over things. A look weighs half at 30 m, and less beyond.
+//! 3. A return is spread along its arc as its bearing is uncertain, and adds its weight there.
+//! 4. The evidence of a cell is its returns divided by its looks, with one extra look that returned
 //!    nothing. So what moves fades, and a street is no brighter for being driven often.
 //!
-//! Sums are integers. A corrected pose takes a keyframe out and draws it elsewhere without a trace,
-//! and the map is the same whatever the order.
-//!
-//! # Frames and units
-//! Those of [`gyre_geometry`]. The map frame is the frame of the poses. Rows of pictures run from
-//! the highest y to the lowest, columns from the lowest x to the highest.
+//! Sums are integers, so that the map is the same whatever the order. The map frame is the frame of
+//! the poses. Rows of pictures run from the highest y to the lowest.
 
 mod drawing;
 mod evidence;

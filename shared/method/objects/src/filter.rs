@@ -1,11 +1,8 @@
 //! The filter of a track: interacting multiple models (Blom and Bar-Shalom, "The interacting
 //! multiple model algorithm for systems with Markovian switching coefficients", 1988), each a
-//! Kalman filter of position and velocity that turns at a rate of its own.
-//!
-//! With a known turn rate the motion is linear in position and velocity (Bar-Shalom, Li and
-//! Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, Sec. 11.7.1): no
-//! model is linearised, and a vehicle that stops has no heading to lose. The prediction errors
-//! determine the turn rate, and the covariance contains its uncertainty.
+//! Kalman filter of position and velocity that turns at a rate of its own, in which the motion is
+//! linear (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and
+//! Navigation", 2001, Sec. 11.7.1).
 
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, SMatrix, SVector, Vector2, Vector4};
 

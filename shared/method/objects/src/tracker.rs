@@ -42,10 +42,8 @@ impl ObjectTracker {
     }
 
     /// Takes the points of the next scan, as measured. Returns the objects at its time: those that
-    /// move, and those that did and stand now.
-    ///
-    /// A scan that is not later than the one before, or later by more than 2 s, ends all
-    /// tracks.
+    /// move, and those that did and stand now. A scan that is not later than the one before, or
+    /// later by more than 2 s, ends all tracks.
     pub fn update(
         &mut self,
         scan: &PlacedScan,

@@ -44,11 +44,9 @@ pub enum ClosingError<E> {
     Estimation(#[from] EstimationError),
 }
 
-/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival.
-///
-/// A keyframe is described and queried once its submap is complete, which lies as far ahead as
-/// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
-/// they are read again where a submap is drawn.
+/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival. A
+/// keyframe is described and queried once its submap is complete. Descriptors are kept in memory;
+/// points are read again where a submap is drawn.
 pub struct LoopCloser {
     submap_reach_m: f64,
     describer: Describer,

@@ -114,10 +114,7 @@ impl Record for Keyframe {
 
 impl RecordReader<Keyframe> {
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
-    /// checked: the checksum covers the whole record.
-    ///
-    /// # Panics
-    /// There are no more than `index` keyframes.
+    /// checked: the checksum covers the whole record. Panics beyond the last keyframe.
     pub fn read_without_points(&mut self, index: usize) -> Result<Keyframe, LogError> {
         self.read_start(index, size_of::<Fixed>())
     }

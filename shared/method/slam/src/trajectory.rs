@@ -28,12 +28,9 @@ pub enum EstimatorKind {
 /// m.
 const GROUP_M: f64 = 5.0;
 
-/// Estimates the poses of all keyframes from their motions and loops.
-///
-/// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of
-///   the set of loops, and not of when loops came.
-/// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of
-///   the time. Its result may depend a little on when loops came.
+/// Estimates the poses of all keyframes from their motions and loops. The result of
+/// [`TrajectoryEstimator::solve`] does not depend on when loops came; the result of
+/// [`TrajectoryEstimator::update`], in a fraction of the time, may a little.
 pub struct TrajectoryEstimator {
     kind: EstimatorKind,
     keyframes: Vec<Corrected>,

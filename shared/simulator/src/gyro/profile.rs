@@ -1,8 +1,5 @@
-//! Gyros that can be bought, by the figures of their data sheets.
-//!
-//! "Typical" figures are taken for standard deviations. No data sheet states how a bias changes
-//! with the temperature inside a vehicle: a change of 1 K over 10 minutes is assumed, and the
-//! accuracy of the mounting is assumed where the sheet has no figure.
+//! Gyros that can be bought, by the figures of their data sheets; "typical" ones as standard
+//! deviations. The temperature is assumed to change by 1 K over 10 minutes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -24,11 +24,8 @@ struct Node {
     heading_rad: f64,
 }
 
-/// Laps around a rectangular block, counter-clockwise, with rounded corners that are taken more
-/// slowly.
-///
-/// The world's origin is the block's centre; the path starts in the middle of the side at negative
-/// y, towards positive x.
+/// Laps around a rectangular block, counter-clockwise, slower in the rounded corners. The world's
+/// origin is its centre; the path starts in the middle of the side at negative y, towards positive x.
 #[derive(Clone, Debug)]
 pub struct BlockLoop {
     nodes: Vec<Node>,

@@ -26,11 +26,8 @@ pub struct Excerpt {
     pub rate_hz: f64,
 }
 
-/// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a
-/// path along it, in the frame of the excerpt's first pose.
-///
-/// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
-/// is noise of the poses.
+/// Returns a path along a trajectory of any format, in the frame of the excerpt's first pose. It
+/// passes within 5 cm of 95 % of a real drive's poses, whose noise is the rest.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
     let error = |reason: String| {

@@ -1,9 +1,5 @@
-//! Sparse Cholesky factorisation of a symmetric matrix of 3 x 3 blocks.
-//!
-//! The factor is computed row by row (Davis, Direct Methods for Sparse Linear Systems, Sec. 4.7),
-//! in an order of approximate minimum degree. The graph of a drive is nearly a chain: of 20,000
-//! keyframes with 500 loops a column has two blocks below the diagonal on average, so that larger
-//! dense parts would gain nothing.
+//! Sparse Cholesky factorisation of a symmetric matrix of 3 x 3 blocks, row by row (Davis, Direct
+//! Methods for Sparse Linear Systems, Sec. 4.7), in an order of approximate minimum degree.
 
 use std::collections::TryReserveError;
 

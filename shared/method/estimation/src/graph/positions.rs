@@ -237,9 +237,6 @@ struct Pair {
 
 /// Returns the pose of the poses' frame in the positions' frame that fits best, by weighted least
 /// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
-///
-/// # Panics
-/// A position is of an unknown keyframe.
 pub fn align<'a>(
     poses: &[Pose],
     positions: impl IntoIterator<Item = &'a Position>,
