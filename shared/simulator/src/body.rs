@@ -8,7 +8,6 @@ pub const NO_BODY: u32 = 0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatterer {
-    /// Position, world frame, metres.
     pub position: Point2<f64>,
     pub cross_section_m2: f64,
     /// Direction of the largest reflection, a unit vector, world frame.
@@ -100,7 +99,6 @@ pub struct Body {
 pub struct Moving<'a> {
     /// The content, in its own frame (x ahead), with a number that no other body has.
     pub body: &'a Body,
-    /// The pose of its frame in the world.
     pub pose: Pose,
     /// The velocity of its frame in the world, metres a second.
     pub velocity: Vector2<f64>,

@@ -9,7 +9,6 @@ use crate::body::{Body, Moving, Scatterer, Wall};
 use crate::route::{KERBS_M, Route};
 use crate::stream::Stream;
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "objects.csv";
 /// The first row of the file. Poses and velocities are in the world of `ground_truth.tum`.
 pub(crate) const HEADER: &str =
@@ -67,7 +66,6 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     car
 }
 
-/// The oncoming cars of a drive.
 #[derive(Clone, Debug)]
 pub(crate) struct Cars {
     route: Route,

@@ -111,12 +111,10 @@ impl SimulationConfig {
         self.gnss.validate()
     }
 
-    /// The seed of the radar's errors.
     pub(crate) fn sensor_seed(&self) -> u64 {
         self.sensor.seed.unwrap_or(self.seed)
     }
 
-    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         let sampling = self.sensor.sampling();
         let with_encoder = self.output.format != Some(OutputFormat::Radiate);

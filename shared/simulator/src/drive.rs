@@ -44,7 +44,6 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
-    /// The drive along a recorded trajectory.
     pub fn along_file(file: PathBuf) -> Self {
         Self {
             file: Some(file),

@@ -5,7 +5,6 @@ use std::fmt::Display;
 use gyre_datasets::TrajectoryError;
 use gyre_storage::StorageError;
 
-/// The reason why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
     /// The configuration cannot be simulated, the folder is in use, or an image cannot be encoded.

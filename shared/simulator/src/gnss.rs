@@ -13,9 +13,7 @@ use crate::episodes::Episodes;
 use crate::stream::Stream;
 use crate::{error::SimulatorError, limits::require_within, simulator::Simulator};
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "gnss.csv";
-/// The first row of the file.
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
 /// Standard deviation of each fix along each axis, and of the error that lasts (orbits and
 /// atmosphere), m: a receiver of a car without corrections.
@@ -89,7 +87,6 @@ pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// Two numbers of the standard normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
     Vector2::from_fn(|_, _| rng.sample(StandardNormal))
 }

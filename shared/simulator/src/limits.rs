@@ -2,7 +2,6 @@
 
 use crate::error::SimulatorError;
 
-/// Checks that `value` lies in `min..=max`.
 pub(crate) fn require_within(
     key: &'static str,
     value: f64,

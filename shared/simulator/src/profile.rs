@@ -44,7 +44,6 @@ pub struct Sampling {
     /// Metres to add to a bin's range: bin `b` is at
     /// `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f64,
-    /// Time of one turn, microseconds.
     pub period_us: i64,
     pub encoder_counts: u16,
     /// Count of the first azimuth: real sweeps do not begin at zero.
@@ -96,7 +95,6 @@ impl Receiver {
 }
 
 impl Sampling {
-    /// Radians from one azimuth to the next.
     pub fn step_rad(&self) -> f64 {
         f64::from(self.encoder_step) * TAU / f64::from(self.encoder_counts)
     }

@@ -46,7 +46,6 @@ const ENCODER_JITTER_RAD: f64 = 3.7e-4;
 /// The surroundings of the sensor during a sweep.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
-    /// All that stands still.
     pub world: &'a World,
     /// The moving bodies near the sensor, at the middle of the sweep.
     pub movers: &'a [Moving<'a>],
@@ -102,7 +101,6 @@ impl Sensor {
 
     /// Measures one sweep into `slot` and returns its geometry: rows of [`METADATA_BYTES`], then
     /// powers, as in an Oxford image.
-    ///
     /// All randomness comes from the radar's seed and `index`, the number of the scan.
     pub fn sweep(
         &mut self,

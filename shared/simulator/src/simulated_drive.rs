@@ -29,7 +29,6 @@ pub struct SimulatedDrive {
 }
 
 impl SimulatedDrive {
-    /// Builds the path and what stands along it.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
@@ -55,7 +54,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),
@@ -83,7 +81,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Columns and rows of an image.
     pub fn image_size(&self) -> ImageSize {
         let sampling = self.simulator.sampling();
         let [width, height] = match self.output {
@@ -127,7 +124,6 @@ impl SimulatedDrive {
         self.simulator.wheel_samples()
     }
 
-    /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
         let simulator = &self.simulator;
         let mut files = match self.output {
@@ -169,7 +165,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
         Renderer {
             drive: self.clone(),
@@ -264,7 +259,6 @@ impl ImageSource for Renderer {
         self.drive.stamps()
     }
 
-    /// Gives the same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
         let ahead = self.ahead.as_mut();
         if !ahead.is_some_and(|ahead| ahead.take(&self.drive, index, pixels)) {

@@ -39,7 +39,6 @@ pub struct Simulator {
     cars: Arc<Cars>,
 }
 
-/// A scan with its ground truth.
 #[derive(Clone, Debug)]
 pub struct SimulatedScan {
     /// The scan, in the layout of an Oxford image (its bytes are the image's, metadata included).
@@ -49,7 +48,6 @@ pub struct SimulatedScan {
 }
 
 impl Simulator {
-    /// Builds the path and what stands along it.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let sampling = config.sensor.sampling();
@@ -88,7 +86,6 @@ impl Simulator {
         self.path.as_ref()
     }
 
-    /// All that stands still.
     pub fn world(&self) -> &World {
         &self.world
     }

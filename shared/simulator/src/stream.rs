@@ -14,15 +14,12 @@ impl Stream {
     pub const TUNNEL: Self = Self(1 << 42);
     /// Bias, scale, misalignment and noise of the gyro.
     pub const GYRO_ERRORS: Self = Self(1 << 48);
-    /// Losses of the gyro's clock.
     pub const GYRO_CLOCK: Self = Self(1 << 49);
-    /// Stalls of the gyro's host.
     pub const GYRO_STALLS: Self = Self(1 << 50);
     /// Scale, noise and losses of the wheels.
     pub const WHEEL_ERRORS: Self = Self(1 << 51);
     pub const WHEEL_SLIPS: Self = Self(1 << 52);
     pub const GNSS_ERRORS: Self = Self(1 << 54);
-    /// Holes without a fix.
     pub const GNSS_HOLES: Self = Self(1 << 57);
 
     /// The sensor in one scan, by its number.

@@ -12,9 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::{episodes::Episodes, error::SimulatorError, limits::require_within};
 use crate::{path::Path, simulator::Simulator, stream::Stream};
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "wheels.csv";
-/// The first row of the file.
 const HEADER: &str = "stamp_ns,speed_m_s";
 
 /// Standard deviation of the scale, a share: tyres are a percent off.
@@ -28,7 +26,6 @@ const STEP_MPS: f64 = 0.01 / 3.6;
 const SLIP_EVERY_S: f64 = 4.0;
 const SLIP_S: f64 = 0.5;
 const SLIP_SHARE: f64 = 0.3;
-/// Share of the samples that are lost.
 const LOST: f64 = 0.02;
 
 /// The speed of the wheels of the axle that does not steer, below the radar.

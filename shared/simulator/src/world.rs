@@ -8,7 +8,6 @@ use crate::occlusion::WallGrid;
 /// Metres a side of the tiles that scatterers are sorted into.
 const TILE_M: f64 = 16.0;
 
-/// All that stands still around the sensor.
 #[derive(Clone, Debug)]
 pub struct World {
     /// Tile by tile; within a tile in the given order.
@@ -22,7 +21,6 @@ pub struct World {
 }
 
 impl World {
-    /// Indexes scatterers and walls.
     pub fn new(content: Body) -> Self {
         let Body {
             mut scatterers,

@@ -20,16 +20,13 @@ use crate::simulated_drive::SimulatedDrive;
 pub use removal::remove_dataset;
 pub use resume::MADE_BY;
 
-/// The result of writing a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     pub scans: usize,
-    /// Scans that existed already.
     pub kept: usize,
     /// Length of the path from the first scan to the last, metres (sum of the straight lines
     /// between scans).
     pub path_m: f64,
-    /// Time from the first scan to the last, seconds.
     pub duration_s: f64,
 }
 
@@ -73,7 +70,6 @@ pub fn write_dataset_on(
     Ok(summary(&drive, kept))
 }
 
-/// The error of a folder that holds a foreign file.
 fn in_use(folder: &Path, other: &str) -> SimulatorError {
     SimulatorError::OtherFiles(format!(
         "{} holds `{other}`, which is no file of this dataset: choose an empty folder",

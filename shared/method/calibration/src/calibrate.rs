@@ -11,7 +11,6 @@ use crate::{
     revisits,
 };
 
-/// Solutions of the linearised residuals, at most.
 const ROUNDS: usize = 4;
 /// A round whose change is below this share of the standard deviations is the last.
 const CONVERGED: f64 = 0.5;
@@ -26,13 +25,11 @@ const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
 /// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
 const ROW_TIME_SHARE: f64 = 0.05;
-/// Revisits needed for the drift.
 const MIN_REVISITS: usize = 5;
 /// Facts that are solved for together, as far as the drive determines them. The others only
 /// confirm: odometry needs no correction of them.
 pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
-/// A fact with its change against the configured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
     pub fact: Fact,
@@ -44,21 +41,17 @@ pub struct FactEstimate {
 }
 
 impl FactEstimate {
-    /// Returns whether the drive adds knowledge about the fact.
     pub fn is_useful(&self) -> bool {
         self.change.sigma < self.fact.useful_sigma()
     }
 }
 
-/// The constants of a radar, estimated from a drive.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     /// All facts in their order. The eccentricity to the side and the times of rows are checks,
     /// with the other facts as found.
     pub facts: [FactEstimate; FACTS],
-    /// Places that were seen again.
     pub revisits: Vec<Revisit>,
-    /// Pairs of scans that were compared.
     pub pairs: usize,
     /// The last solution changed the facts by less than their standard deviations. Otherwise they
     /// are not to be trusted.
@@ -68,11 +61,9 @@ pub struct Calibration {
     pub proposed: Vec<Fact>,
     /// Mean overlap of the pairs as configured, and with the facts that the drive determines.
     pub overlap: [f64; 2],
-    /// The mounting, by the corrected track.
     pub mounting: Option<Mounting>,
     /// The track as configured, and the one with the proposed facts.
     pub before: Track,
-    /// See [`Self::before`].
     pub after: Track,
 }
 
@@ -89,7 +80,6 @@ impl Calibration {
     }
 }
 
-/// Finds the facts of a drive.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let before = drive.mean_track()?;
     let path_m = before.path_m().last().copied().unwrap_or_default();
@@ -178,7 +168,6 @@ impl Solution {
     }
 }
 
-/// The solution around one change of the facts.
 struct Round {
     free: Vec<Fact>,
     solved: [Estimate; FACTS],

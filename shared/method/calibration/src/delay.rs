@@ -12,7 +12,6 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
     pub stamp_ns: i64,
-    /// The time between them, ns.
     pub interval_ns: i64,
     /// By the radar, rad or m; `None` where it does not measure it.
     pub radar: Option<f64>,

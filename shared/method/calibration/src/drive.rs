@@ -27,13 +27,10 @@ const MOVING_M: f64 = 0.5;
 
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// Number of the scan in the recording.
     pub number: usize,
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
     /// Time since the scan before, s; 0 where the chain of motions starts.
     pub interval_s: f64,
-    /// The motion that the search found.
     pub searched: Pose,
     /// The points as measured under the configured facts.
     pub points: Vec<SparsePoint>,
@@ -43,12 +40,10 @@ pub struct Sweep {
 pub struct Drive {
     odometry: Odometry,
     config: OdometryConfig,
-    /// The scans in their order.
     pub sweeps: Vec<Sweep>,
     pub(crate) sense: Sign,
     /// Chirps rise and fall by turns, as the scans report.
     pub(crate) alternates: bool,
-    /// The reflections of the vehicle itself in the scans.
     pub(crate) reflections: OwnReflections,
     extractor: PointExtractor,
 }
@@ -58,11 +53,8 @@ pub struct Drive {
 pub struct Track {
     /// The poses in the frame of the first scan.
     pub poses: Vec<Pose>,
-    /// The motion to each scan from the one before.
     pub motions: Vec<UncertainMotion>,
-    /// The velocity at each scan.
     pub twists: Vec<Twist>,
-    /// True if the chain of motions starts with a scan.
     starts: Vec<bool>,
     /// The change of the configured facts.
     pub(crate) change: FactVector,
@@ -255,7 +247,6 @@ impl Track {
         self.motions.iter().map(up_to).collect()
     }
 
-    /// Returns whether the chain of motions restarts between two scans.
     pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
         self.starts[earlier + 1..=later].contains(&true)
     }

@@ -6,7 +6,6 @@ use gyre_scan_matching::ConfigError;
 use gyre_slam::ClosingError;
 use thiserror::Error;
 
-/// Why a drive cannot be used.
 #[derive(Debug, Error)]
 pub enum CalibrationError {
     #[error(
@@ -22,11 +21,7 @@ pub enum CalibrationError {
     #[error(
         "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
     )]
-    Distance {
-        /// The given length, m.
-        distance_m: f64,
-        path_m: f64,
-    },
+    Distance { distance_m: f64, path_m: f64 },
     #[error(transparent)]
     Refinement(#[from] ConfigError),
 }

@@ -52,7 +52,6 @@ impl Fact {
 pub(crate) type Sign = f64;
 
 /// Moves a point as measured to where it is measured once the facts are corrected by `change`.
-///
 /// `chirp` is 1, or where chirps alternate the sign of this point's.
 pub(crate) fn correct(
     point: &SparsePoint,

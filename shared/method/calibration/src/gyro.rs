@@ -53,7 +53,6 @@ impl ClockError {
 }
 
 /// Finds the offset, the axis, the scale and the bias of a gyro by a track of the drive.
-///
 /// Over `max_gap_s` without samples its rate is not interpolated.
 pub fn calibrate_gyro(
     drive: &Drive,

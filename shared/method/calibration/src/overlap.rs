@@ -139,7 +139,6 @@ impl System {
         }
     }
 
-    /// Returns the number of pairs.
     pub fn len(&self) -> usize {
         self.rows.len()
     }

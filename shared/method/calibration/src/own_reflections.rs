@@ -12,7 +12,6 @@ const SECTORS: usize = 90;
 const SHARE: f64 = 0.9;
 const MIN_SCANS: usize = 50;
 
-/// Counts the scans with power in each cell around the vehicle.
 #[derive(Clone, Debug)]
 pub struct OwnReflections {
     counts: Vec<usize>,

@@ -39,7 +39,6 @@ pub(crate) struct PairSlope {
     /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are
     /// right it vanishes.
     pub slope: FactVector,
-    /// The overlap, from 0 to 1.
     pub overlap: f64,
 }
 

@@ -12,7 +12,6 @@ const REACH_M: f64 = 60.0;
 const HEADER: f64 = 56.0;
 /// Scans to each side of the two that are drawn with them.
 const AROUND: usize = 2;
-/// Fainter points are left out.
 const MIN_WEIGHT: f32 = 0.3;
 
 pub fn svg(drive: &Drive, calibration: &Calibration) -> String {

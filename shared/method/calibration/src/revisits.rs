@@ -9,7 +9,6 @@ use gyre_slam::{
 
 use crate::{CalibrationError, Drive, Track};
 
-/// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Revisit {
     pub later: usize,
@@ -28,7 +27,6 @@ impl KeyframeSource for &Keyframes {
     }
 }
 
-/// Finds the revisits of a drive along its track.
 pub fn find(drive: &Drive, track: &Track) -> Result<Vec<Revisit>, CalibrationError> {
     let keyframes = Keyframes(keyframes(drive, track));
     let config = drive.config();

@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use crate::findings::Found;
 
-/// Returns the file's text.
 pub fn toml(found: &Found) -> String {
     let mut text = format!(
         "# Found by gyre calibrate from {} scans, {:.0} m.\n\n[dataset]\n",
@@ -41,7 +40,6 @@ pub fn toml(found: &Found) -> String {
     text
 }
 
-/// Two digits of the standard deviation.
 fn digits(sigma: f64) -> usize {
     (1.0 - sigma.log10().floor()).clamp(1.0, 9.0) as usize
 }

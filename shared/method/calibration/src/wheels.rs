@@ -32,14 +32,12 @@ pub struct WheelCalibration {
     pub delay_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
-    /// Correlation of the distances with the radar's.
     pub correlation: f64,
     /// Number of distances that were compared, of a second each.
     pub distances: usize,
 }
 
 /// Finds the offset and the scale of the wheels by a track of the drive.
-///
 /// Over `max_gap_s` without samples their speed is not interpolated.
 pub fn calibrate_wheels(
     drive: &Drive,

@@ -100,19 +100,15 @@ pub struct Verdict {
     pub outcome: Outcome,
 }
 
-/// The result of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// The constraint is part of the estimate.
     Accepted,
-    /// The constraint contradicts the estimate and is not part of it.
     Rejected,
     /// The constraint agrees with the estimate, and its group has been counted in full: it is not
     /// part of the estimate.
     Redundant,
 }
 
-/// Checks that a keyframe is one of `keyframes`.
 pub(crate) fn keyframe_exists(keyframe: usize, keyframes: usize) -> Result<(), EstimationError> {
     match keyframe < keyframes {
         true => Ok(()),

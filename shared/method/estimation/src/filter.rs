@@ -35,7 +35,6 @@ impl Default for FilterOptions {
 /// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
 /// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number
 /// of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long trajectories.
-///
 /// The paper's filter keeps the covariance of x, y and yaw of each pose, this filter the covariance
 /// of a small motion of the world that takes the estimated pose to the true one: to first order the
 /// same. An error of yaw moves the poses after it around an arc instead of along its tangent, and
@@ -51,7 +50,6 @@ pub struct TrajectoryFilter {
     groups: BTreeSet<u64>,
 }
 
-/// A relative pose as an observation of the state.
 struct Observation {
     ends: [usize; 2],
     predicted: Pose,

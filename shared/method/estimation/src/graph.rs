@@ -28,7 +28,6 @@ pub struct GraphOptions {
     pub gate: f64,
     /// The weight of a loop that disagrees with the other constraints.
     pub kernel: Kernel,
-    /// The largest number of linearisations of one solution.
     pub max_iterations: usize,
     /// A solution is found when a step lowers the cost by less than this share of it.
     pub tolerance: f64,
@@ -58,7 +57,6 @@ pub struct PoseGraph {
     loops: Vec<Closing>,
     groups: BTreeMap<u64, usize>,
     positions: Vec<Measured>,
-    /// The normal equations of the present constraints; `None` after a constraint was added.
     system: Option<System>,
     /// True if the system is factorised, undamped, at the present poses.
     factorised: bool,
@@ -72,22 +70,18 @@ struct State {
     frame: Option<Pose>,
 }
 
-/// A loop that passed the gate.
 struct Closing {
     edge: Edge,
     group: Option<u64>,
     /// Chi-square against the odometry alone.
     gate_chi_square: f64,
-    /// The kernel's weight.
     weight: f64,
 }
 
 /// A loop of a [`PoseGraph`] that passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedLoop {
-    /// The keyframe that the motion is measured from.
     pub from: usize,
-    /// The keyframe whose pose is measured.
     pub to: usize,
     /// Squared normalised difference of the measured motion from the estimate; 3 is expected of a
     /// right loop.
@@ -96,7 +90,6 @@ pub struct WeightedLoop {
     pub weight: f64,
 }
 
-/// The result of solving a pose graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
     /// Half the sum of the squared normalised residuals, with loops after the kernel.
@@ -171,7 +164,6 @@ impl PoseGraph {
         Ok(self.verdict(self.against_odometry(&edge)))
     }
 
-    /// Removes all loops. The poses stay where they are until the next solution.
     pub fn clear_loops(&mut self) {
         self.loops.clear();
         self.groups.clear();
@@ -243,7 +235,6 @@ impl PoseGraph {
         Edge::new(ends, constraint.motion).ok_or(EstimationError::Singular)
     }
 
-    /// Marks the system as out of date.
     fn forget_system(&mut self) {
         self.system = None;
         self.factorised = false;

@@ -8,14 +8,12 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Latitude of the frame's origin, the sensor at the first keyframe, degrees.
     pub latitude_deg: f64,
     pub longitude_deg: f64,
     /// Heading of the frame's x axis, degrees clockwise from true north.
     pub heading_deg: f64,
 }
 
-/// A place that cannot be the origin of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
     "the origin {}, {}, {} is none: latitude from -80 to 84, longitude from -180 to 180 and heading from -360 to 360 degrees are needed",

@@ -16,7 +16,6 @@ use crate::{
     pixels,
 };
 
-/// The version of the folder's form.
 const VERSION: i64 = 1;
 const MANIFEST: &str = "map.toml";
 const TILES: &str = "tiles";
@@ -27,7 +26,6 @@ const MAX_TILE_BYTES: u64 = 1 << 20;
 /// Tiles of a map: 7,000 km of streets.
 const MAX_TILES: usize = 500_000;
 
-/// The content of `map.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
@@ -41,7 +39,6 @@ struct Manifest {
     origin: Option<Origin>,
 }
 
-/// A map that was opened.
 #[derive(Debug)]
 pub struct Map {
     folder: PathBuf,
@@ -133,7 +130,6 @@ fn tile_path(folder: &Path, tile: TileIndex) -> PathBuf {
 }
 
 impl Map {
-    /// Opens the map in `folder`.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let refused = |reason: String| MapError::NotAMap {
             path: folder.to_owned(),
@@ -178,17 +174,14 @@ impl Map {
         version.ok_or_else(|| "map.toml has no version".to_owned())
     }
 
-    /// Returns the options that it was drawn with.
     pub fn options(&self) -> &MapOptions {
         &self.manifest.options
     }
 
-    /// Returns the place of its frame on the earth, if that is known.
     pub fn origin(&self) -> Option<Origin> {
         self.manifest.origin
     }
 
-    /// Returns the number of keyframes it was drawn from.
     pub fn keyframes(&self) -> usize {
         self.manifest.keyframes
     }

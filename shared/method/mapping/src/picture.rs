@@ -37,7 +37,6 @@ pub struct Overlay<'a> {
     pub trajectory: &'a [&'a [Pose]],
     /// The trajectory by odometry alone, drawn thin; empty where it is the same.
     pub odometry: &'a [Pose],
-    /// Both ends of each loop.
     pub loops: &'a [[Point2<f64>; 2]],
 }
 

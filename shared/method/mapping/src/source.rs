@@ -7,7 +7,6 @@ use thiserror::Error;
 
 use crate::{Cell, Evidence, OptionError, TileImage, TileIndex, georeference::OriginError};
 
-/// A map that cannot be drawn, written or read.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error(transparent)]
@@ -31,11 +30,9 @@ pub enum MapError {
     Encode(String),
 }
 
-/// A map, tile by tile.
 pub trait TileSource {
     fn cell_m(&self) -> f64;
 
-    /// The tiles in rising order.
     fn tiles(&self) -> Vec<TileIndex>;
 
     /// Reads a tile; one that does not exist is blank.

@@ -19,7 +19,6 @@ pub const BLOCKS: usize = TILE_CELLS / BLOCK;
 pub const ONE: u32 = 1 << 14;
 
 /// The evidence about the cells of a tile, in units of [`ONE`].
-///
 /// Integers, so that a keyframe is taken out again without a trace, and sums do not depend on their
 /// order.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -30,11 +29,9 @@ pub struct Tile {
     pub looked: [u32; BLOCKS * BLOCKS],
 }
 
-/// A tile that keyframes look at.
 #[derive(Default)]
 struct Entry {
     keyframes: u32,
-    /// When it was last used.
     used: u64,
     /// The tile, while it is in memory.
     tile: Option<Box<Tile>>,
@@ -70,12 +67,10 @@ impl TileStore {
         }
     }
 
-    /// Returns the tiles in rising order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.entries.keys().copied()
     }
 
-    /// Counts one keyframe more that touches the tile.
     pub fn enter(&mut self, index: TileIndex) {
         self.entries.entry(index).or_default().keyframes += 1;
     }

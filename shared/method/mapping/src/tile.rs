@@ -89,7 +89,6 @@ impl Default for TileImage {
 }
 
 impl TileImage {
-    /// Returns the rows, from the highest y down.
     pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Cell]> {
         self.cells.chunks_exact(TILE_CELLS)
     }
@@ -98,14 +97,11 @@ impl TileImage {
 /// The smallest rectangle of tiles around all tiles of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileExtent {
-    /// The tile of lowest x and y.
     pub min: TileIndex,
-    /// The tile of highest x and y.
     pub max: TileIndex,
 }
 
 impl TileExtent {
-    /// Returns the extent of `tiles`; `None` without any.
     pub fn of(tiles: &[TileIndex]) -> Option<Self> {
         let first = *tiles.first()?;
         let around = |extent: Self, tile: &TileIndex| Self {
@@ -125,7 +121,6 @@ impl TileExtent {
         Some(tiles.iter().fold(start, around))
     }
 
-    /// Returns the columns and rows of cells.
     pub fn cells(&self) -> [usize; 2] {
         let count = |min: i32, max: i32| (max.abs_diff(min) as usize + 1) * TILE_CELLS;
         [count(self.min.x, self.max.x), count(self.min.y, self.max.y)]

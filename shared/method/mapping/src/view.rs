@@ -8,7 +8,6 @@ use nalgebra::{Point2, Vector2};
 
 use crate::MapOptions;
 
-/// Sectors of one degree.
 const SECTORS: usize = 360;
 /// Sectors to either side that a return speaks for: a return hides weaker ones at its range within
 /// the beam, so that not every azimuth has points of a wall that all of them see.
@@ -28,17 +27,13 @@ pub struct View {
     own_m: [f64; SECTORS],
 }
 
-/// A part of a return.
 #[derive(Clone, Copy)]
 pub(crate) struct Sample {
-    /// The place in the frame of the keyframe, m.
     pub(crate) place: Point2<f64>,
-    /// The amount that it adds to its place.
     pub(crate) amount: f64,
 }
 
 impl View {
-    /// Starts without a keyframe.
     pub fn new(options: &MapOptions) -> Self {
         Self {
             options: options.clone(),
@@ -48,7 +43,6 @@ impl View {
         }
     }
 
-    /// Looks through the eyes of a keyframe.
     pub fn take(&mut self, keyframe: &Keyframe) {
         self.points.start(&keyframe.points, &keyframe.twist);
         self.own_m.fill(0.0);
@@ -89,7 +83,6 @@ impl View {
         places.filter(|(place, weight)| *weight > 0.0 && place.norm().is_finite())
     }
 
-    /// Calls `take` with the parts of all returns.
     pub(crate) fn returns(&self, mut take: impl FnMut(Sample)) {
         let share = FULL_CELL_M / self.options.cell_m;
         for [x_m, y_m, weight] in self.points.points() {

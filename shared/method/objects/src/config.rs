@@ -58,7 +58,6 @@ impl ObjectsConfig {
         self.kind == ObjectsKind::Tracks
     }
 
-    /// Checks the bounds of all settings.
     pub fn validate(&self) -> Result<(), ObjectsError> {
         let require = |key: &str, value: f64, (low, high), bounds: &str| {
             let refused = || format!("objects.{key} is {value}, but must be {bounds}");

@@ -10,11 +10,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use crate::raster::{Memory, PLANES, SIDE};
 use crate::{ObjectsError, PlacedScan};
 
-/// The network in the program.
 const NETWORK: &str = "gyre:models/objects.onnx";
 /// Cells of the output, a side: each is as large as two by two of the input.
 const OUT: usize = SIDE / 2;
-/// Values of a cell.
 const VALUES: usize = 11;
 /// Side of a cell of the output, m.
 const OUT_M: f64 = 2.0 * crate::raster::CELL_M;
@@ -25,19 +23,16 @@ const SIZE_M: [f64; 2] = [4.5, 1.9];
 /// Distance within which only the most likely detection counts, m.
 const ALONE_M: f64 = 2.5;
 
-/// Finds vehicles that move in the last scans.
 pub(crate) struct Detector {
     network: PlanesNetwork,
     memory: Memory,
 }
 
-/// A vehicle as a scan shows it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Detection {
     /// The centre in the frame of the odometry at the time of its azimuth, with the Doppler shift
     /// of its motion, m.
     pub at: Point2<f64>,
-    /// The velocity, m/s.
     pub velocity: Vector2<f64>,
     pub heading: Vector2<f64>,
     /// Length and width, m.
@@ -162,14 +157,12 @@ impl Detection {
     }
 }
 
-/// The bearing and the time of a point.
 struct Azimuth {
     bearing_rad: f64,
     time_s: f64,
     doppler_s: f64,
 }
 
-/// Returns the bearings and times of points.
 fn azimuths(points: &[SparsePoint], deskewed: &[Point2<f64>]) -> Vec<Azimuth> {
     let both = points.iter().zip(deskewed);
     let azimuths = both.map(|(point, from_sensor)| Azimuth {

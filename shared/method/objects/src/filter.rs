@@ -47,7 +47,6 @@ struct Estimate {
     covariance: Matrix4<f64>,
 }
 
-/// A measured position of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sighting {
     /// The position, m, as if the object stood.
@@ -70,7 +69,6 @@ pub(crate) struct Innovation {
 }
 
 impl Innovation {
-    /// Returns the squared Mahalanobis distance; infinite for a covariance that is singular.
     pub fn chi_square(&self) -> f64 {
         mahalanobis(self.difference, self.covariance)
     }
@@ -117,7 +115,6 @@ impl Filter {
         Point2::new(self.mean.state[0], self.mean.state[1])
     }
 
-    /// Returns the velocity, m/s.
     pub fn velocity(&self) -> Vector2<f64> {
         Vector2::new(self.mean.state[2], self.mean.state[3])
     }
@@ -158,12 +155,10 @@ impl Filter {
         self.combine();
     }
 
-    /// Compares with a measured position.
     pub fn innovation(&self, sighting: &Sighting) -> Innovation {
         self.mean.innovation(sighting)
     }
 
-    /// Updates the state by a measured position.
     pub fn update(&mut self, sighting: &Sighting) {
         let innovations = self.models.map(|model| model.estimate.innovation(sighting));
         for (model, innovation) in self.models.iter_mut().zip(&innovations) {
@@ -314,7 +309,6 @@ fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Esti
     Estimate { state, covariance }
 }
 
-/// Returns the squared Mahalanobis distance; infinite for a covariance that is singular.
 pub(crate) fn mahalanobis<const N: usize>(
     difference: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,

@@ -30,7 +30,6 @@ struct Return {
     weight: f32,
 }
 
-/// A scan that is remembered.
 struct Seen {
     stamp_ns: i64,
     pose: Pose,
@@ -38,7 +37,6 @@ struct Seen {
 }
 
 pub(crate) struct Memory {
-    /// The newest first.
     scans: VecDeque<Seen>,
     /// The planes that were drawn last, kept since fresh memory costs a page fault for each page.
     planes: Vec<f32>,
@@ -80,7 +78,6 @@ impl Memory {
 
     /// Draws the scans around the sensor at the pose of the newest one: planes x SIDE x SIDE, x
     /// ahead in rows, y to the left in columns.
-    ///
     /// A plane of a scan has the largest weight of its returns in each cell; the next one the share
     /// of all scans before these that had a return there, and the last one the range over 64 m.
     pub fn draw(&mut self, pose: &Pose) -> &[f32] {

@@ -91,7 +91,6 @@ impl Track {
         }
     }
 
-    /// Predicts it some seconds later.
     pub fn predict(&mut self, dt_s: f64) {
         if !self.stopped {
             self.filter.predict(dt_s, &self.heading);
@@ -136,13 +135,11 @@ impl Track {
         self.judge_sight();
     }
 
-    /// Notes that a scan does not show it.
     pub fn miss(&mut self) {
         self.score -= MISSED_LOSS;
         self.judge_sight();
     }
 
-    /// Decides whether it is lost.
     fn judge_sight(&mut self) {
         if self.unseen_s > COAST_S || self.score < END_SCORE {
             self.lose();
@@ -155,7 +152,6 @@ impl Track {
         self.stopped = self.filter.velocity().norm() < STOPPING_MPS;
     }
 
-    /// Turns the heading into the direction of the motion.
     fn turn(&mut self) {
         let velocity = self.filter.velocity();
         if velocity.norm() > HEADING_MPS {
@@ -254,7 +250,6 @@ impl Track {
     }
 }
 
-/// Returns the position that a detection reports.
 fn sighting(detection: &Detection) -> Sighting {
     Sighting {
         at: detection.at,

@@ -16,7 +16,6 @@ const LEAST_LIKELY: f64 = 0.1;
 /// elsewhere.
 const MAX_GAP_S: f64 = 2.0;
 
-/// Tracks moving objects from scan to scan.
 pub struct ObjectTracker {
     config: ObjectsConfig,
     detector: Detector,
@@ -61,7 +60,6 @@ impl ObjectTracker {
         Ok(&self.objects)
     }
 
-    /// Predicts all tracks at the scan's time.
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;

@@ -11,9 +11,7 @@ use crate::{Record, exact::ExactMotion};
 /// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
-    /// The number of the found keyframe.
     pub place: usize,
-    /// The correlation coefficient of the descriptors.
     pub similarity: f64,
     /// The pose of the queried keyframe in the frame of the found one, with its covariance; a
     /// covariance of zero if the two were not aligned.
@@ -35,7 +33,6 @@ pub struct LoopCandidate {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
     pub keyframe: usize,
-    /// The candidates that were verified.
     pub candidates: Vec<LoopCandidate>,
 }
 

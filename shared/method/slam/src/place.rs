@@ -13,7 +13,6 @@ pub struct Place {
     pub path_m: f64,
     /// The motion from the keyframe before, as [`Keyframe::motion`](crate::Keyframe::motion).
     pub motion: UncertainMotion,
-    /// The descriptor of the submap around the keyframe.
     pub descriptor: Descriptor,
 }
 

@@ -51,7 +51,6 @@ pub struct TrajectoryEstimator {
     estimator: Estimator,
 }
 
-/// A keyframe with its pose by odometry.
 struct Corrected {
     seq: u64,
     at: Stamped,
@@ -264,13 +263,11 @@ impl TrajectoryEstimator {
         &self.loops
     }
 
-    /// Returns the motions between the keyframes.
     pub fn odometry(&self) -> impl Iterator<Item = Constraint> + '_ {
         let motions = self.keyframes.iter().skip(1).enumerate();
         motions.map(|(last, keyframe)| Constraint::odometry(last, keyframe.motion))
     }
 
-    /// Returns the fixes of GNSS, and what became of them.
     pub fn fixes(&self) -> &Fixes {
         &self.fixes
     }
@@ -295,13 +292,11 @@ impl TrajectoryEstimator {
         }))
     }
 
-    /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
         let keyframes = self.keyframes.iter().map(|it| (it.seq, it.at.odometry));
         Correction::new(keyframes, self.poses())
     }
 
-    /// Starts an estimator with the first keyframe.
     fn start(&self) -> Estimator {
         let start = self.keyframes.first();
         let start = start.map_or(Pose::identity(), |first| first.at.odometry);
@@ -425,7 +420,6 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Notes the kernel's weights of the loops that are used.
     fn weigh(&mut self) {
         let Some(graph) = self.estimator.graph() else {
             return;
@@ -459,7 +453,6 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Takes the new loops into the standing filter.
     fn update_filter(&mut self) -> Result<(), EstimationError> {
         let new = self.loops.iter_mut().filter(|it| !it.is_taken);
         for it in new {

@@ -6,11 +6,9 @@ use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoopVerdict {
-    /// The loop is part of the estimate.
     Used,
     /// It contradicts the odometry between its keyframes; in the filter, the estimate.
     ContradictsOdometry,
-    /// It contradicts most of the other loops.
     ContradictsLoops,
     /// The group has been counted in full (filter alone).
     Redundant,

@@ -11,10 +11,8 @@ const CATCH_UP_NS: i64 = 100_000;
 /// Time between stalls and their duration, s. Samples of a stall are stamped at its end.
 const STALL_EVERY_S: f64 = 2.0;
 const STALL_S: f64 = 0.06;
-/// Share of the samples that are lost.
 const LOST: f64 = 0.02;
 
-/// Stamps samples in their order.
 pub(super) struct Clock<'a> {
     config: &'a SimulatedGyroConfig,
     rng: ChaCha8Rng,

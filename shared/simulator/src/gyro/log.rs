@@ -9,7 +9,6 @@ use super::clock::Clock;
 use super::errors::Errors;
 use crate::simulator::Simulator;
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
 /// The first row of the file, as in the log of RADIATE.
 const HEADER: &str =

@@ -30,7 +30,6 @@ pub enum GyroProfile {
 /// The figures of a gyro; standard deviations unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroFigures {
-    /// Samples a second.
     pub rate_hz: f64,
     /// Angle random walk, rad/√s.
     pub noise_rad_per_sqrt_s: f64,
@@ -48,7 +47,6 @@ pub struct GyroFigures {
 }
 
 impl GyroProfile {
-    /// The figures of this gyro; `None` for no gyro.
     pub fn figures(self) -> Option<GyroFigures> {
         let exact = GyroFigures {
             rate_hz: 100.0,

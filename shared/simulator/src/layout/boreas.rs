@@ -10,7 +10,6 @@ use crate::simulator::Simulator;
 /// Time over which the yaw rate is taken, seconds.
 const RATE_SPAN_S: f64 = 1e-3;
 
-/// The scan's time, microseconds since 1970.
 pub(crate) fn stamp_us(simulator: &Simulator, index: usize) -> i64 {
     simulator
         .time(index)

@@ -20,7 +20,6 @@ const STALL_S: std::ops::Range<f64> = 0.3..1.4;
 /// Time between scans while the host catches up, microseconds.
 const CATCH_UP_US: i64 = 5_000;
 
-/// Checks that readers of this format can handle the radar.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
     if PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
@@ -37,7 +36,6 @@ pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
 /// one or more.
 const LOST: f64 = 0.0015;
 
-/// Returns the azimuths of a scan that the host loses, in order.
 pub(crate) fn lost_azimuths(simulator: &Simulator, index: usize) -> Vec<usize> {
     if index == 0 || !simulator.config().sensor.lost_azimuths {
         return Vec::new();

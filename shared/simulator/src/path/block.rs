@@ -60,7 +60,6 @@ impl BlockLoop {
         }
     }
 
-    /// Length of one lap, metres.
     pub fn lap_m(&self) -> f64 {
         self.lap_m
     }

@@ -3,7 +3,6 @@
 use gyre_geometry::{Pose, Twist};
 use nalgebra::Vector2;
 
-/// A motion of the sensor that is continuous in time.
 pub trait Path: Send + Sync {
     /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s`
     /// seconds after the start; a path of finite duration stands still before and after.

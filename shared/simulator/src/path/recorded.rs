@@ -15,7 +15,6 @@ const FASTEST_MPS: f64 = 90.0;
 /// Maximum time between two poses, seconds.
 const LONGEST_PAUSE_S: f64 = 3600.0;
 
-/// The part of a file that is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excerpt {
     /// Start, seconds after the file's first pose.
@@ -61,7 +60,6 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
     Ok(SplinePath::measured(&moved))
 }
 
-/// Reads a file, or one of the program.
 fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     match gyre_shipped::text(path) {
         Some(text) => parse_trajectory(text, path),
@@ -69,7 +67,6 @@ fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     }
 }
 
-/// Rejects jumps, and pauses of hours.
 fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
     for pair in poses.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);

@@ -33,7 +33,6 @@ impl<const D: usize> UniformSpline<D> {
     /// Fits a curve with knots `step` apart to the samples, with a penalty on its third derivative
     /// (Eilers and Marx, "Flexible smoothing with B-splines and penalties", 1996): a low-pass
     /// filter with the frequency `cutoff`, periods a unit.
-    ///
     /// The samples are in ascending order; without any the curve is zero.
     pub fn fit(samples: &[Sample<D>], step: f64, cutoff: f64) -> Self {
         let (start, end) = match samples {

@@ -3,7 +3,6 @@
 use crate::interpolate::interpolate;
 
 /// Two-way side lobes: dB below the main lobe by the angle in half-power widths.
-///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths
 /// beside isolated strong echoes.
 const SIDE_LOBES: [(f64, f64); 8] = [

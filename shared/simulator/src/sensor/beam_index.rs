@@ -6,7 +6,6 @@ use super::antenna::Antenna;
 use super::echoes::{Echo, NEGLIGIBLE_POWER};
 use super::sweep_poses::{MARGIN, SweepPoses};
 
-/// Echoes sorted by the azimuths whose beams they lie in.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BeamIndex {
     /// The azimuths whose beams each echo lies in.

@@ -77,7 +77,6 @@ impl SensorConfig {
         Ok(())
     }
 
-    /// The transmitter and receiver of the radar.
     pub fn receiver(&self) -> Receiver {
         let kind = self.profile.receiver();
         Receiver {

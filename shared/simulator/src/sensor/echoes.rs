@@ -11,7 +11,6 @@ use crate::world::World;
 
 /// Echoes with less power are neglected.
 pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
-/// Minimum range of scatterers, metres.
 const NEAREST_M: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +32,6 @@ impl Echo {
     }
 }
 
-/// Everything that determines the amplitudes.
 pub(super) struct View<'a> {
     pub sweep_poses: &'a SweepPoses,
     pub line_of_sight: &'a LineOfSight,
@@ -81,7 +79,6 @@ impl View<'_> {
         });
     }
 
-    /// The power that is received from a scatterer at a place.
     fn power(
         &self,
         scatterer: &Scatterer,

@@ -16,7 +16,6 @@ const CLEARANCE_M: f32 = 0.1;
 /// Maximum distance of a moving body's parts from its origin, metres: more than half a car.
 const MOVER_M: f64 = 3.0;
 
-/// A wall along a ray.
 #[derive(Clone, Copy, Debug)]
 struct WallHit {
     range_m: f32,
@@ -33,7 +32,6 @@ pub(super) struct LineOfSight {
 }
 
 impl LineOfSight {
-    /// Casts the rays of a sweep.
     pub fn cast(&mut self, scene: &Scene<'_>, sweep_poses: &SweepPoses, reach_m: f64) {
         self.passed.clear();
         self.starts.clear();

@@ -19,7 +19,6 @@ pub(super) struct AzimuthPose {
     pub heading_rad: f64,
     /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
-    /// Time since the middle of the sweep, seconds.
     pub time_s: f64,
 }
 
@@ -86,7 +85,6 @@ impl SweepPoses {
         self.azimuths
     }
 
-    /// Radians from one azimuth to the next.
     pub fn step_rad(&self) -> f64 {
         self.step_rad
     }

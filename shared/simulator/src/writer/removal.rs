@@ -11,7 +11,6 @@ use crate::error::SimulatorError;
 use crate::simulated_drive::SimulatedDrive;
 
 /// Removes the dataset in `folder` with the configuration that made it.
-///
 /// If the folder holds any other file, nothing is removed.
 pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     let _alone = super::lock(folder)?;
@@ -36,7 +35,6 @@ pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     Ok(())
 }
 
-/// The files of a dataset, relative to its folder.
 fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
     let images = (0..drive.scans())
         .map(|index| Path::new(drive.image_folder()).join(drive.image_name(index)));

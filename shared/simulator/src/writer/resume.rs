@@ -38,7 +38,6 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
     toml::to_string(value).map_err(|error| SimulatorError::key("simulation", error, expected))
 }
 
-/// Returns the scans that `out` lacks.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,

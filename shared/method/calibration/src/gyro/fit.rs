@@ -35,7 +35,6 @@ pub(crate) struct Fit {
 impl Fit {
     /// Fits the turns around a peak; `None` if they do not determine the parameters, or determine a
     /// different offset than the peak's.
-    ///
     /// Speeds have no bias: without one it stays zero.
     pub(crate) fn new(
         turns: &[Turn],

@@ -18,7 +18,6 @@ pub(super) struct Cholesky {
     rows: Lists<usize>,
     /// The blocks below the diagonal, by columns as in `rows`.
     below: Vec<Matrix3<f64>>,
-    /// The blocks on the diagonal, which are lower triangles.
     diagonal: Vec<Matrix3<f64>>,
     /// A row of the matrix, transposed; zero between the steps.
     row: Vec<Matrix3<f64>>,
@@ -112,7 +111,6 @@ impl Cholesky {
         pivot
     }
 
-    /// Solves the factorised equations in place.
     pub fn solve(&self, side: &mut DVector<f64>) {
         let block = |of: usize| side.fixed_rows::<3>(3 * of).into_owned();
         let mut solved: Vec<_> = self.order.iter().map(|&of| block(of)).collect();

@@ -32,7 +32,6 @@ impl Dogleg {
         }
     }
 
-    /// Returns the length of the Gauss-Newton step.
     pub fn full_length(&self) -> f64 {
         self.gauss_newton.norm()
     }

@@ -7,7 +7,6 @@ use crate::relative::Relative;
 
 pub(super) type Ends = [usize; 2];
 
-/// A constraint with the inverse of its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
     pub ends: Ends,
@@ -53,11 +52,9 @@ impl Edge {
 
 /// The contribution of an edge to the normal equations.
 pub(super) struct Linear {
-    /// The diagonal blocks of both poses.
     pub blocks: [Matrix3<f64>; 2],
     /// The block of the rows of the first pose and the columns of the second.
     pub between: Matrix3<f64>,
-    /// The right-hand sides of both poses.
     pub sides: [Vector3<f64>; 2],
     pub chi_square: f64,
 }

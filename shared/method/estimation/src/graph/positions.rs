@@ -45,7 +45,6 @@ pub struct WeightedPosition {
 
 pub(super) struct Measured {
     it: Position,
-    /// The kernel's weight.
     pub(super) weight: f64,
     is_refused: bool,
 }
@@ -138,7 +137,6 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Removes all positions, and the pose of the frame in theirs.
     pub fn clear_positions(&mut self) {
         self.positions.clear();
         self.state.frame = None;

@@ -84,7 +84,6 @@ impl PoseGraph {
         self.solve()
     }
 
-    /// Makes the system of the present constraints.
     pub(super) fn prepare(&mut self) -> Result<&mut System, EstimationError> {
         let system = match self.system.take() {
             Some(system) => system,

@@ -28,7 +28,6 @@ pub struct Descriptor {
 }
 
 /// Computes descriptors.
-///
 /// Planned once; nothing is allocated afterwards.
 pub struct Describer {
     search: RotationSearch,

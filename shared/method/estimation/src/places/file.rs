@@ -21,7 +21,6 @@ const CHECKSUM_BYTES: usize = 4;
 /// The largest file, bytes: a million places.
 const MAX_BYTES: u64 = 6 << 30;
 
-/// A file of places that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum PlaceFileError {
     #[error(transparent)]

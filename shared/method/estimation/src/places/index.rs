@@ -17,7 +17,6 @@ const ANGLES: usize = 4 * HARMONICS;
 /// Angles of a place that are ranked, at most.
 const MAX_ANGLES: usize = 8;
 
-/// A place that looks similar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// The place, counted from 0 in the order of insertion.
@@ -42,13 +41,11 @@ pub struct OrderError {
 /// The data of a place beside its descriptor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PathPoint {
-    /// Number that the caller gave it.
     pub id: u64,
     pub path_m: f64,
 }
 
 /// The descriptors of all places, in the order of the path.
-///
 /// A query allocates nothing.
 pub struct PlaceIndex {
     pub(super) places: Vec<PathPoint>,
@@ -58,7 +55,6 @@ pub struct PlaceIndex {
     query: Query,
 }
 
-/// The working memory of a query.
 struct Query {
     /// Distance in the sieve, and place.
     distances: Vec<(u32, u32)>,
@@ -123,7 +119,6 @@ impl PlaceIndex {
         self.places.is_empty()
     }
 
-    /// Returns the id and the path (m) of a place.
     pub fn place(&self, place: usize) -> Option<(u64, f64)> {
         self.places.get(place).map(|place| (place.id, place.path_m))
     }
@@ -136,7 +131,6 @@ impl PlaceIndex {
         })
     }
 
-    /// Returns the number of places up to `path_m` metres along the path.
     pub fn places_until(&self, path_m: f64) -> usize {
         self.places.partition_point(|place| place.path_m <= path_m)
     }
@@ -249,7 +243,6 @@ impl Query {
         debug_assert!(done.is_ok(), "lengths are those of the plan");
     }
 
-    /// The correlation at a sample of the angle.
     fn at(&self, k: isize) -> f64 {
         f64::from(self.correlation[k.rem_euclid(ANGLES as isize) as usize])
     }
@@ -294,7 +287,6 @@ fn keep_apart(found: &mut Vec<Candidate>, apart: impl Fn(&Candidate, &Candidate)
     found.truncate(kept);
 }
 
-/// Sum of absolute differences.
 #[simd]
 fn distance(a: &[u8], b: &[u8]) -> u32 {
     a.iter()

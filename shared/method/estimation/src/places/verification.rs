@@ -61,7 +61,6 @@ pub struct Verification {
 }
 
 /// Registers the submap of a query with the submaps of candidates.
-///
 /// Planned once; nothing is allocated afterwards.
 pub struct LoopVerifier {
     translation: TranslationSearch,

@@ -14,11 +14,8 @@ const UNKNOWN: u8 = u8::MAX;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     pub cell_m: f64,
-    /// Cells along x.
     pub columns: usize,
-    /// Cells along y.
     pub rows: usize,
-    /// The lowest x and y, m.
     pub corner_m: Vector2<f64>,
     /// The cells by rows, from the corner on: 0 to 100 % occupied, 255 unknown.
     pub values: Vec<u8>,

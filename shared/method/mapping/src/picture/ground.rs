@@ -3,7 +3,6 @@
 use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource, pixels};
 use nalgebra::Vector2;
 
-/// Longest side of a picture, px.
 const MAX_SIDE: usize = 4096;
 /// Least opacity of a seen cell: one look from nearby.
 const SEEN: u8 = 32;
@@ -58,7 +57,6 @@ impl Ground {
         self.cells.len() / self.width
     }
 
-    /// Cuts off columns and rows around the seen part.
     fn cropped(self) -> Self {
         let is_seen = |cell: &Cell| cell.looked >= SEEN;
         let rows = || self.cells.chunks_exact(self.width);

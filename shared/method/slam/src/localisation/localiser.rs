@@ -35,13 +35,10 @@ const GATE: f64 = 16.27;
 const REACH_M: f64 = 15.0;
 const LOST_AFTER_S: f64 = 3.0;
 
-/// A scan, with its motion by odometry.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
     pub points: &'a [SparsePoint],
-    /// The velocity of the sensor.
     pub twist: Twist,
     /// The motion from the scan before, with its covariance along that one's axes.
     pub motion: UncertainMotion,
@@ -50,15 +47,11 @@ pub struct Observation<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     Lost,
-    /// A first fix, without prior.
     Found,
-    /// A fix near the prediction.
     Tracked,
-    /// A prediction by odometry from the last fix.
     Predicted,
 }
 
-/// A measured place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
     /// The pose in the map, with its covariance along the map's axes.
@@ -71,7 +64,6 @@ pub struct Fix {
     pub keyframe: usize,
 }
 
-/// The place of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
     pub status: Status,
@@ -79,7 +71,6 @@ pub struct Localisation {
     pub fix: Option<Fix>,
 }
 
-/// A pose that a search has found.
 #[derive(Clone, Copy)]
 struct Hypothesis {
     pose: Pose,
@@ -93,7 +84,6 @@ struct Track {
     fixed_ns: i64,
 }
 
-/// Localises scans in a map.
 pub struct Localiser {
     map: Map,
     describer: Describer,
@@ -103,7 +93,6 @@ pub struct Localiser {
     hypotheses: Vec<Hypothesis>,
     scan: Submap,
     place: Submap,
-    /// The keyframe whose submap `place` is.
     drawn: Option<usize>,
     track: Option<Track>,
 }
@@ -134,7 +123,6 @@ impl Localiser {
         &self.map
     }
 
-    /// Forgets the last known place.
     pub fn reset(&mut self) {
         self.track = None;
     }

@@ -17,7 +17,6 @@ const KEYFRAMES: &str = Keyframe::FILE;
 /// The file of descriptors of submaps, in its folder.
 const PLACES: &str = "places.index";
 
-/// Keyframes that make no map, or a map that cannot be read or written.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error("a map needs keyframes: there is none")]
@@ -103,7 +102,6 @@ impl Map {
         })
     }
 
-    /// Returns the keyframes, in the order of the path.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
@@ -112,7 +110,6 @@ impl Map {
         self.keyframes[keyframe].pose.motion
     }
 
-    /// Returns the keyframe nearest to a place, and its distance, m.
     pub fn nearest(&self, place: Point2<f64>) -> (usize, f64) {
         let distance_m =
             |keyframe: &Keyframe| (keyframe.pose.motion.translation.vector - place.coords).norm();
@@ -127,7 +124,6 @@ impl Map {
         self.index.rank_all(descriptor, angles)
     }
 
-    /// Makes the submap around a keyframe.
     pub(crate) fn draw(&self, middle: usize, submap: &mut Submap) {
         let keyframe = &self.keyframes[middle];
         submap.start(&keyframe.points, &keyframe.twist);
@@ -139,12 +135,10 @@ impl Map {
         }
     }
 
-    /// Plans a submap with room for any keyframe's submap.
     pub(crate) fn new_submap(&self) -> Submap {
         Submap::with_capacity(self.largest() * (2 * MAX_NEIGHBOURS + 1))
     }
 
-    /// Returns the largest number of points of a keyframe.
     pub(crate) fn largest(&self) -> usize {
         let points = self.keyframes.iter().map(|keyframe| keyframe.points.len());
         points.max().unwrap_or(0)

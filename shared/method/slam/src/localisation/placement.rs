@@ -26,7 +26,6 @@ const STARTS: usize = 100;
 /// Stretches to either side of a fix within which odometry hardly leaves it: 20 m.
 const NEAR_STRETCHES: u64 = 4;
 
-/// A keyframe of a drive that was found in the map.
 #[derive(Clone, Copy, Debug)]
 pub struct FoundKeyframe {
     pub keyframe: usize,
@@ -36,7 +35,6 @@ pub struct FoundKeyframe {
 #[derive(Clone, Debug, Default)]
 pub struct DriveSearch {
     found: Vec<FoundKeyframe>,
-    /// The stretch of the path that each keyframe lies on.
     stretches: Vec<u64>,
 }
 
@@ -47,7 +45,6 @@ pub struct PlacedDrive {
     /// The keyframes whose fixes agree with the others.
     pub agreeing: Vec<FoundKeyframe>,
     stretches: Vec<u64>,
-    /// The stretches with a fix that agrees.
     fixed: BTreeSet<u64>,
 }
 

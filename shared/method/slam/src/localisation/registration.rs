@@ -22,7 +22,6 @@ const VARIANCE_SCALE: f64 = 2.0;
 const PLANNED: &str = "rasters have the shape that the searches are planned for";
 
 /// Registers a scan with submaps.
-///
 /// Planned once; nothing is allocated afterwards.
 pub(crate) struct Registration {
     translation: TranslationSearch,
@@ -34,7 +33,6 @@ pub(crate) struct Registration {
 }
 
 impl Registration {
-    /// Plans registrations of scans of at most `capacity` points.
     pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         let translation = TranslationConfig {
             reach_m: SEARCH_REACH_M,

@@ -20,7 +20,6 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// Plans rasters of `n` x `n` cells.
     pub fn new(n: usize) -> Self {
         let middle = 0.5 * (n as f64 - 1.0);
         let sector_of = |(row, column)| sector(middle - row as f64, middle - column as f64) as u8;
@@ -31,7 +30,6 @@ impl Sight {
         }
     }
 
-    /// Finds the visible region of a scan's sensor.
     pub fn look(&mut self, scan: &Submap) {
         let mut saw = [false; SECTORS];
         for [x_m, y_m, _] in scan.points() {
