@@ -27,7 +27,7 @@ pub enum EstimationError {
     )]
     TooManyKeyframes { limit: usize },
     #[error(
-        "the constraints do not determine the poses: covariances differ by too many orders of magnitude, or poses are beyond the range          of numbers"
+        "the constraints do not determine the poses: covariances differ by too many orders of magnitude, or poses are beyond the range of numbers"
     )]
     Singular,
     #[error("there is not enough memory for the equations of {keyframes} keyframes")]

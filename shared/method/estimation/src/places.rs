@@ -20,12 +20,14 @@ mod descriptor;
 mod file;
 mod index;
 mod keyframes;
+mod registrar;
 mod verification;
 
 pub use descriptor::{Describer, Descriptor};
 pub use file::PlaceFileError;
 pub use index::{Candidate, OrderError, PlaceIndex};
 pub use keyframes::{KeyframeSelector, MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
+pub use registrar::Registrar;
 pub use verification::{LoopVerifier, Verification, VerificationOutcome};
 
 /// Cells per side of a submap's raster, and their size: 102 m to each side.
