@@ -10,8 +10,8 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use crate::episodes::Episodes;
+use crate::simulator::Simulator;
 use crate::stream::Stream;
-use crate::{error::SimulatorError, limits::require_within, simulator::Simulator};
 
 pub(crate) const FILE: &str = "gnss.csv";
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
@@ -38,12 +38,6 @@ pub struct SimulatedGnssConfig {
     pub rate_hz: f64,
     /// True if there is no fix for 15 s in each 40 s.
     pub faults: bool,
-}
-
-impl SimulatedGnssConfig {
-    pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("gnss.rate_hz", self.rate_hz, 0.0, 100.0)
-    }
 }
 
 /// The fixes during a drive, by their stamps. `None` without a receiver.
@@ -109,7 +103,7 @@ mod tests {
                 ..SimulationConfig::default()
             };
             let simulator = Simulator::new(&config).expect("a drive");
-            let fixes = simulator.gnss_fixes().unwrap_or_default();
+            let fixes = super::fixes(&simulator).unwrap_or_default();
             (simulator, fixes)
         };
         let (simulator, fixes) = simulated(false);
@@ -126,6 +120,6 @@ mod tests {
         let holes = simulated(true).1.len();
         assert!((1200..1300).contains(&holes), "{holes}");
         let without = Simulator::new(&SimulationConfig::default()).expect("a drive");
-        assert_eq!(without.gnss_fixes(), None);
+        assert_eq!(super::fixes(&without), None);
     }
 }

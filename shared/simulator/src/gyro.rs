@@ -11,8 +11,6 @@ mod tests;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::SimulatorError;
-use crate::limits::require_within;
 pub use profile::{GyroFigures, GyroProfile};
 
 /// The gyro and its clock. Its axes are forward, left and up.
@@ -25,10 +23,4 @@ pub struct SimulatedGyroConfig {
     pub delay_s: f64,
     /// True if its host stalls for 60 ms in each 2 s and loses 2 % of the samples.
     pub faults: bool,
-}
-
-impl SimulatedGyroConfig {
-    pub(crate) fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("gyro.delay_s", self.delay_s, -1e6, 1e6)
-    }
 }

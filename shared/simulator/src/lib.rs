@@ -13,7 +13,6 @@ pub mod gyro;
 mod image;
 mod interpolate;
 mod layout;
-mod limits;
 pub mod occlusion;
 pub mod output;
 pub mod path;

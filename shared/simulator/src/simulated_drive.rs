@@ -115,13 +115,13 @@ impl SimulatedDrive {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.gyro_samples()
+        log::samples(&self.simulator)
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.wheel_samples()
+        wheels::samples(&self.simulator)
     }
 
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
@@ -143,7 +143,7 @@ impl SimulatedDrive {
         if let Some(samples) = self.wheel_samples() {
             add(wheels::FILE, wheels::csv(&samples));
         }
-        if let Some(fixes) = simulator.gnss_fixes() {
+        if let Some(fixes) = gnss::fixes(simulator) {
             add(gnss::FILE, gnss::csv(&fixes));
         }
         files

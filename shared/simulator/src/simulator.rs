@@ -4,19 +4,17 @@ use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{RawFix, Sample};
 use nalgebra::Point2;
 
 use crate::cars::Cars;
 use crate::config::{MAX_SCANS, Realism, SimulationConfig};
 use crate::error::SimulatorError;
-use crate::gyro::log;
 use crate::path::Path;
 use crate::profile::Sampling;
 use crate::route::Route;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::world::World;
-use crate::{gnss, scenery, tunnel, wheels};
+use crate::{scenery, tunnel};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives
@@ -112,22 +110,6 @@ impl Simulator {
 
     pub(crate) fn cars(&self) -> &Cars {
         &self.cars
-    }
-
-    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
-    /// without a gyro.
-    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(self)
-    }
-
-    /// The samples of the wheels, by their stamps. `None` without wheels that measure.
-    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        wheels::samples(self)
-    }
-
-    /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
-    pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
-        gnss::fixes(self)
     }
 
     pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {

@@ -9,8 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, error::SimulatorError, limits::require_within};
-use crate::{path::Path, simulator::Simulator, stream::Stream};
+use crate::{episodes::Episodes, path::Path, simulator::Simulator, stream::Stream};
 
 pub(crate) const FILE: &str = "wheels.csv";
 const HEADER: &str = "stamp_ns,speed_m_s";
@@ -38,13 +37,6 @@ pub struct SimulatedWheelsConfig {
     pub delay_s: f64,
     /// True if the wheels turn 30 % too fast for 0.5 s in each 4 s and 2 % of the samples are lost.
     pub faults: bool,
-}
-
-impl SimulatedWheelsConfig {
-    pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("wheels.rate_hz", self.rate_hz, 0.0, 1000.0)?;
-        require_within("wheels.delay_s", self.delay_s, -1e6, 1e6)
-    }
 }
 
 /// The samples during a drive, by their stamps: each is the mean over its period, stamped at its
@@ -134,7 +126,7 @@ mod tests {
             ..SimulationConfig::default()
         };
         let simulator = Simulator::new(&config).expect("a drive");
-        let samples = simulator.wheel_samples().unwrap_or_default();
+        let samples = samples(&simulator).unwrap_or_default();
         (simulator, samples)
     }
 

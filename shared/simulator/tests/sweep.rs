@@ -215,7 +215,11 @@ fn a_radar_of_its_own_measures_a_point_where_it_is() {
         range_offset_m: Some(0.0),
         ..SensorConfig::default()
     };
-    sensor.validate().unwrap();
+    let config = SimulationConfig {
+        sensor: sensor.clone(),
+        ..SimulationConfig::default()
+    };
+    config.validate().unwrap();
     let scan = measured(
         point(0.0, -60.25),
         &Twist::default(),

@@ -24,7 +24,7 @@ fn drive(profile: GyroProfile, faults: bool, scans: usize) -> (Simulator, Vec<Sa
         ..SimulationConfig::default()
     };
     let simulator = Simulator::new(&config).unwrap();
-    let samples = simulator.gyro_samples().unwrap();
+    let samples = log::samples(&simulator).unwrap();
     (simulator, samples)
 }
 
