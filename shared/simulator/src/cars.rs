@@ -83,7 +83,7 @@ impl Cars {
             bodies: Vec::new(),
             starts_m: Vec::new(),
         };
-        let end_m = match route.is_closed() {
+        let end_m = match route.closed {
             true => route.length_m() - APART_M.start,
             false => route.length_m() + SPEED_MPS * until_s,
         };

@@ -63,7 +63,7 @@ type Square = (i64, i64);
 fn lanes(route: &Route) -> HashSet<Square> {
     let reach = (CLEAR_M / SQUARE_M).ceil() as i64;
     let mut taken = HashSet::new();
-    for node in route.nodes() {
+    for node in &route.nodes {
         for aside_m in [0.0, KERBS_M[0] - KERBS_M[1]] {
             let place = node * Point2::new(0.0, aside_m);
             let (column, row) = square(place);
@@ -345,7 +345,7 @@ mod tests {
         assert!(built.walls.len() > 100 && built.scatterers.len() > 3000);
         let lane_m = |place: Point2<f64>, aside_m: f64| {
             let places = route
-                .nodes()
+                .nodes
                 .iter()
                 .map(|node| node * Point2::new(0.0, aside_m));
             places
@@ -360,11 +360,11 @@ mod tests {
         }
         let near = |side: f64| {
             let is_near = |at: usize| {
-                let place = route.nodes()[at] * Point2::new(0.0, side * 12.0);
+                let place = route.nodes[at] * Point2::new(0.0, side * 12.0);
                 let apart_m = |other: &Scatterer| (other.position - place).norm();
                 built.scatterers.iter().any(|other| apart_m(other) < 8.0)
             };
-            (0..route.nodes().len()).filter(|at| is_near(*at)).count() as f64 * STEP_M
+            (0..route.nodes.len()).filter(|at| is_near(*at)).count() as f64 * STEP_M
         };
         for side in [-1.0, 1.0] {
             assert!(near(side) > 0.9 * route.length_m(), "{}", near(side));

@@ -34,7 +34,7 @@ pub struct Simulator {
     sampling: Sampling,
     path: Arc<dyn Path>,
     world: Arc<World>,
-    cars: Arc<Cars>,
+    pub(crate) cars: Arc<Cars>,
 }
 
 #[derive(Clone, Debug)]
@@ -106,10 +106,6 @@ impl Simulator {
     pub fn pose(&self, index: usize) -> Pose {
         let time = self.time(index);
         self.path.pose(time.drive_time_s(time.middle_us()))
-    }
-
-    pub(crate) fn cars(&self) -> &Cars {
-        &self.cars
     }
 
     pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {

@@ -30,7 +30,7 @@ pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> Vec<u8> {
     for (scan, &stamp_ns) in stamps_ns.iter().enumerate() {
         let time_s = simulator.drive_time_s(stamp_ns);
         let place = Point2::from(simulator.path().pose(time_s).translation.vector);
-        for car in simulator.cars().near(place, REPORTED_M, time_s) {
+        for car in simulator.cars.near(place, REPORTED_M, time_s) {
             let [visible, power] = best_echo(simulator.world(), &receiver, place, &car);
             let object = car.body.walls[0].body - FIRST_BODY;
             let ([x, y, yaw], [length, width]) = (xy_yaw(&car.pose), HALF_M);

@@ -17,7 +17,7 @@ pub(super) struct BeamIndex {
 
 impl BeamIndex {
     pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, sweep_poses: &SweepPoses) {
-        let (azimuths, step_rad) = (sweep_poses.azimuths(), sweep_poses.step_rad());
+        let (azimuths, step_rad) = (sweep_poses.azimuths, sweep_poses.step_rad);
         let span = |echo: &Echo| {
             let reach =
                 antenna.reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0)) / step_rad;

@@ -35,12 +35,12 @@ impl LineOfSight {
     pub fn cast(&mut self, scene: &Scene<'_>, sweep_poses: &SweepPoses, reach_m: f64) {
         self.passed.clear();
         self.starts.clear();
-        for ray in 0..(sweep_poses.azimuths() + 2 * MARGIN) * RAYS {
+        for ray in 0..(sweep_poses.azimuths + 2 * MARGIN) * RAYS {
             let first = self.passed.len();
             self.starts.push(first);
             let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
             let azimuth_pose = sweep_poses.at(azimuth.floor());
-            let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad();
+            let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad;
             let line = Rotation2::new(-turned) * azimuth_pose.beam * reach_m;
             self.cast_ray(scene, azimuth_pose, line, reach_m);
             self.passed[first..].sort_unstable_by(|a, b| a.range_m.total_cmp(&b.range_m));
@@ -63,11 +63,8 @@ impl LineOfSight {
                 body: wall.body,
             });
         };
-        scene.world.walls_between(
-            azimuth_pose.position,
-            azimuth_pose.position + line,
-            &mut add,
-        );
+        let from = azimuth_pose.position;
+        scene.world.walls.between(from, from + line, &mut add);
         for mover in scene.movers {
             let pose = mover.pose_after(azimuth_pose.time_s);
             let from = pose.inverse_transform_point(&azimuth_pose.position);

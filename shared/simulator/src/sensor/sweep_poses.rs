@@ -26,9 +26,9 @@ pub(super) struct AzimuthPose {
 #[derive(Clone, Debug, Default)]
 pub(super) struct SweepPoses {
     all: Vec<AzimuthPose>,
-    azimuths: usize,
+    pub azimuths: usize,
     first_rad: f64,
-    step_rad: f64,
+    pub step_rad: f64,
 }
 
 impl SweepPoses {
@@ -79,14 +79,6 @@ impl SweepPoses {
 
     pub fn middle(&self) -> &AzimuthPose {
         self.at((self.azimuths / 2) as f64)
-    }
-
-    pub fn azimuths(&self) -> usize {
-        self.azimuths
-    }
-
-    pub fn step_rad(&self) -> f64 {
-        self.step_rad
     }
 
     /// Visits the azimuths, with fractions, where the beam passes an object at

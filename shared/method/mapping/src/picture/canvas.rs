@@ -45,7 +45,7 @@ pub struct Canvas {
     pixmap: Pixmap,
     /// Pixels of a unit: drawn elements have the same share of every picture.
     unit: f32,
-    view: View,
+    pub view: View,
     footer: f32,
 }
 
@@ -104,10 +104,6 @@ impl Canvas {
 
     pub fn width(&self) -> usize {
         self.pixmap.width() as usize
-    }
-
-    pub fn view(&self) -> View {
-        self.view
     }
 
     pub fn rgb(&self) -> Vec<u8> {
