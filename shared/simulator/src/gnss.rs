@@ -71,14 +71,14 @@ pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
 }
 
 /// The fixes as CSV: a reader gets exactly the numbers of the fixes.
-pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
+pub(crate) fn csv(fixes: &[RawFix]) -> String {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {
         let [latitude_deg, longitude_deg] = fix.at;
         let (stamp_ns, sigma_m) = (fix.stamp_ns, fix.sigma_m);
         let _ = writeln!(text, "{stamp_ns},{latitude_deg},{longitude_deg},{sigma_m}");
     }
-    text.into_bytes()
+    text
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {

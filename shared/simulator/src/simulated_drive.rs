@@ -131,21 +131,23 @@ impl SimulatedDrive {
             OutputFormat::Boreas => boreas::side_files(simulator),
             OutputFormat::Radiate => Vec::new(),
         };
-        let mut add = |name: &str, bytes: Vec<u8>| files.push((name.into(), bytes));
-        if let Some(stamps) = self.stamps() {
-            add("Navtech_Polar.txt", stamps.into_bytes());
-        }
-        add("ground_truth.tum", self.ground_truth_tum());
-        add(cars::FILE, truth::objects_csv(simulator, &self.stamps_ns()));
-        if let Some(samples) = self.gyro_samples() {
-            add(log::FILE, log::csv(&samples));
-        }
-        if let Some(samples) = self.wheel_samples() {
-            add(wheels::FILE, wheels::csv(&samples));
-        }
-        if let Some(fixes) = gnss::fixes(simulator) {
-            add(gnss::FILE, gnss::csv(&fixes));
-        }
+        let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
+        files.push(("ground_truth.tum", truth));
+        let objects = truth::objects_csv(simulator, &self.stamps_ns());
+        files.push((cars::FILE, objects));
+        let logs = [
+            ("Navtech_Polar.txt", self.stamps()),
+            (log::FILE, self.gyro_samples().map(|it| log::csv(&it))),
+            (
+                wheels::FILE,
+                self.wheel_samples().map(|it| wheels::csv(&it)),
+            ),
+            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
+        ];
+        files.extend(
+            logs.into_iter()
+                .filter_map(|(name, log)| Some((name, log?))),
+        );
         files
     }
 

@@ -24,7 +24,7 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
 }
 
 /// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.
-pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> Vec<u8> {
+pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> String {
     let mut text = format!("{HEADER}\n");
     let receiver = simulator.config().sensor.receiver();
     for (scan, &stamp_ns) in stamps_ns.iter().enumerate() {
@@ -45,7 +45,7 @@ pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> Vec<u8> {
             );
         }
     }
-    text.into_bytes()
+    text
 }
 
 /// The largest share of the power that passes to a part of a car, and the power of its strongest

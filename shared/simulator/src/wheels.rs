@@ -59,12 +59,12 @@ pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
 }
 
 /// The samples as CSV: a reader gets exactly the numbers of the samples.
-pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
+pub(crate) fn csv(samples: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for sample in samples {
         let _ = writeln!(text, "{},{}", sample.stamp_ns, sample.values[0]);
     }
-    text.into_bytes()
+    text
 }
 
 struct Wheels<'a> {

@@ -38,7 +38,7 @@ pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
 }
 
 /// The samples as CSV: a reader gets exactly the numbers of the samples.
-pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
+pub(crate) fn csv(samples: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for sample in samples {
         let _ = write!(text, "{}", sample.stamp_ns);
@@ -47,5 +47,5 @@ pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
         }
         text.push('\n');
     }
-    text.into_bytes()
+    text
 }

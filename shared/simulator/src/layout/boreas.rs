@@ -21,10 +21,7 @@ pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
 }
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
-    vec![(
-        "applanix/radar_poses.csv".into(),
-        radar_poses_csv(simulator).into_bytes(),
-    )]
+    vec![("applanix/radar_poses.csv", radar_poses_csv(simulator))]
 }
 
 fn radar_poses_csv(simulator: &Simulator) -> String {

@@ -11,14 +11,8 @@ pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
     vec![
-        (
-            "radar.timestamps".into(),
-            timestamps(simulator).into_bytes(),
-        ),
-        (
-            "gt/radar_odometry.csv".into(),
-            radar_odometry_csv(simulator).into_bytes(),
-        ),
+        ("radar.timestamps", timestamps(simulator)),
+        ("gt/radar_odometry.csv", radar_odometry_csv(simulator)),
     ]
 }
 

@@ -39,10 +39,10 @@ fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
     let images = (0..drive.scans())
         .map(|index| Path::new(drive.image_folder()).join(drive.image_name(index)));
     let beside = drive.side_files().into_iter().map(|(name, _)| name);
+    // Earlier builds wrote the poses of all azimuths too.
+    let others = [MADE_BY, DATASET_OPTIONS, "azimuth_poses.npy"];
     images
-        .chain(beside)
-        // Earlier builds wrote the poses of all azimuths too.
-        .chain([MADE_BY, DATASET_OPTIONS, "azimuth_poses.npy"].map(PathBuf::from))
+        .chain(beside.chain(others).map(PathBuf::from))
         .collect()
 }
 
