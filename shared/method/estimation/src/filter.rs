@@ -13,25 +13,6 @@ use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict
 /// third by less than a millimetre.
 const LINEARISATIONS: usize = 3;
 
-#[derive(Debug, Clone, PartialEq)]
-pub struct FilterOptions {
-    /// The largest number of keyframes. The covariance takes 72 bytes times its square, and a loop
-    /// costs time in proportion.
-    pub max_keyframes: usize,
-    /// A loop whose chi-square is larger is rejected.
-    pub gate: f64,
-}
-
-impl Default for FilterOptions {
-    /// Returns 2,000 keyframes (a covariance of 288 MB), and a gate at 99.9 %.
-    fn default() -> Self {
-        Self {
-            max_keyframes: 2000,
-            gate: CHI_SQUARE_99_9,
-        }
-    }
-}
-
 /// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
 /// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number
 /// of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long trajectories.
@@ -41,7 +22,7 @@ impl Default for FilterOptions {
 /// the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
-    options: FilterOptions,
+    max_keyframes: usize,
     poses: Vec<Pose>,
     /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
     /// beyond the poses are reserve.
@@ -59,10 +40,14 @@ struct Observation {
 }
 
 impl TrajectoryFilter {
+    /// The usual number of keyframes, with a covariance of 288 MB: it takes 72 bytes times the
+    /// square of the number, and a loop costs time in proportion.
+    pub const MAX_KEYFRAMES: usize = 2000;
+
     /// Creates a filter with keyframe 0 at `start`, known exactly.
-    pub fn new(start: Pose, options: FilterOptions) -> Self {
+    pub fn new(start: Pose, max_keyframes: usize) -> Self {
         Self {
-            options,
+            max_keyframes,
             poses: vec![start],
             covariance: DMatrix::zeros(3, 3),
             groups: BTreeSet::new(),
@@ -128,7 +113,7 @@ impl TrajectoryFilter {
 
     /// Makes room for the covariance of `count` keyframes, and for more to come.
     fn reserve(&mut self, count: usize) -> Result<(), EstimationError> {
-        let limit = self.options.max_keyframes;
+        let limit = self.max_keyframes;
         if count > limit {
             return Err(EstimationError::TooManyKeyframes { limit });
         }
@@ -155,7 +140,7 @@ impl TrajectoryFilter {
             chi_square,
             outcome,
         };
-        if chi_square.is_nan() || chi_square > self.options.gate {
+        if chi_square.is_nan() || chi_square > CHI_SQUARE_99_9 {
             return verdict(Outcome::Rejected);
         }
         if group.is_some_and(|group| !self.groups.insert(group)) {

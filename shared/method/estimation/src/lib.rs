@@ -19,7 +19,7 @@ mod relative;
 
 pub use constraint::{CHI_SQUARE_99_9, CHI_SQUARE_99_9_PLANE, Constraint, Kind, Outcome, Verdict};
 pub use error::EstimationError;
-pub use filter::{FilterOptions, TrajectoryFilter};
+pub use filter::TrajectoryFilter;
 pub use g2o::{G2o, G2oError};
 pub use graph::{
     GraphOptions, PoseGraph, Position, Solution, WeightedLoop, WeightedPosition, align,

@@ -3,9 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::common::{Batch, Drive, LOOP, ODOMETRY, apart, dead_reckoning, exact};
-use gyre_estimation::{
-    Constraint, EstimationError, FilterOptions, Kind, Outcome, TrajectoryFilter,
-};
+use gyre_estimation::{Constraint, EstimationError, Kind, Outcome, TrajectoryFilter};
 use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,7 +16,7 @@ fn along(x_m: f64, x: f64) -> UncertainMotion {
 }
 
 fn straight(motions: usize) -> TrajectoryFilter {
-    let mut filter = TrajectoryFilter::new(Pose::identity(), FilterOptions::default());
+    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
     for k in 0..motions {
         filter
             .apply(&Constraint::odometry(k, along(1.0, 1.0)))
@@ -49,7 +47,7 @@ fn a_loop_is_shared_among_the_poses_before_it_by_their_covariance() {
 
 #[test]
 fn an_uncertain_turn_makes_a_later_pose_uncertain_sideways() {
-    let mut filter = TrajectoryFilter::new(Pose::identity(), FilterOptions::default());
+    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
     let turn = UncertainMotion {
         motion: pose(0.0, 0.0, FRAC_PI_2),
         covariance: Matrix3::from_diagonal(&Vector3::new(1e-12, 1e-12, 1e-4)),
@@ -138,11 +136,7 @@ fn the_covariance_stays_symmetric_and_positive_through_many_loops() {
 
 #[test]
 fn a_full_filter_refuses_the_next_keyframe_and_says_what_to_do() {
-    let options = FilterOptions {
-        max_keyframes: 3,
-        ..FilterOptions::default()
-    };
-    let mut filter = TrajectoryFilter::new(Pose::identity(), options);
+    let mut filter = TrajectoryFilter::new(Pose::identity(), 3);
     for k in 0..2 {
         filter
             .apply(&Constraint::odometry(k, along(1.0, 1.0)))

@@ -1,8 +1,8 @@
 //! The poses of keyframes, estimated from odometry and loops.
 
 use gyre_estimation::{
-    Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome, PoseGraph,
-    TrajectoryFilter, Verdict, WeightedPosition,
+    Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter, Verdict,
+    WeightedPosition,
 };
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Matrix3;
@@ -71,7 +71,8 @@ impl Estimator {
                 Self::Graph(Box::new(PoseGraph::new(start, GraphOptions::default())))
             }
             EstimatorKind::Filter => {
-                Self::Filter(TrajectoryFilter::new(start, FilterOptions::default()))
+                let limit = TrajectoryFilter::MAX_KEYFRAMES;
+                Self::Filter(TrajectoryFilter::new(start, limit))
             }
         }
     }
