@@ -11,7 +11,7 @@ use gyre_storage::StorageError;
 use nalgebra::Point2;
 
 use crate::{
-    MapOptions, OptionError,
+    MapError, MapOptions, OptionError, TileSource,
     store::{BLOCK, BLOCKS, ONE, TileStore},
     tile::{Cell, TILE_CELLS, TileImage, TileIndex},
     view::View,
@@ -77,11 +77,6 @@ impl Evidence {
 
     pub fn keyframes(&self) -> usize {
         self.drawn.len()
-    }
-
-    /// Returns the tiles that some keyframe touches, in rising order.
-    pub fn tiles(&self) -> Vec<TileIndex> {
-        self.store.tiles().collect()
     }
 
     /// Returns the tiles that have changed since the last call, also those that are no more, in
@@ -153,13 +148,13 @@ impl Evidence {
             self.returned.entry(*tile).or_default().clear();
         }
         let (per_m, returned) = (1.0 / self.options.cell_m, &mut self.returned);
-        self.view.returns(|sample| {
-            let place = pose * sample.place * per_m;
+        self.view.returns(|place, amount| {
+            let place = pose * place * per_m;
             let corner = place.map(|at| (at - 0.5).floor());
             let over = place.map(|at| at - 0.5) - corner;
             for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                 let share = |far: i32, over: f64| if far == 1 { over } else { 1.0 - over };
-                let amount = sample.amount * share(x, over.x) * share(y, over.y);
+                let amount = amount * share(x, over.x) * share(y, over.y);
                 let (tile, cell) = locate(
                     corner.x as i64 + i64::from(x),
                     corner.y as i64 + i64::from(y),
@@ -171,11 +166,22 @@ impl Evidence {
             }
         });
     }
+}
 
-    /// Makes the image of a tile, and returns whether some keyframe touches it.
-    pub fn image(&mut self, index: TileIndex, image: &mut TileImage) -> Result<bool, StorageError> {
+impl TileSource for Evidence {
+    fn cell_m(&self) -> f64 {
+        self.options.cell_m
+    }
+
+    /// The tiles that some keyframe touches.
+    fn tiles(&self) -> Vec<TileIndex> {
+        self.store.tiles().collect()
+    }
+
+    fn read(&mut self, index: TileIndex, image: &mut TileImage) -> Result<(), MapError> {
         let Some(tile) = self.store.get(index)? else {
-            return Ok(false);
+            image.cells.fill(Cell::default());
+            return Ok(());
         };
         for (row, cells) in image.cells.chunks_exact_mut(TILE_CELLS).rev().enumerate() {
             for (column, cell) in cells.iter_mut().enumerate() {
@@ -183,7 +189,7 @@ impl Evidence {
                 *cell = quantise(tile.returned[row * TILE_CELLS + column], looked);
             }
         }
-        Ok(true)
+        Ok(())
     }
 }
 

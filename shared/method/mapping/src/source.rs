@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use gyre_storage::StorageError;
 use thiserror::Error;
 
-use crate::{Cell, Evidence, OptionError, TileImage, TileIndex, georeference::OriginError};
+use crate::{OptionError, TileImage, TileIndex, georeference::OriginError};
 
 #[derive(Debug, Error)]
 pub enum MapError {
@@ -37,21 +37,4 @@ pub trait TileSource {
 
     /// Reads a tile; one that does not exist is blank.
     fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError>;
-}
-
-impl TileSource for Evidence {
-    fn cell_m(&self) -> f64 {
-        self.options().cell_m
-    }
-
-    fn tiles(&self) -> Vec<TileIndex> {
-        Evidence::tiles(self)
-    }
-
-    fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError> {
-        if !self.image(tile, image)? {
-            image.cells.fill(Cell::default());
-        }
-        Ok(())
-    }
 }
