@@ -142,14 +142,18 @@ impl Map {
         }
         let text = storage::read_text(&path, storage::SETTINGS)
             .map_err(StorageError::at("read", &path))?;
-        let version = Self::version(&text).map_err(&refused)?;
+        let unreadable = |error: toml::de::Error| refused(format!("map.toml: {}", error.message()));
+        let table: toml::Table = toml::from_str(&text).map_err(unreadable)?;
+        // Other versions of this program write the version in the same form.
+        let Some(version) = table.get("version").and_then(toml::Value::as_integer) else {
+            return Err(refused("map.toml has no version".to_owned()));
+        };
         if version != VERSION {
             return Err(refused(format!(
                 "its version is {version}, and this program reads version {VERSION}: use the gyre that drew it, or draw it again with gyre map"
             )));
         }
-        let manifest: Manifest = toml::from_str(&text)
-            .map_err(|error| refused(format!("map.toml: {}", error.message())))?;
+        let manifest: Manifest = toml::Value::Table(table).try_into().map_err(unreadable)?;
         manifest.options.validate()?;
         if manifest.tile_cells != TILE_CELLS || manifest.tiles.len() > MAX_TILES {
             return Err(refused(format!(
@@ -164,14 +168,6 @@ impl Map {
             tiles: tiles.collect(),
             manifest,
         })
-    }
-
-    /// The version, which other versions of this program write in the same form.
-    fn version(text: &str) -> Result<i64, String> {
-        let table: toml::Table =
-            toml::from_str(text).map_err(|error| format!("map.toml: {}", error.message()))?;
-        let version = table.get("version").and_then(toml::Value::as_integer);
-        version.ok_or_else(|| "map.toml has no version".to_owned())
     }
 
     pub fn options(&self) -> &MapOptions {
