@@ -195,9 +195,8 @@ impl Fixes {
         new.try_for_each(|(_, position)| graph.measure(*position))
     }
 
-    /// Compares the clock of the fixes with the radar's, by their speeds. Returns whether they can
-    /// be used.
-    pub(crate) fn compare_clocks(&mut self, keyframes: &[Stamped]) -> bool {
+    /// Compares the clock of the fixes with the radar's, by their speeds.
+    pub(crate) fn compare_clocks(&mut self, keyframes: &[Stamped]) {
         self.clock = self.offset(keyframes);
         let wrong = self.clock.filter(|clock| self.is_wrong(clock, keyframes));
         self.refusal = match wrong {
@@ -205,7 +204,6 @@ impl Fixes {
             Some(clock) => Some(FixRefusal::Clock(clock)),
             None => None,
         };
-        self.refusal.is_none()
     }
 
     pub(crate) fn check(&mut self, graph: &PoseGraph) {
