@@ -30,6 +30,7 @@ struct Node {
 pub struct BlockLoop {
     nodes: Vec<Node>,
     lap_s: f64,
+    lap_m: f64,
 }
 
 impl BlockLoop {
@@ -52,7 +53,15 @@ impl BlockLoop {
         let speeds = speeds(&headings, step, speed_mps, lateral_acceleration_mps2);
         let nodes = integrate(&headings, &speeds, step, -width_m / 2.0);
         let lap_s = nodes[count].time_s;
-        Self { nodes, lap_s }
+        Self {
+            nodes,
+            lap_s,
+            lap_m,
+        }
+    }
+
+    pub fn lap_m(&self) -> f64 {
+        self.lap_m
     }
 }
 
