@@ -85,7 +85,9 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let path_m = before.path_m().last().copied().unwrap_or_default();
     if path_m < 100.0 {
         let scans = drive.sweeps.len();
-        return Err(CalibrationError::TooShort { scans, path_m });
+        return Err(CalibrationError::Unusable(format!(
+            "{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more, so give a longer recording or a larger --scans"
+        )));
     }
     let revisits = evenly(revisits::find(drive, &before)?, &before);
     let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
@@ -207,10 +209,14 @@ fn round(
     free: &[Fact],
 ) -> Result<Round, CalibrationError> {
     let system = System::measure(drive, track, &pairs(track, revisits));
+    let undetermined = || {
+        let reason = "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones";
+        CalibrationError::Unusable(reason.to_owned())
+    };
     let unknown = [Estimate::UNKNOWN; FACTS];
     Ok(Round {
         free: free.to_vec(),
-        solved: system.solve(free).ok_or(CalibrationError::Undetermined)?,
+        solved: system.solve(free).ok_or_else(undetermined)?,
         checked: system.solve(&Fact::ALL).unwrap_or(unknown),
         pairs: system.len(),
     })

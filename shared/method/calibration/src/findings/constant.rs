@@ -120,7 +120,9 @@ pub(super) fn resolution(
     };
     let ratio = distance_m / path_m;
     if !PLAUSIBLE_RATIO.contains(&ratio) {
-        return Err(CalibrationError::Distance { distance_m, path_m });
+        return Err(CalibrationError::Unusable(format!(
+            "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
+        )));
     }
     let value = resolution_m * ratio;
     Ok(Ok(Constant {

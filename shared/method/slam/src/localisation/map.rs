@@ -27,16 +27,8 @@ pub enum MapError {
     Keyframes(#[from] LogError),
     #[error(transparent)]
     Places(#[from] PlaceFileError),
-    #[error(
-        "{KEYFRAMES} has {keyframes} keyframes{end}, and {PLACES} {places}: draw the map again with gyre map",
-        end = if *.is_complete { "" } else { " and no end" }
-    )]
-    Unlike {
-        keyframes: usize,
-        /// The file of keyframes was written to its end.
-        is_complete: bool,
-        places: usize,
-    },
+    #[error("{0}")]
+    Unlike(String),
 }
 
 /// Keyframes with their poses in the map's frame, and what their submaps look like.
@@ -82,11 +74,12 @@ impl Map {
         let index = PlaceIndex::load(&folder.join(PLACES))?;
         let (is_complete, keyframes) = (reader.has_ended(), keyframes?);
         if !is_complete || index.len() != keyframes.len() {
-            return Err(MapError::Unlike {
-                keyframes: keyframes.len(),
-                is_complete,
-                places: index.len(),
-            });
+            let end = if is_complete { "" } else { " and no end" };
+            return Err(MapError::Unlike(format!(
+                "{KEYFRAMES} has {} keyframes{end}, and {PLACES} {}: draw the map again with gyre map",
+                keyframes.len(),
+                index.len()
+            )));
         }
         Self::with_index(keyframes, index)
     }
