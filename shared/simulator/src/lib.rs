@@ -41,7 +41,7 @@ pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
-pub use simulator::{SimulatedScan, Simulator};
+pub use simulator::Simulator;
 pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

@@ -80,7 +80,7 @@ impl Sensor {
         let (cells, spacing) = spectrum.noise_cells();
         let power = |cell: usize| {
             let range_m = sampling.range_m(cell as f64 * spacing).max(0.0);
-            let floor_db = interpolate(receiver.floor_db, range_m).unwrap_or_default();
+            let floor_db = interpolate(receiver.floor_db, range_m);
             10f32.powf((floor_db + config.noise_db) as f32 / 10.0)
         };
         Self {

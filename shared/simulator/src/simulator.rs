@@ -37,14 +37,6 @@ pub struct Simulator {
     pub(crate) cars: Arc<Cars>,
 }
 
-#[derive(Clone, Debug)]
-pub struct SimulatedScan {
-    /// The scan, in the layout of an Oxford image (its bytes are the image's, metadata included).
-    pub scan: OwnedScan,
-    /// Pose of the sensor in the world at the middle of the sweep (the scan's stamp).
-    pub pose: Pose,
-}
-
 impl Simulator {
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
@@ -132,13 +124,11 @@ impl Simulator {
     }
 
     /// Renders scan `index`: the same bytes whenever and on whatever thread it is called.
-    pub fn render_scan(&self, index: usize) -> SimulatedScan {
+    /// It has the layout of an Oxford image, whose bytes are the image's, metadata included.
+    pub fn render_scan(&self, index: usize) -> OwnedScan {
         let mut scan = OwnedScan::with_limits(self.limits());
         scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
-        SimulatedScan {
-            scan,
-            pose: self.pose(index),
-        }
+        scan
     }
 
     /// Renders scan `index` into existing memory, of at least the size of [`Simulator::limits`].

@@ -61,7 +61,7 @@ fn a_blind_radar_receives_noise_alone_and_a_tunnel_hides_the_town() {
         change(&mut config);
         let simulator = Simulator::new(&config).unwrap();
         [4, 12].map(|index| {
-            let scan = simulator.render_scan(index).scan;
+            let scan = simulator.render_scan(index);
             let far = (0..400).flat_map(|azimuth| scan.view().row(azimuth)[600..].to_vec());
             far.filter(|power| *power > 60).count()
         })
@@ -89,7 +89,7 @@ fn another_seed_gives_other_streets_and_another_one_of_the_radar_the_same() {
         simulator(2, None),
         simulator(1, Some(9)),
     );
-    let scan = |simulator: &Simulator| simulator.render_scan(0).scan.bytes;
+    let scan = |simulator: &Simulator| simulator.render_scan(0).bytes;
     assert_ne!(scan(&usual), scan(&other));
     assert_ne!(scan(&usual), scan(&again));
     assert_ne!(usual.world().scatterers(), other.world().scatterers());

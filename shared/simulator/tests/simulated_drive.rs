@@ -68,7 +68,7 @@ fn each_format_is_detected_and_read_back_as_it_was_rendered() {
         for index in 0..3 {
             let (read, rendered) = (
                 read(dataset.as_mut(), index),
-                drive.simulator().render_scan(index).scan,
+                drive.simulator().render_scan(index),
             );
             assert_same_measurement(&drive, &read, &rendered);
             if format == OutputFormat::Oxford {

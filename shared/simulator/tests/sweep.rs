@@ -232,7 +232,7 @@ fn a_radar_of_its_own_measures_a_point_where_it_is() {
 #[test]
 fn powers_are_distributed_as_in_a_street() {
     let simulator = Simulator::new(&SimulationConfig::default()).unwrap();
-    let scans = [0, 20, 40].map(|index| simulator.render_scan(index).scan);
+    let scans = [0, 20, 40].map(|index| simulator.render_scan(index));
     let rows = scans
         .iter()
         .flat_map(|scan| (0..AZIMUTHS).flat_map(|row| scan.view().row(row)));
