@@ -1,9 +1,6 @@
 //! The evidence of keyframes, tile by tile.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
-};
+use std::{collections::BTreeMap, path::Path};
 
 use gyre_geometry::Pose;
 use gyre_slam::Keyframe;
@@ -34,7 +31,6 @@ pub struct Evidence {
     view: View,
     store: TileStore,
     drawn: BTreeMap<u64, Pose>,
-    changed: BTreeSet<TileIndex>,
     /// The contribution of a keyframe to a tile: the cell and the amount.
     returned: BTreeMap<TileIndex, Vec<(u32, u32)>>,
 }
@@ -66,7 +62,6 @@ impl Evidence {
             options: options.clone(),
             store: TileStore::new(folder, IN_MEMORY),
             drawn: BTreeMap::new(),
-            changed: BTreeSet::new(),
             returned: BTreeMap::new(),
         })
     }
@@ -77,12 +72,6 @@ impl Evidence {
 
     pub fn keyframes(&self) -> usize {
         self.drawn.len()
-    }
-
-    /// Returns the tiles that have changed since the last call, also those that are no more, in
-    /// rising order.
-    pub fn take_changed(&mut self) -> BTreeSet<TileIndex> {
-        std::mem::take(&mut self.changed)
     }
 
     /// Returns whether a keyframe at `pose` (in the map frame) should be drawn: it is not drawn
@@ -137,7 +126,6 @@ impl Evidence {
                 self.store.leave(index);
             }
         }
-        self.changed.extend(tiles);
         Ok(())
     }
 
