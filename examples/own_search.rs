@@ -76,7 +76,7 @@ pub(crate) fn drive(simulator: &Simulator) -> Result<Vec<Registered>, Box<dyn Er
         ..Parts::new(&config)?
     };
     let mut odometry = Odometry::with_parts(&config, parts);
-    let scans = (0..simulator.scans()).map(|index| simulator.render_scan(index).scan);
+    let scans = (0..simulator.scans()).map(|index| simulator.render_scan(index));
     scans
         .map(|scan| Ok(odometry.register(&scan.view(), &[])?))
         .collect()

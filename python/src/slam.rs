@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use gyre_estimation::EstimationError;
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_slam::{
-    ClosingError, JudgedLoop, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions,
-    ScanPose, TrajectoryEstimator, TrajectoryOptions,
+    ClosingError, JudgedLoop, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser,
+    SUBMAP_REACH_M, ScanPose, TrajectoryEstimator,
 };
 use pyo3::prelude::*;
 use thiserror::Error;
@@ -168,18 +168,11 @@ impl Slam {
             ));
         }
         let capacity = config.odometry.points.capacity;
-        let closer = LoopCloser::new(
-            LoopOptions::default(),
-            &config.odometry.refinement,
-            capacity,
-        );
+        let closer = LoopCloser::new(SUBMAP_REACH_M, &config.odometry.refinement, capacity);
         let state = State {
             builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,
-            estimator: TrajectoryEstimator::new(TrajectoryOptions {
-                kind,
-                ..TrajectoryOptions::default()
-            }),
+            estimator: TrajectoryEstimator::new(kind),
             keyframes: Keyframes(Vec::new()),
             odometry: gyre_radar::Trajectory::default(),
             is_finished: false,

@@ -164,28 +164,6 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: a drive with loops in several runs"]
-fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
-    [LOOP_CLOSURE, TRAJECTORY]
-        .into_iter()
-        .for_each(assert_restarted_when_it_hangs);
-}
-
-fn assert_restarted_when_it_hangs(follower: &str) {
-    let run = run().rate(MODERATE).set("run.stall_timeout_s=3");
-    let mut running = run.start();
-    send(running.await_stage(follower), Signal::STOP);
-    let ended = running.finish();
-    ended.succeeded();
-    // While the stream continues, the heartbeat reveals the fault, and afterwards the progress.
-    let sentences = ["hangs", "has made no progress"];
-    let said = sentences.map(|it| ended.stderr.contains(&format!("{follower} {it}")));
-    assert!(said.contains(&true), "{}", ended.stderr);
-    assert_undisturbed(&run, follower);
-    assert!(restarts(&run, follower) > 0);
-}
-
-#[test]
 fn loops_and_corrections_can_be_watched() {
     let run = run().rate(MODERATE);
     let mut running = run.start();

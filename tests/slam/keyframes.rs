@@ -56,16 +56,6 @@ fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: a drive with loops in several runs"]
-fn keyframes_are_the_same_whatever_the_window_and_without_room_for_observers() {
-    for sentence in ["run.window=1", "run.observers=0"] {
-        let run = run().set(sentence);
-        run.complete();
-        require_undisturbed(&run, sentence);
-    }
-}
-
-#[test]
 fn a_run_without_refinement_logs_keyframes_too() {
     let run = run().set("refinement.kind=none");
     run.complete();

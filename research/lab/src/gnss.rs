@@ -10,7 +10,7 @@ use gyre_estimation::{Position, align};
 use gyre_geometry::Pose;
 use gyre_radar::median;
 use gyre_samples::{GnssConfig, GnssFix};
-use gyre_slam::{Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
+use gyre_slam::{EstimatorKind, Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_terminal::Failure;
 use nalgebra::{Point2, Vector2};
 use serde_json::{Value, json};
@@ -136,8 +136,7 @@ impl Drive {
         config: &GnssConfig,
     ) -> Result<TrajectoryEstimator, Failure> {
         let fixes = Fixes::new(fixes.to_vec(), config);
-        let mut estimator =
-            TrajectoryEstimator::new(TrajectoryOptions::default()).with_fixes(fixes);
+        let mut estimator = TrajectoryEstimator::new(EstimatorKind::Graph).with_fixes(fixes);
         for keyframe in &self.keyframes {
             estimator.push(keyframe)?;
         }

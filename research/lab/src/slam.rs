@@ -8,9 +8,7 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
 use gyre_estimation::Constraint;
-use gyre_slam::{
-    EstimatorKind, LoopCloser, LoopOptions, Query, TrajectoryEstimator, TrajectoryOptions,
-};
+use gyre_slam::{EstimatorKind, LoopCloser, Query, SUBMAP_REACH_M, TrajectoryEstimator};
 use gyre_terminal::Failure;
 
 use crate::{
@@ -47,12 +45,9 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
     let start = Instant::now();
     let queries = queries(&drive)?;
     let closing = start.elapsed();
-    let trajectory = TrajectoryOptions {
-        kind: match arguments.filter {
-            true => EstimatorKind::Filter,
-            false => EstimatorKind::Graph,
-        },
-        ..TrajectoryOptions::default()
+    let kind = match arguments.filter {
+        true => EstimatorKind::Filter,
+        false => EstimatorKind::Graph,
     };
     let mut rows = vec![Figures::before(&drive)?.row("odometry")];
     let count = arguments.wrong_loops;
@@ -63,7 +58,7 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
     ];
     for (name, wrong) in injected {
         let start = Instant::now();
-        let mut estimator = estimate(&drive, &queries, &wrong, &trajectory)?;
+        let mut estimator = estimate(&drive, &queries, &wrong, kind)?;
         let solved = start.elapsed();
         rows.push(Figures::after(&drive, &mut estimator, solved)?.row(name));
         if count == 0 {
@@ -80,7 +75,7 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
 
 /// Closes all loops.
 fn queries(drive: &Drive) -> Result<Vec<Query>, Failure> {
-    let mut closer = LoopCloser::new(LoopOptions::default(), &drive.refinement, drive.capacity)?;
+    let mut closer = LoopCloser::new(SUBMAP_REACH_M, &drive.refinement, drive.capacity)?;
     let (mut source, mut queries) = (drive, Vec::new());
     for keyframe in &drive.keyframes {
         closer.push(keyframe)?;
@@ -98,9 +93,9 @@ fn estimate(
     drive: &Drive,
     queries: &[Query],
     wrong: &[Constraint],
-    options: &TrajectoryOptions,
+    kind: EstimatorKind,
 ) -> Result<TrajectoryEstimator, Failure> {
-    let mut estimator = TrajectoryEstimator::new(options.clone());
+    let mut estimator = TrajectoryEstimator::new(kind);
     let mut wrong = wrong.iter().peekable();
     for (keyframe, query) in drive.keyframes.iter().zip(queries) {
         estimator.push(keyframe)?;

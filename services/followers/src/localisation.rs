@@ -10,9 +10,7 @@ use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{Fix, FixHeader, Item, fix_status};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
-use gyre_slam::localisation::{
-    Localisation, Localiser, LocaliserOptions, Map, Observation, Status,
-};
+use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
 use gyre_slam::{Keyframe, RecordReader, SlamConfig};
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -26,8 +24,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let failed = |error: &dyn std::error::Error| StageError::Configuration(error.to_string());
     let map = Map::open(&slam.map).map_err(|error| failed(&error))?;
-    let options = LocaliserOptions::default();
-    let localiser = Localiser::new(map, options, &refinement, points.capacity);
+    let localiser = Localiser::new(map, &refinement, points.capacity);
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }

@@ -13,8 +13,8 @@ use gyre_messages::{Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeSource, LoopCloser, LoopOptions, Place, Query, RecordLog,
-    RecordReader, SlamConfig,
+    ClosingError, Keyframe, KeyframeSource, LoopCloser, Place, Query, RecordLog, RecordReader,
+    SlamConfig,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -62,10 +62,7 @@ struct Settings {
 impl Settings {
     fn closer(&self) -> Result<LoopCloser, StageError> {
         LoopCloser::new(
-            LoopOptions {
-                submap_reach_m: self.slam.submap_reach_m,
-                ..LoopOptions::default()
-            },
+            self.slam.submap_reach_m,
             &self.refinement,
             self.points.capacity,
         )

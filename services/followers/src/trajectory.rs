@@ -20,7 +20,7 @@ use gyre_run::SourceConfig;
 use gyre_samples::GnssConfig;
 use gyre_slam::{
     EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
-    TrajectoryEstimator, TrajectoryOptions,
+    TrajectoryEstimator,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -83,16 +83,12 @@ struct Trajectory {
 
 impl Trajectory {
     fn open(out: &std::path::Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
-        let options = TrajectoryOptions {
-            kind,
-            ..TrajectoryOptions::default()
-        };
         Ok(Self {
             out: out.to_owned(),
             kind,
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
-            estimator: TrajectoryEstimator::new(options).with_fixes(fixes.clone()),
+            estimator: TrajectoryEstimator::new(kind).with_fixes(fixes.clone()),
             fixes,
             live_fixes: None,
             newest: None,

@@ -69,11 +69,7 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     match write(threads, simulation, out) {
-        Err(
-            SimulatorError::OutputInUse { .. }
-            | SimulatorError::OtherDataset { .. }
-            | SimulatorError::OtherImage { .. },
-        ) if replace => {
+        Err(SimulatorError::OtherFiles(_)) if replace => {
             remove_dataset(out).map_err(|error| {
                 format!("cannot replace the recording of an earlier run: {error}, which is another --out")
             })?;

@@ -5,11 +5,10 @@ use gyre_geometry::Pose;
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
-use crate::body::{Aspect, Body, Moving, Scatterer, Wall};
+use crate::body::{Body, Moving, Scatterer, Wall};
 use crate::route::{KERBS_M, Route};
 use crate::stream::Stream;
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "objects.csv";
 /// The first row of the file. Poses and velocities are in the world of `ground_truth.tum`.
 pub(crate) const HEADER: &str =
@@ -54,26 +53,19 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
         for share in [0.15, 0.4, 0.65, 0.9] {
             let normal = Rotation2::new(rng.random_range(-0.5..0.5)) * outward;
             let sharpness = rng.random_range(1.0..10.0);
-            car.scatterers.push(Scatterer {
-                position: from + direction * (share + rng.random_range(-0.1..0.1)),
-                cross_section_m2: spread(rng, 1.5, 5.0),
-                aspect: Aspect::Facing { normal, sharpness },
-                body,
-            });
+            let position = from + direction * (share + rng.random_range(-0.1..0.1));
+            let cross_section_m2 = spread(rng, 1.5, 5.0);
+            let part = Scatterer::facing(position, cross_section_m2, normal, sharpness, body);
+            car.scatterers.push(part);
         }
     }
-    car.walls = [[0, 2], [1, 3]]
-        .map(|[from, to]| Wall {
-            from: corners[from],
-            to: corners[to],
-            transmission: TRANSMISSION,
-            body,
-        })
+    let diagonals = [[0, 2], [1, 3]].map(|ends| ends.map(|end| corners[end]));
+    car.walls = diagonals
+        .map(|[from, to]| Wall::new(from, to, TRANSMISSION, body))
         .to_vec();
     car
 }
 
-/// The oncoming cars of a drive.
 #[derive(Clone, Debug)]
 pub(crate) struct Cars {
     route: Route,
@@ -85,13 +77,13 @@ pub(crate) struct Cars {
 impl Cars {
     /// Cars that meet the vehicle until a time, s.
     pub fn new(route: &Route, until_s: f64, seed: u64) -> Self {
-        let mut rng = Stream::Cars.generator(seed);
+        let mut rng = Stream::CARS.generator(seed);
         let mut cars = Self {
             route: route.clone(),
             bodies: Vec::new(),
             starts_m: Vec::new(),
         };
-        let end_m = match route.is_closed() {
+        let end_m = match route.closed {
             true => route.length_m() - APART_M.start,
             false => route.length_m() + SPEED_MPS * until_s,
         };

@@ -1,13 +1,13 @@
 //! The configuration of a simulation.
 
 use gyre_datasets::DatasetOptions;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::drive::DriveConfig;
 use crate::error::SimulatorError;
 use crate::gnss::SimulatedGnssConfig;
 use crate::gyro::SimulatedGyroConfig;
-use crate::limits::require_within;
 use crate::output::{OutputConfig, OutputFormat};
 use crate::sensor::SensorConfig;
 use crate::wheels::SimulatedWheelsConfig;
@@ -15,9 +15,7 @@ use crate::wheels::SimulatedWheelsConfig;
 pub(crate) const MAX_SCANS: usize = 100_000;
 
 /// The errors of the radar.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Realism {
     /// Noise, speckle, fluctuating echoes, a jittering encoder, and azimuths that are lost.
@@ -31,7 +29,7 @@ pub enum Realism {
 ///
 /// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines
 /// and logarithms are the system's).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
     /// Scans to generate. A drive around a block is repeated as long as they last; a drive along a
@@ -66,7 +64,6 @@ pub struct SimulationConfig {
     pub output: OutputConfig,
 }
 
-/// Returns whether all keys of a section are as configurations leave them out.
 fn is_default<T: Default + PartialEq>(section: &T) -> bool {
     *section == T::default()
 }
@@ -90,39 +87,67 @@ impl Default for SimulationConfig {
 }
 
 impl SimulationConfig {
-    /// Checks that all values can be simulated.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        if let Some(scans) = self.scans {
-            require_within("scans", scans as f64, 1.0, MAX_SCANS as f64)?;
+        let Self {
+            drive,
+            sensor,
+            gyro,
+            wheels,
+            gnss,
+            ..
+        } = self;
+        let scans = self.scans.unwrap_or(1) as f64;
+        let [blind_s, sees_s] = self.blind_s.unwrap_or_default();
+        let [begins_m, length_m] = self.tunnel_m.unwrap_or([0.0, 10.0]);
+        let sampling = sensor.sampling();
+        let (bins, azimuths) = (sampling.bins as f64, sampling.azimuths as f64);
+        let eccentricity_rad = sensor.azimuth_eccentricity_rad;
+        for (key, value, least, most) in [
+            ("scans", scans, 1.0, MAX_SCANS as f64),
+            ("blind_s", blind_s, 0.0, 1e6),
+            ("blind_s", sees_s, blind_s, 1e6),
+            ("tunnel_m", begins_m, 0.0, 1e5),
+            ("tunnel_m", length_m, 10.0, 1e4),
+            ("drive.block_m", drive.block_m[0], 30.0, 400.0),
+            ("drive.block_m", drive.block_m[1], 30.0, 400.0),
+            ("drive.speed_mps", drive.speed_mps, 0.5, 40.0),
+            ("drive.from_s", drive.from_s, 0.0, 1e6),
+            ("drive.for_s", drive.for_s.unwrap_or(1.0), 1.0, 1e6),
+            ("sensor.bins", bins, 16.0, 20_000.0),
+            ("sensor.bin_m", sampling.range_resolution_m, 0.01, 5.0),
+            ("sensor.azimuths", azimuths, 60.0, 4000.0),
+            ("sensor.period_s", sensor.period_s.unwrap_or(1.0), 0.05, 2.0),
+            ("sensor.beam_deg", sensor.beam_deg.unwrap_or(1.0), 0.1, 20.0),
+            ("sensor.noise_db", sensor.noise_db, -20.0, 40.0),
+            ("sensor.range_offset_m", sampling.range_offset_m, -5.0, 5.0),
+            ("sensor.doppler_s", sampling.doppler_s, -0.5, 0.5),
+            (
+                "sensor.azimuth_eccentricity_rad",
+                eccentricity_rad,
+                -0.05,
+                0.05,
+            ),
+            ("gyro.delay_s", gyro.delay_s, -1e6, 1e6),
+            ("wheels.rate_hz", wheels.rate_hz, 0.0, 1000.0),
+            ("wheels.delay_s", wheels.delay_s, -1e6, 1e6),
+            ("gnss.rate_hz", gnss.rate_hz, 0.0, 100.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                let expected = format!("between {least} and {most}");
+                return Err(SimulatorError::key(key, value, expected));
+            }
         }
-        if let Some([from_s, to_s]) = self.blind_s {
-            require_within("blind_s", from_s, 0.0, 1e6)?;
-            require_within("blind_s", to_s, from_s, 1e6)?;
+        if sensor.lost_azimuths && self.output.format != Some(OutputFormat::Radiate) {
+            let expected = "false unless output.format = \"radiate\": in other formats the azimuth of each row is written beside it";
+            return Err(SimulatorError::key("sensor.lost_azimuths", true, expected));
         }
-        if let Some([from_m, length_m]) = self.tunnel_m {
-            require_within("tunnel_m", from_m, 0.0, 1e5)?;
-            require_within("tunnel_m", length_m, 10.0, 1e4)?;
-        }
-        self.drive.validate()?;
-        self.sensor.validate()?;
-        if self.sensor.lost_azimuths && self.output.format != Some(OutputFormat::Radiate) {
-            return Err(SimulatorError::Config {
-                key: "sensor.lost_azimuths",
-                value: "true".to_owned(),
-                expected: "false unless output.format = \"radiate\": in other formats the azimuth of each row is written beside it".to_owned(),
-            });
-        }
-        self.gyro.validate()?;
-        self.wheels.validate()?;
-        self.gnss.validate()
+        Ok(())
     }
 
-    /// The seed of the radar's errors.
     pub(crate) fn sensor_seed(&self) -> u64 {
         self.sensor.seed.unwrap_or(self.seed)
     }
 
-    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         let sampling = self.sensor.sampling();
         let with_encoder = self.output.format != Some(OutputFormat::Radiate);

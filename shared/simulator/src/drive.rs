@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
-use crate::limits::require_within;
 use crate::path::recorded::{self, Excerpt};
 use crate::path::{BlockLoop, Path};
 
@@ -44,22 +43,11 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
-    /// The drive along a recorded trajectory.
     pub fn along_file(file: PathBuf) -> Self {
         Self {
             file: Some(file),
             ..Self::default()
         }
-    }
-
-    /// Checks that all values can be driven.
-    pub fn validate(&self) -> Result<(), SimulatorError> {
-        for side_m in self.block_m {
-            require_within("drive.block_m", side_m, 30.0, 400.0)?;
-        }
-        require_within("drive.speed_mps", self.speed_mps, 0.5, 40.0)?;
-        require_within("drive.from_s", self.from_s, 0.0, 1e6)?;
-        require_within("drive.for_s", self.for_s.unwrap_or(1.0), 1.0, 1e6)
     }
 
     /// Builds the path, for a radar with so many sweeps a second.

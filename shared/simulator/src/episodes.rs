@@ -3,7 +3,6 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// The episodes of a drive.
 pub(crate) struct Episodes {
     every_s: f64,
     lasts_s: f64,

@@ -10,12 +10,10 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use crate::episodes::Episodes;
+use crate::simulator::Simulator;
 use crate::stream::Stream;
-use crate::{error::SimulatorError, limits::require_within, path::Path};
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "gnss.csv";
-/// The first row of the file.
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
 /// Standard deviation of each fix along each axis, and of the error that lasts (orbits and
 /// atmosphere), m: a receiver of a car without corrections.
@@ -42,25 +40,14 @@ pub struct SimulatedGnssConfig {
     pub faults: bool,
 }
 
-impl SimulatedGnssConfig {
-    /// Checks that all values can be simulated.
-    pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("gnss.rate_hz", self.rate_hz, 0.0, 100.0)
-    }
-}
-
-/// The fixes during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps. `None` without a receiver.
-pub(crate) fn fixes(
-    config: &SimulatedGnssConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
+/// The fixes during a drive, by their stamps. `None` without a receiver.
+pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
+    let (config, seed) = (&simulator.config().gnss, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
-        let mut rng = Stream::GnssErrors.generator(seed);
-        let mut holes = Episodes::new(HOLE_EVERY_S, HOLE_S, Stream::GnssHoles.generator(seed));
+        let mut rng = Stream::GNSS_ERRORS.generator(seed);
+        let mut holes = Episodes::new(HOLE_EVERY_S, HOLE_S, Stream::GNSS_HOLES.generator(seed));
         let kept = (-1.0 / (config.rate_hz * BIAS_LASTS_S)).exp();
         let fresh_m = BIAS_M * (1.0 - kept * kept).sqrt();
         let mut bias_m = normal(&mut rng) * BIAS_M;
@@ -84,17 +71,16 @@ pub(crate) fn fixes(
 }
 
 /// The fixes as CSV: a reader gets exactly the numbers of the fixes.
-pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
+pub(crate) fn csv(fixes: &[RawFix]) -> String {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {
         let [latitude_deg, longitude_deg] = fix.at;
         let (stamp_ns, sigma_m) = (fix.stamp_ns, fix.sigma_m);
         let _ = writeln!(text, "{stamp_ns},{latitude_deg},{longitude_deg},{sigma_m}");
     }
-    text.into_bytes()
+    text
 }
 
-/// Two numbers of the standard normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
     Vector2::from_fn(|_, _| rng.sample(StandardNormal))
 }
@@ -102,7 +88,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SimulationConfig, Simulator};
+    use crate::SimulationConfig;
 
     #[test]
     fn fixes_err_by_as_much_as_they_say_and_holes_have_none() {
@@ -117,7 +103,7 @@ mod tests {
                 ..SimulationConfig::default()
             };
             let simulator = Simulator::new(&config).expect("a drive");
-            let fixes = simulator.gnss_fixes().unwrap_or_default();
+            let fixes = super::fixes(&simulator).unwrap_or_default();
             (simulator, fixes)
         };
         let (simulator, fixes) = simulated(false);
@@ -134,6 +120,6 @@ mod tests {
         let holes = simulated(true).1.len();
         assert!((1200..1300).contains(&holes), "{holes}");
         let without = Simulator::new(&SimulationConfig::default()).expect("a drive");
-        assert_eq!(without.gnss_fixes(), None);
+        assert_eq!(super::fixes(&without), None);
     }
 }

@@ -1,21 +1,26 @@
 //! The gyro beside the radar: the section `[simulation.gyro]`, and the log that it leaves.
-//!
-//! In the order of the data:
-//!
-//! - [`config`]: the configuration; [`profile`]: gyros that can be bought;
-//! - `attitude`: the vehicle's rate of rotation and acceleration, from its path;
-//! - `errors`: the errors of the sensor;
-//! - `clock`: the stamps, and which samples are lost;
-//! - `log`: the samples as a log has them.
 
 mod attitude;
 mod clock;
-pub mod config;
 mod errors;
 pub(crate) mod log;
 pub mod profile;
 #[cfg(test)]
 mod tests;
 
-pub use config::SimulatedGyroConfig;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 pub use profile::{GyroFigures, GyroProfile};
+
+/// The gyro and its clock. Its axes are forward, left and up.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SimulatedGyroConfig {
+    /// The gyro. Default: `none`, and then the other keys have no effect.
+    pub profile: GyroProfile,
+    /// Delay of the stamps against the radar's clock, seconds.
+    pub delay_s: f64,
+    /// True if its host stalls for 60 ms in each 2 s and loses 2 % of the samples.
+    pub faults: bool,
+}

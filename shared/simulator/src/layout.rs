@@ -6,4 +6,4 @@ pub(crate) mod oxford;
 pub(crate) mod radiate;
 
 /// A file beside the images: its path in the dataset's folder, and its content.
-pub(crate) type SideFile = (std::path::PathBuf, Vec<u8>);
+pub(crate) type SideFile = (&'static str, String);

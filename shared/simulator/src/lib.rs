@@ -1,31 +1,6 @@
-//! Simulated drives of a spinning FMCW radar, with exact truth.
-//!
-//! A vehicle with a radar drives around a block of houses or along a trajectory. The result is a
-//! dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed into a pipeline.
-//! In the order of the data:
-//!
-//! - [`config`]: the configuration,
-//! - [`drive`], [`path`]: the path of the sensor, a pose for every instant; `route`: the places
-//!   along it,
-//! - `scenery`, `cars`, `tunnel`: what stands along the route and what moves on it,
-//! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
-//!   points,
-//! - [`profile`]: the radars; [`sensor`]: the measurement of one sweep; [`gyro`], [`wheels`],
-//!   [`gnss`]: the other sensors,
-//! - [`simulator`]: single scans with their exact poses,
-//! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format, with its truth,
-//! - [`writer`]: the same on a disk.
-//!
-//! ```
-//! use gyre_simulator::{SimulationConfig, Simulator};
-//!
-//! let simulator = Simulator::new(&SimulationConfig { scans: Some(2), ..SimulationConfig::default() })?;
-//! let first = simulator.render_scan(0);
-//! assert_eq!(first.scan.view().geometry.azimuths, 400);
-//! let motion = simulator.pose(0).inverse() * simulator.pose(1);
-//! assert!(motion.translation.x > 1.0, "metres ahead in a quarter of a second");
-//! # Ok::<(), gyre_simulator::SimulatorError>(())
-//! ```
+//! Simulated drives of a spinning FMCW radar, with exact truth: around a block of houses or along a
+//! trajectory, as a dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed
+//! into a pipeline. [`simulator`] renders single scans, [`sensor`] measures one sweep.
 
 pub mod body;
 mod cars;
@@ -38,7 +13,6 @@ pub mod gyro;
 mod image;
 mod interpolate;
 mod layout;
-mod limits;
 pub mod occlusion;
 pub mod output;
 pub mod path;
@@ -67,7 +41,7 @@ pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
-pub use simulator::{SimulatedScan, Simulator};
+pub use simulator::Simulator;
 pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

@@ -24,7 +24,6 @@ pub struct WallGrid {
 }
 
 impl WallGrid {
-    /// Indexes the walls.
     pub fn new(walls: Vec<Wall>) -> Self {
         let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
         let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b))
@@ -40,24 +39,20 @@ impl WallGrid {
             cell_start: vec![0],
             cell_walls: Vec::new(),
         };
-        grid.sort();
-        grid
-    }
-
-    fn sort(&mut self) {
-        let mut cells: Vec<Vec<u32>> = vec![Vec::new(); self.columns * self.rows];
-        for (index, wall) in self.walls.iter().enumerate() {
-            let mut walk = CellWalk::new(self, wall.from, wall.to);
+        let mut cells: Vec<Vec<u32>> = vec![Vec::new(); columns * rows];
+        for (index, wall) in grid.walls.iter().enumerate() {
+            let mut walk = CellWalk::new(&grid, wall.from, wall.to);
             while let Some((column, row, _)) = walk.next_cell() {
-                if let Some(cell) = self.cell(column, row) {
+                if let Some(cell) = grid.cell(column, row) {
                     cells[cell].push(index as u32);
                 }
             }
         }
         for cell in cells {
-            self.cell_walls.extend(cell);
-            self.cell_start.push(self.cell_walls.len() as u32);
+            grid.cell_walls.extend(cell);
+            grid.cell_start.push(grid.cell_walls.len() as u32);
         }
+        grid
     }
 
     fn cell(&self, column: i64, row: i64) -> Option<usize> {
@@ -66,15 +61,15 @@ impl WallGrid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Visits all walls between two points; see [`crate::World::walls_between`].
+    /// Visits the walls between two points, each once, with the share of the line up to the wall.
     pub fn between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(&Wall, f64)) {
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;
         while let Some((column, row, left)) = walk.next_cell() {
-            for &index in self
-                .cell(column, row)
-                .map_or(&[][..], |cell| self.walls_in(cell))
-            {
+            let starts = self.cell(column, row).map_or([0; 2], |cell| {
+                [cell, cell + 1].map(|cell| self.cell_start[cell] as usize)
+            });
+            for &index in &self.cell_walls[starts[0]..starts[1]] {
                 let wall = &self.walls[index as usize];
                 // A wall lies in several cells, but the line crosses it in one of them only.
                 if let Some(share) =
@@ -85,10 +80,6 @@ impl WallGrid {
             }
             entered = left;
         }
-    }
-
-    fn walls_in(&self, cell: usize) -> &[u32] {
-        &self.cell_walls[self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize]
     }
 }
 

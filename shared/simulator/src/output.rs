@@ -4,10 +4,11 @@ use std::fmt;
 use std::str::FromStr;
 
 use gyre_datasets::Format;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The format of the dataset.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputConfig {
     /// Format of the files. Default: in a run that of `dataset.format`, else Oxford's.
@@ -22,9 +23,7 @@ pub struct OutputConfig {
 }
 
 /// A dataset format that can be written.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutputFormat {
     /// Oxford Radar RobotCar. Fits every radar.
@@ -73,21 +72,13 @@ impl OutputFormat {
             Format::Oxford => Some(Self::Oxford),
             Format::Boreas | Format::BoreasRt => Some(Self::Boreas),
             Format::Radiate => Some(Self::Radiate),
-            Format::Oord
-            | Format::Mulran
-            | Format::MulranOxfordForm
-            | Format::Fomo
-            | Format::Mcap
-            | Format::Other
-            | Format::Ros2Bag => None,
+            _ => None,
         }
     }
 }
 
 /// The delays with which a host receives scans.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HostStamps {
     /// The same delay for each scan.

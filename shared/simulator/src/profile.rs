@@ -2,15 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Bytes before each azimuth's bins: stamp, encoder, validity or chirp, as in Oxford's files.
 pub const METADATA_BYTES: usize = 11;
 
 /// A radar.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
     /// Navtech CTS350-X as recorded by Oxford Radar RobotCar: 3768 bins of 0.0438 m.
@@ -35,7 +34,6 @@ pub enum Chirp {
     Alternating,
 }
 
-/// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     pub azimuths: usize,
@@ -46,15 +44,12 @@ pub struct Sampling {
     /// Metres to add to a bin's range: bin `b` is at
     /// `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f64,
-    /// Time of one turn, microseconds.
     pub period_us: i64,
-    /// Counts of the encoder in one turn.
     pub encoder_counts: u16,
     /// Count of the first azimuth: real sweeps do not begin at zero.
     pub encoder_first: u16,
     /// Counts from one azimuth to the next.
     pub encoder_step: u16,
-    /// The direction of the chirps.
     pub chirp: Chirp,
     /// Doppler shift: metres of range for each m/s of closing speed.
     pub doppler_s: f64,
@@ -100,12 +95,10 @@ impl Receiver {
 }
 
 impl Sampling {
-    /// Radians from one azimuth to the next.
     pub fn step_rad(&self) -> f64 {
         f64::from(self.encoder_step) * TAU / f64::from(self.encoder_counts)
     }
 
-    /// Encoder count at an azimuth.
     pub fn encoder_count(&self, azimuth: usize) -> u16 {
         self.encoder_first + self.encoder_step * azimuth as u16
     }
@@ -120,7 +113,6 @@ impl Sampling {
         METADATA_BYTES + self.bins
     }
 
-    /// The bin of a range, with fractions.
     pub fn bin(&self, range_m: f64) -> f64 {
         (range_m - self.range_offset_m) / self.range_resolution_m - 0.5
     }
@@ -137,7 +129,6 @@ impl Sampling {
 }
 
 impl Profile {
-    /// The sampling of this radar.
     pub fn sampling(self) -> Sampling {
         let oxford = Sampling {
             azimuths: 400,

@@ -15,7 +15,6 @@ const STEP_S: f64 = 0.02;
 /// left of a street with two lanes.
 pub(crate) const KERBS_M: [f64; 2] = [2.8, 6.2];
 
-/// One side of the street.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Left,
@@ -24,19 +23,15 @@ pub(crate) enum Side {
 
 impl Side {
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
-
-    /// Distance from the vehicle to the kerb of this side, metres.
-    pub fn kerb_m(self) -> f64 {
-        KERBS_M[self as usize]
-    }
 }
 
 /// The way of the vehicle, one lap of it if the path repeats itself.
 #[derive(Clone, Debug)]
 pub(crate) struct Route {
     /// Places [`STEP_M`] apart, x along the way.
-    nodes: Vec<Pose>,
-    closed: bool,
+    pub nodes: Vec<Pose>,
+    /// True if the path repeats itself.
+    pub closed: bool,
 }
 
 impl Route {
@@ -71,15 +66,6 @@ impl Route {
         }
     }
 
-    pub fn nodes(&self) -> &[Pose] {
-        &self.nodes
-    }
-
-    /// Returns whether the path repeats itself.
-    pub fn is_closed(&self) -> bool {
-        self.closed
-    }
-
     pub fn length_m(&self) -> f64 {
         self.nodes.len() as f64 * STEP_M
     }
@@ -89,10 +75,9 @@ impl Route {
     pub fn at(&self, distance_m: f64) -> Option<Pose> {
         let count = self.nodes.len();
         let along = distance_m / STEP_M;
-        let along = if self.closed {
-            along.rem_euclid(count as f64)
-        } else {
-            along
+        let along = match self.closed {
+            true => along.rem_euclid(count as f64),
+            false => along,
         };
         if !(0.0..=(count - 1) as f64).contains(&along) && !self.closed {
             return None;
@@ -113,7 +98,7 @@ impl Route {
     /// along the street, y away from it.
     pub fn beside(&self, side: Side, distance_m: f64, beyond_m: f64) -> Option<Pose> {
         let node = self.at(distance_m)?;
-        let aside_m = side.kerb_m() + beyond_m;
+        let aside_m = KERBS_M[side as usize] + beyond_m;
         let (place, turn_rad) = match side {
             Side::Left => (node * Point2::new(0.0, aside_m), 0.0),
             Side::Right => (node * Point2::new(0.0, -aside_m), PI),
@@ -149,7 +134,7 @@ mod tests {
             .map(|(x, at)| (f64::from(at), gyre_geometry::pose(*x, 0.0, 0.0)))
             .collect();
         let route = Route::along(&SplinePath::measured(&poses));
-        assert!((18..=21).contains(&route.nodes().len()), "{route:?}");
+        assert!((18..=21).contains(&route.nodes.len()), "{route:?}");
         assert!(route.at(-0.5).is_none() && route.at(40.0).is_none());
         let left = route.beside(Side::Left, 5.0, 1.0).unwrap();
         assert!(

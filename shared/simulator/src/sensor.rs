@@ -1,14 +1,5 @@
 //! A sweep of a spinning FMCW radar, each azimuth measured at its own time from its own pose.
 //!
-//! In the order of a measurement:
-//!
-//! - `sweep_poses`: the sensor's pose at each azimuth, and the times when its beam passes a place,
-//! - `line_of_sight`: rays in all directions, and the walls along each,
-//! - `echoes`: the echoes with their amplitudes; `scintillation`: their fluctuation with the
-//!   direction,
-//! - `antenna`: the beam's pattern; `beam_index`: the echoes of each azimuth,
-//! - `spectrum`: range processing and quantisation.
-//!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so scatterers in one
 //! resolution cell interfere (speckle), differently from each pose. Noise is the receiver's alone.
 
@@ -55,11 +46,9 @@ const ENCODER_JITTER_RAD: f64 = 3.7e-4;
 /// The surroundings of the sensor during a sweep.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
-    /// All that stands still.
     pub world: &'a World,
     /// The moving bodies near the sensor, at the middle of the sweep.
     pub movers: &'a [Moving<'a>],
-    /// The path of the sensor.
     pub path: &'a dyn Path,
     /// True if the radome is blocked, so that no echo passes.
     pub blind: bool,
@@ -91,7 +80,7 @@ impl Sensor {
         let (cells, spacing) = spectrum.noise_cells();
         let power = |cell: usize| {
             let range_m = sampling.range_m(cell as f64 * spacing).max(0.0);
-            let floor_db = interpolate(receiver.floor_db, range_m).unwrap_or_default();
+            let floor_db = interpolate(receiver.floor_db, range_m);
             10f32.powf((floor_db + config.noise_db) as f32 / 10.0)
         };
         Self {
@@ -112,7 +101,6 @@ impl Sensor {
 
     /// Measures one sweep into `slot` and returns its geometry: rows of [`METADATA_BYTES`], then
     /// powers, as in an Oxford image.
-    ///
     /// All randomness comes from the radar's seed and `index`, the number of the scan.
     pub fn sweep(
         &mut self,
@@ -121,7 +109,7 @@ impl Sensor {
         index: u64,
         slot: &mut ScanSlot<'_>,
     ) -> SweepGeometry {
-        let mut rng = Stream::Scan(index).generator(self.seed);
+        let mut rng = Stream::scan(index).generator(self.seed);
         self.collect_echoes(scene, time);
         for azimuth in 0..self.sampling.azimuths {
             rng.set_word_pos((azimuth as u128 + 1) * WORDS_PER_AZIMUTH);
@@ -134,14 +122,12 @@ impl Sensor {
         self.geometry(time)
     }
 
-    /// Collects the echoes of the sweep.
     fn collect_echoes(&mut self, scene: Scene<'_>, time: SweepTime) {
         let error_rad = |azimuth_rad: f64| self.eccentricity_rad * azimuth_rad.cos();
         self.sweep_poses
             .sample(scene.path, time, &self.sampling, error_rad);
         let reach_m = self.sampling.reach_m();
-        self.line_of_sight
-            .cast(scene.world, scene.movers, &self.sweep_poses, reach_m);
+        self.line_of_sight.cast(&scene, &self.sweep_poses, reach_m);
         self.echoes.clear();
         if !scene.blind {
             let view = View {

@@ -13,40 +13,29 @@ use crate::cars;
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
 use crate::gyro::log;
-use crate::layout::SideFile;
-use crate::layout::{boreas, oxford, radiate};
-use crate::output::{HostStamps, OutputFormat};
-use crate::profile::Chirp;
-use crate::profile::METADATA_BYTES;
+use crate::layout::{SideFile, boreas, oxford, radiate};
+use crate::output::OutputFormat;
+use crate::profile::{Chirp, METADATA_BYTES};
 use crate::sensor::Sensor;
 use crate::simulator::Simulator;
 use crate::truth;
 use crate::{gnss, wheels};
 use render_ahead::Ahead;
 
-/// A simulated drive in a dataset format.
 #[derive(Clone)]
 pub struct SimulatedDrive {
     simulator: Simulator,
     output: OutputFormat,
-    host: HostStamps,
-    seed: u64,
 }
 
 impl SimulatedDrive {
-    /// Builds the path and what stands along it.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
         }
-        Ok(Self {
-            simulator,
-            output,
-            host: config.output.host_stamps,
-            seed: config.sensor_seed(),
-        })
+        Ok(Self { simulator, output })
     }
 
     pub fn simulator(&self) -> &Simulator {
@@ -65,7 +54,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),
@@ -80,13 +68,11 @@ impl SimulatedDrive {
     /// The folder of the images, relative to the dataset's.
     pub fn image_folder(&self) -> &'static str {
         match self.output {
-            OutputFormat::Oxford => oxford::FOLDER,
-            OutputFormat::Boreas => boreas::FOLDER,
-            OutputFormat::Radiate => radiate::FOLDER,
+            OutputFormat::Oxford | OutputFormat::Boreas => "radar",
+            OutputFormat::Radiate => "Navtech_Polar",
         }
     }
 
-    /// The name of an image.
     pub fn image_name(&self, index: usize) -> String {
         match self.output {
             OutputFormat::Oxford => oxford::file_name(&self.simulator, index),
@@ -95,19 +81,13 @@ impl SimulatedDrive {
         }
     }
 
-    /// Columns and rows of an image.
     pub fn image_size(&self) -> ImageSize {
         let sampling = self.simulator.sampling();
-        match self.output {
-            OutputFormat::Radiate => ImageSize {
-                width: sampling.azimuths,
-                height: sampling.bins,
-            },
-            _ => ImageSize {
-                width: METADATA_BYTES + sampling.bins,
-                height: sampling.azimuths,
-            },
-        }
+        let [width, height] = match self.output {
+            OutputFormat::Radiate => [sampling.azimuths, sampling.bins],
+            _ => [METADATA_BYTES + sampling.bins, sampling.azimuths],
+        };
+        ImageSize { width, height }
     }
 
     /// The scan's time as the format defines it, nanoseconds since 1970.
@@ -122,77 +102,71 @@ impl SimulatedDrive {
         }
     }
 
-    /// `ground_truth.tum`: the poses at the times of the scans.
+    fn stamps_ns(&self) -> Vec<i64> {
+        (0..self.scans())
+            .map(|index| self.stamp_ns(index))
+            .collect()
+    }
+
     pub fn ground_truth_tum(&self) -> Vec<u8> {
-        truth::ground_truth_tum(
-            &self.simulator,
-            (0..self.scans())
-                .map(|index| self.stamp_ns(index))
-                .collect(),
-        )
+        truth::ground_truth_tum(&self.simulator, self.stamps_ns())
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.gyro_samples()
+        log::samples(&self.simulator)
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.wheel_samples()
+        wheels::samples(&self.simulator)
     }
 
-    /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
+        let simulator = &self.simulator;
         let mut files = match self.output {
-            OutputFormat::Oxford => oxford::side_files(&self.simulator),
-            OutputFormat::Boreas => boreas::side_files(&self.simulator),
-            OutputFormat::Radiate => self
-                .stamps()
-                .map(|text| ("Navtech_Polar.txt".into(), text.into_bytes()))
-                .into_iter()
-                .collect(),
+            OutputFormat::Oxford => oxford::side_files(simulator),
+            OutputFormat::Boreas => boreas::side_files(simulator),
+            OutputFormat::Radiate => Vec::new(),
         };
-        files.push(("ground_truth.tum".into(), self.ground_truth_tum()));
-        files.push((
-            "azimuth_poses.npy".into(),
-            truth::azimuth_poses_npy(&self.simulator),
-        ));
-        let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
-        files.push((
-            cars::FILE.into(),
-            truth::objects_csv(&self.simulator, stamps_ns),
-        ));
+        let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
+        files.push(("ground_truth.tum", truth));
+        let objects = truth::objects_csv(simulator, &self.stamps_ns());
+        files.push((cars::FILE, objects));
+        let logs = [
+            ("Navtech_Polar.txt", self.stamps()),
+            (log::FILE, self.gyro_samples().map(|it| log::csv(&it))),
+            (
+                wheels::FILE,
+                self.wheel_samples().map(|it| wheels::csv(&it)),
+            ),
+            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
+        ];
         files.extend(
-            self.gyro_samples()
-                .map(|samples| (log::FILE.into(), log::csv(&samples))),
+            logs.into_iter()
+                .filter_map(|(name, log)| Some((name, log?))),
         );
-        files.extend(
-            self.wheel_samples()
-                .map(|samples| (wheels::FILE.into(), wheels::csv(&samples))),
-        );
-        let fixes = self.simulator.gnss_fixes();
-        files.extend(fixes.map(|fixes| (gnss::FILE.into(), gnss::csv(&fixes))));
         files
     }
 
     fn stamps(&self) -> Option<String> {
+        let config = self.simulator.config();
+        let host = config.output.host_stamps;
         (self.output == OutputFormat::Radiate)
-            .then(|| radiate::stamps(&self.simulator, self.host, self.seed))
+            .then(|| radiate::stamps(&self.simulator, host, config.sensor_seed()))
     }
 
     /// Returns the azimuths of a scan that the host loses, in order: see
     /// [`SensorConfig::lost_azimuths`](crate::SensorConfig::lost_azimuths).
     pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
         match self.output {
-            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, self.seed, index),
+            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, index),
             OutputFormat::Oxford | OutputFormat::Boreas => Vec::new(),
         }
     }
 
-    /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
         Renderer {
             drive: self.clone(),
@@ -287,7 +261,6 @@ impl ImageSource for Renderer {
         self.drive.stamps()
     }
 
-    /// Gives the same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
         let ahead = self.ahead.as_mut();
         if !ahead.is_some_and(|ahead| ahead.take(&self.drive, index, pixels)) {

@@ -4,19 +4,17 @@ use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{RawFix, Sample};
 use nalgebra::Point2;
 
 use crate::cars::Cars;
 use crate::config::{MAX_SCANS, Realism, SimulationConfig};
 use crate::error::SimulatorError;
-use crate::gyro::log;
 use crate::path::Path;
 use crate::profile::Sampling;
 use crate::route::Route;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::world::World;
-use crate::{gnss, scenery, tunnel, wheels};
+use crate::{scenery, tunnel};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives
@@ -36,20 +34,10 @@ pub struct Simulator {
     sampling: Sampling,
     path: Arc<dyn Path>,
     world: Arc<World>,
-    cars: Arc<Cars>,
-}
-
-/// A scan with its ground truth.
-#[derive(Clone, Debug)]
-pub struct SimulatedScan {
-    /// The scan, in the layout of an Oxford image (its bytes are the image's, metadata included).
-    pub scan: OwnedScan,
-    /// Pose of the sensor in the world at the middle of the sweep (the scan's stamp).
-    pub pose: Pose,
+    pub(crate) cars: Arc<Cars>,
 }
 
 impl Simulator {
-    /// Builds the path and what stands along it.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let sampling = config.sensor.sampling();
@@ -75,7 +63,6 @@ impl Simulator {
         &self.config
     }
 
-    /// The sampling of the radar.
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
     }
@@ -85,17 +72,14 @@ impl Simulator {
         self.scans
     }
 
-    /// The path of the sensor.
     pub fn path(&self) -> &dyn Path {
         self.path.as_ref()
     }
 
-    /// All that stands still.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// The time of scan `index`.
     pub fn time(&self, index: usize) -> SweepTime {
         let Sampling {
             period_us,
@@ -116,32 +100,8 @@ impl Simulator {
         self.path.pose(time.drive_time_s(time.middle_us()))
     }
 
-    /// The oncoming cars.
-    pub(crate) fn cars(&self) -> &Cars {
-        &self.cars
-    }
-
-    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
-    /// without a gyro.
-    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(
-            &self.config.gyro,
-            self.config.seed,
-            self.path(),
-            self.span(),
-        )
-    }
-
-    /// The samples of the wheels, by their stamps. `None` without wheels that measure.
-    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        let Self { config, .. } = self;
-        wheels::samples(&config.wheels, config.seed, self.path(), self.span())
-    }
-
-    /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
-    pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
-        let Self { config, .. } = self;
-        gnss::fixes(&config.gnss, config.seed, self.path(), self.span())
+    pub(crate) fn drive_time_s(&self, stamp_ns: i64) -> f64 {
+        (stamp_ns - self.span().0) as f64 * 1e-9
     }
 
     /// The start of the drive, ns since 1970, and its duration, s.
@@ -150,14 +110,12 @@ impl Simulator {
         (EPOCH_US * 1000, end_s)
     }
 
-    /// A new sensor for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
         let Self { config, .. } = self;
         let is_exact = config.realism == Realism::Exact;
         Sensor::new(&config.sensor, is_exact, config.sensor_seed())
     }
 
-    /// The size of one scan.
     pub fn limits(&self) -> ScanLimits {
         ScanLimits {
             bytes: self.sampling.azimuths * self.sampling.stride(),
@@ -166,13 +124,11 @@ impl Simulator {
     }
 
     /// Renders scan `index`: the same bytes whenever and on whatever thread it is called.
-    pub fn render_scan(&self, index: usize) -> SimulatedScan {
+    /// It has the layout of an Oxford image, whose bytes are the image's, metadata included.
+    pub fn render_scan(&self, index: usize) -> OwnedScan {
         let mut scan = OwnedScan::with_limits(self.limits());
         scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
-        SimulatedScan {
-            scan,
-            pose: self.pose(index),
-        }
+        scan
     }
 
     /// Renders scan `index` into existing memory, of at least the size of [`Simulator::limits`].
@@ -207,11 +163,9 @@ fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize,
     }
     let most = (duration_s / period_s + 0.5) as usize;
     match wanted {
-        Some(scans) if scans > most => Err(SimulatorError::TooManyScans {
-            scans,
-            most,
-            duration_s,
-        }),
+        Some(scans) if scans > most => Err(SimulatorError::Refused(format!(
+            "`simulation.scans` is {scans}, but the drive ends after {most} scans ({duration_s:.1} s): take at most so many, or leave the key out"
+        ))),
         Some(scans) => Ok(scans),
         None => Ok(most.clamp(1, MAX_SCANS)),
     }

@@ -4,60 +4,42 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The use of a stream.
+/// The use of a stream. There are far fewer scans and blocks than numbers between the constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stream {
-    /// The sensor in one scan, by its number.
-    Scan(u64),
-    /// The scenery along the streets.
-    Scenery,
-    /// The other cars.
-    Cars,
-    /// The lining of the tunnel.
-    Tunnel,
-    /// Host stalls, by block of scans with one stall each.
-    Stall(u64),
-    /// The azimuths of a scan that the host loses, by its number.
-    Lost(u64),
-    /// Bias, scale, misalignment and noise of the gyro.
-    GyroErrors,
-    /// Losses of the gyro's clock.
-    GyroClock,
-    /// Stalls of the gyro's host.
-    GyroStalls,
-    /// Scale, noise and losses of the wheels.
-    WheelErrors,
-    WheelSlips,
-    /// Noise and lasting errors of the GNSS receiver.
-    GnssErrors,
-    /// Holes without a fix.
-    GnssHoles,
-}
+pub(crate) struct Stream(u64);
 
 impl Stream {
-    /// The stream's generator, at its first number.
-    pub fn generator(self, seed: u64) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(self.number());
-        rng
+    pub const SCENERY: Self = Self(1 << 40);
+    pub const CARS: Self = Self(1 << 41);
+    pub const TUNNEL: Self = Self(1 << 42);
+    /// Bias, scale, misalignment and noise of the gyro.
+    pub const GYRO_ERRORS: Self = Self(1 << 48);
+    pub const GYRO_CLOCK: Self = Self(1 << 49);
+    pub const GYRO_STALLS: Self = Self(1 << 50);
+    /// Scale, noise and losses of the wheels.
+    pub const WHEEL_ERRORS: Self = Self(1 << 51);
+    pub const WHEEL_SLIPS: Self = Self(1 << 52);
+    pub const GNSS_ERRORS: Self = Self(1 << 54);
+    pub const GNSS_HOLES: Self = Self(1 << 57);
+
+    /// The sensor in one scan, by its number.
+    pub fn scan(index: u64) -> Self {
+        Self(1 + index)
     }
 
-    /// There are far fewer scans and blocks than numbers between the constants.
-    fn number(self) -> u64 {
-        match self {
-            Self::Scan(index) => 1 + index,
-            Self::Scenery => 1 << 40,
-            Self::Cars => 1 << 41,
-            Self::Tunnel => 1 << 42,
-            Self::Stall(block) => (1 << 43) + block,
-            Self::Lost(index) => (1 << 44) + index,
-            Self::GyroErrors => 1 << 48,
-            Self::GyroClock => 1 << 49,
-            Self::GyroStalls => 1 << 50,
-            Self::WheelErrors => 1 << 51,
-            Self::WheelSlips => 1 << 52,
-            Self::GnssErrors => 1 << 54,
-            Self::GnssHoles => 1 << 57,
-        }
+    /// Host stalls, by block of scans with one stall each.
+    pub fn stall(block: u64) -> Self {
+        Self((1 << 43) + block)
+    }
+
+    /// The azimuths of a scan that the host loses, by its number.
+    pub fn lost(index: u64) -> Self {
+        Self((1 << 44) + index)
+    }
+
+    pub fn generator(self, seed: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(self.0);
+        rng
     }
 }

@@ -1,15 +1,8 @@
-//! Exact ground truth beside a dataset of any format: `ground_truth.tum`, the pose at the time of
-//! each scan, and `azimuth_poses.npy`, the pose at the time of each azimuth.
-//!
-//! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the
-//! first azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise.
-//! It takes 12.8 MB for 1,000 scans of 400 azimuths, and `numpy.load(path, mmap_mode="r")` opens
-//! it. The header is written here since `ndarray-npy` and `npyz` would add a Python parser (pest)
-//! and a C build for these ten lines.
+//! Exact ground truth beside a dataset of any format.
 
 use std::fmt::Write;
 
-use gyre_geometry::{Pose, xy_yaw};
+use gyre_geometry::xy_yaw;
 use gyre_radar::Trajectory;
 use nalgebra::Point2;
 
@@ -21,73 +14,23 @@ use crate::world::World;
 
 /// `ground_truth.tum` as bytes. `stamps_ns` are the times of the scans.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
-    let poses = stamps_ns
-        .iter()
-        .enumerate()
-        .map(|(index, ns)| pose_at(simulator, index, *ns))
-        .collect();
+    let pose = |stamp_ns: &i64| simulator.path().pose(simulator.drive_time_s(*stamp_ns));
+    let poses = stamps_ns.iter().map(pose).collect();
+    let stamp_ns = Some(stamps_ns);
     let mut text = Vec::new();
     // Writing to memory cannot fail, and there are stamps.
-    let _ = gyre_datasets::write_tum(
-        &Trajectory {
-            stamp_ns: Some(stamps_ns),
-            poses,
-        },
-        &mut text,
-    );
+    let _ = gyre_datasets::write_tum(&Trajectory { stamp_ns, poses }, &mut text);
     text
 }
 
-fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Pose {
-    let epoch_ns = simulator.time(index).epoch_us * 1000;
-    simulator.path().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
-}
-
-/// `azimuth_poses.npy` as bytes.
-pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
-    let (scans, azimuths) = (simulator.scans(), simulator.sampling().azimuths);
-    let mut bytes = npy_header(scans, azimuths);
-    bytes.reserve(scans * azimuths * 4 * size_of::<f64>());
-    for index in 0..scans {
-        let time = simulator.time(index);
-        for azimuth in 0..azimuths {
-            let time_s = time.drive_time_s(time.stamp_us(azimuth));
-            let pose = simulator.path().pose(time_s);
-            for value in [
-                time_s,
-                pose.translation.x,
-                pose.translation.y,
-                pose.rotation.angle(),
-            ] {
-                bytes.extend(value.to_le_bytes());
-            }
-        }
-    }
-    bytes
-}
-
-/// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64
-/// bytes.
-fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
-    let dictionary =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");
-    let before = 10;
-    let padded = (before + dictionary.len() + 1).next_multiple_of(64) - before;
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    header.extend((padded as u16).to_le_bytes());
-    header.extend(format!("{dictionary:<width$}\n", width = padded - 1).into_bytes());
-    header
-}
-
 /// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.
-pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: impl Iterator<Item = i64>) -> Vec<u8> {
+pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> String {
     let mut text = format!("{HEADER}\n");
     let receiver = simulator.config().sensor.receiver();
-    for (scan, stamp_ns) in stamps_ns.enumerate() {
-        let (start_ns, _) = simulator.span();
-        let time_s = (stamp_ns - start_ns) as f64 * 1e-9;
+    for (scan, &stamp_ns) in stamps_ns.iter().enumerate() {
+        let time_s = simulator.drive_time_s(stamp_ns);
         let place = Point2::from(simulator.path().pose(time_s).translation.vector);
-        for car in simulator.cars().near(place, REPORTED_M, time_s) {
+        for car in simulator.cars.near(place, REPORTED_M, time_s) {
             let [visible, power] = best_echo(simulator.world(), &receiver, place, &car);
             let object = car.body.walls[0].body - FIRST_BODY;
             let ([x, y, yaw], [length, width]) = (xy_yaw(&car.pose), HALF_M);
@@ -102,7 +45,7 @@ pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: impl Iterator<Item =
             );
         }
     }
-    text.into_bytes()
+    text
 }
 
 /// The largest share of the power that passes to a part of a car, and the power of its strongest
@@ -113,7 +56,7 @@ fn best_echo(world: &World, receiver: &Receiver, from: Point2<f64>, car: &Moving
         let ray = from - there.position;
         let range_m = ray.norm().max(1.0);
         let passed = world.transmission(from, there.position, there.body);
-        let gain = there.aspect.gain(ray / range_m);
+        let gain = there.gain(ray / range_m);
         let power = there.cross_section_m2 * gain * receiver.sensitivity(range_m);
         [passed, power * passed]
     });

@@ -1,13 +1,10 @@
-//! A tunnel: walls without structure along a stretch of the drive.
-//!
-//! Inside a radar sees two smooth lines and nothing else, until a portal comes into its range: how
-//! far the vehicle drives is not determined. The lining is rough to the radar and everywhere the
-//! same: its echoes are speckle, which is new at every place of the vehicle.
+//! A tunnel: walls without structure along a stretch of the drive. Inside a radar sees two smooth
+//! lines and nothing else until a portal comes into its range: how far it drives is not determined.
 
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 
-use crate::body::{Aspect, Body, Scatterer, Wall};
+use crate::body::{Body, Scatterer, Wall};
 use crate::error::SimulatorError;
 use crate::route::{KERBS_M, Route, STEP_M};
 use crate::stream::Stream;
@@ -32,14 +29,12 @@ pub(crate) fn build(
     let count = (length_m / STEP_M) as usize;
     let nodes = (0..=count).map(|at| route.at(from_m + at as f64 * STEP_M));
     let Some(nodes) = nodes.collect::<Option<Vec<_>>>() else {
-        return Err(SimulatorError::Config {
-            key: "tunnel_m",
-            value: format!("[{from_m}, {length_m}]"),
-            expected: format!(
-                "a tunnel that ends before the drive, which is {:.0} m long",
-                route.length_m()
-            ),
-        });
+        let value = format!("[{from_m}, {length_m}]");
+        let expected = format!(
+            "a tunnel that ends before the drive, which is {:.0} m long",
+            route.length_m()
+        );
+        return Err(SimulatorError::key("tunnel_m", value, expected));
     };
     let is_inside = |place: Point2<f64>| {
         nodes.iter().any(|node| {
@@ -52,28 +47,17 @@ pub(crate) fn build(
         let middle = nalgebra::center(&wall.from, &wall.to);
         ![wall.from, middle, wall.to].into_iter().any(is_inside)
     });
-    let rng = &mut Stream::Tunnel.generator(seed);
+    let rng = &mut Stream::TUNNEL.generator(seed);
     for (side, aside_m) in [1.0, -1.0].into_iter().zip(KERBS_M) {
         for piece in nodes.windows(2) {
             let [from, to] = [0, 1].map(|end| piece[end] * Point2::new(0.0, side * aside_m));
-            scenery.walls.push(Wall {
-                from,
-                to,
-                transmission: TRANSMISSION,
-                body: BODY,
-            });
+            scenery.walls.push(Wall::new(from, to, TRANSMISSION, BODY));
             let inwards = piece[0].rotation * Vector2::new(0.0, -side);
             scenery.scatterers.extend((0..SCATTERERS_M).map(|at| {
                 let share = (at as f64 + rng.random_range(0.25..0.75)) / SCATTERERS_M as f64;
-                Scatterer {
-                    position: from + (to - from) * share + inwards * rng.random_range(0.0..ROUGH_M),
-                    cross_section_m2: LINING_M2,
-                    aspect: Aspect::Facing {
-                        normal: inwards,
-                        sharpness: 1.0,
-                    },
-                    body: BODY,
-                }
+                let position =
+                    from + (to - from) * share + inwards * rng.random_range(0.0..ROUGH_M);
+                Scatterer::facing(position, LINING_M2, inwards, 1.0, BODY)
             }));
         }
     }

@@ -8,7 +8,6 @@ use crate::occlusion::WallGrid;
 /// Metres a side of the tiles that scatterers are sorted into.
 const TILE_M: f64 = 16.0;
 
-/// All that stands still around the sensor.
 #[derive(Clone, Debug)]
 pub struct World {
     /// Tile by tile; within a tile in the given order.
@@ -18,11 +17,10 @@ pub struct World {
     rows: usize,
     /// `tile_start[t]..tile_start[t + 1]` are the scatterers of tile `t`.
     tile_start: Vec<usize>,
-    walls: WallGrid,
+    pub walls: WallGrid,
 }
 
 impl World {
-    /// Indexes scatterers and walls.
     pub fn new(content: Body) -> Self {
         let Body {
             mut scatterers,
@@ -82,22 +80,12 @@ impl World {
     /// Two-way share of the power that passes between two points; walls of `body` are ignored.
     pub fn transmission(&self, from: Point2<f64>, to: Point2<f64>, body: u32) -> f64 {
         let mut passed = 1.0;
-        self.walls_between(from, to, &mut |wall, _| {
+        self.walls.between(from, to, &mut |wall, _| {
             if wall.body != body {
                 passed *= wall.transmission;
             }
         });
         passed
-    }
-
-    /// Visits the walls between two points, each once, with the share of the line up to the wall.
-    pub fn walls_between(
-        &self,
-        from: Point2<f64>,
-        to: Point2<f64>,
-        see: &mut impl FnMut(&Wall, f64),
-    ) {
-        self.walls.between(from, to, see);
     }
 }
 

@@ -5,11 +5,12 @@ mod resume;
 
 use std::fs::{self, File};
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use gyre_datasets::ImageSource as _;
+use gyre_storage::StorageError;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
@@ -19,19 +20,13 @@ use crate::simulated_drive::SimulatedDrive;
 pub use removal::remove_dataset;
 pub use resume::MADE_BY;
 
-/// The result of writing a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// The dataset's folder.
-    pub folder: PathBuf,
-    /// Scans in the dataset.
     pub scans: usize,
-    /// Scans that existed already.
     pub kept: usize,
     /// Length of the path from the first scan to the last, metres (sum of the straight lines
     /// between scans).
     pub path_m: f64,
-    /// Time from the first scan to the last, seconds.
     pub duration_s: f64,
 }
 
@@ -50,11 +45,9 @@ pub fn write_dataset(
 }
 
 /// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls
-/// `progress(done, total)` for each image.
-///
-/// The files are the same, byte for byte, for the same configuration and any number of threads.
-/// Images of an earlier call with the same configuration are kept, if it was interrupted or had
-/// fewer scans; the first and the last of them are compared with newly rendered ones.
+/// `progress(done, total)` for each image. The files do not depend on the number of threads. Images
+/// of an earlier call with the same configuration are kept; the first and the last of them are
+/// compared with newly rendered ones.
 pub fn write_dataset_on(
     threads: NonZeroUsize,
     config: &SimulationConfig,
@@ -63,7 +56,7 @@ pub fn write_dataset_on(
 ) -> Result<Summary, SimulatorError> {
     let drive = SimulatedDrive::new(config)?;
     let images = out.join(drive.image_folder());
-    fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
+    fs::create_dir_all(&images).map_err(StorageError::at("write", &images))?;
     let _alone = lock(out)?;
     let missing = resume::missing(&drive, config, out)?;
     gyre_storage::write(&out.join(MADE_BY), resume::made_by(config)?)?;
@@ -74,25 +67,31 @@ pub fn write_dataset_on(
     progress(kept, drive.scans());
     let mut written = |done| progress(kept + done, drive.scans());
     write_images(&drive, &missing, threads.get(), &images, &mut written)?;
-    Ok(summary(&drive, out, kept))
+    Ok(summary(&drive, kept))
+}
+
+fn in_use(folder: &Path, other: &str) -> SimulatorError {
+    SimulatorError::OtherFiles(format!(
+        "{} holds `{other}`, which is no file of this dataset: choose an empty folder",
+        folder.display()
+    ))
 }
 
 /// Locks the folder for this process until the returned file is dropped.
 fn lock(folder: &Path) -> Result<File, SimulatorError> {
-    let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
+    let failed = StorageError::at("write", folder);
+    let handle = File::open(folder).map_err(&failed)?;
     match handle.try_lock() {
         Ok(()) => Ok(handle),
-        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy {
-            folder: folder.to_owned(),
-        }),
-        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write {
-            path: folder.to_owned(),
-            source,
-        }),
+        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Refused(format!(
+            "another process is writing to {}: wait for it, or choose another folder",
+            folder.display()
+        ))),
+        Err(fs::TryLockError::Error(source)) => Err(failed(source).into()),
     }
 }
 
-fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
+fn summary(drive: &SimulatedDrive, kept: usize) -> Summary {
     let simulator = drive.simulator();
     let last = simulator.scans() - 1;
     let step_m = |i: usize| {
@@ -102,7 +101,6 @@ fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
             .norm()
     };
     Summary {
-        folder: out.to_owned(),
         scans: simulator.scans(),
         kept,
         path_m: (0..last).map(step_m).sum(),
@@ -114,7 +112,7 @@ fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorE
     for (name, bytes) in drive.side_files() {
         let path = out.join(name);
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
+            fs::create_dir_all(folder).map_err(StorageError::at("write", folder))?;
         }
         gyre_storage::write(&path, &bytes)?;
     }
@@ -129,12 +127,21 @@ fn write_images(
     folder: &Path,
     progress: &mut dyn FnMut(usize),
 ) -> Result<(), SimulatorError> {
-    let next = AtomicUsize::new(0);
+    let (next, size) = (AtomicUsize::new(0), drive.image_size());
     let (sender, results) = mpsc::channel();
     std::thread::scope(|scope| {
         for _ in 0..threads.min(missing.len()) {
             let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || work(drive, folder, missing, next, &sender));
+            scope.spawn(move || {
+                let mut renderer = drive.renderer();
+                let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
+                while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    renderer.draw(index, &mut pixels);
+                    let path = folder.join(drive.image_name(index));
+                    // The receiver outlives the threads.
+                    let _ = sender.send(write_image(&path, size, &pixels, &mut encoded));
+                }
+            });
         }
         drop(sender);
         let mut outcome = Ok(());
@@ -149,27 +156,4 @@ fn write_images(
         outcome
     })?;
     Ok(gyre_storage::sync_folder(folder)?)
-}
-
-fn work(
-    drive: &SimulatedDrive,
-    folder: &Path,
-    missing: &[usize],
-    next: &AtomicUsize,
-    results: &mpsc::Sender<Result<(), SimulatorError>>,
-) {
-    let (mut renderer, size) = (drive.renderer(), drive.image_size());
-    let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
-    while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-        renderer.draw(index, &mut pixels);
-        let written = write_image(
-            &folder.join(drive.image_name(index)),
-            size,
-            &pixels,
-            &mut encoded,
-        );
-        if results.send(written).is_err() {
-            return;
-        }
-    }
 }

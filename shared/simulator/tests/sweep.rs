@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use gyre_datasets::DatasetOptions;
 use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::body::{NO_BODY, Scatterer, Wall};
@@ -99,23 +98,18 @@ fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     (azimuth, seen(azimuth).1)
 }
 
+fn twist([vx_mps, vy_mps, yaw_rate_radps]: [f64; 3]) -> Twist {
+    Twist {
+        vx_mps,
+        vy_mps,
+        yaw_rate_radps,
+    }
+}
+
 /// No point lies near the sweep's seam ahead: a turning vehicle sees those twice or never.
 #[test]
 fn point_appears_where_the_moving_sensor_passed_it() {
-    let motions = [
-        Twist::default(),
-        Twist {
-            vx_mps: 12.0,
-            vy_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        },
-        Twist {
-            vx_mps: 9.0,
-            vy_mps: 0.5,
-            yaw_rate_radps: -0.9,
-        },
-    ];
-    for motion in motions {
+    for motion in [[0.0; 3], [12.0, 0.0, 0.0], [9.0, 0.5, -0.9]].map(twist) {
         for (x, y) in [
             (20.0, 10.0),
             (15.0, -25.0),
@@ -142,22 +136,8 @@ fn point_appears_where_the_moving_sensor_passed_it() {
 }
 
 #[test]
-fn point_to_the_right_lies_at_a_quarter_turn() {
-    let scan = sweep(point(0.0, -20.0), &Twist::default(), 0.0);
-    let (azimuth, _, _) = brightest(&scan);
-    assert!(
-        (99..=100).contains(&azimuth),
-        "clockwise from ahead: {azimuth}"
-    );
-}
-
-#[test]
 fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
-    let motion = Twist {
-        vx_mps: 10.0,
-        vy_mps: 0.0,
-        yaw_rate_radps: 0.0,
-    };
+    let motion = twist([10.0, 0.0, 0.0]);
     for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
         let at = |shift: f64| brightest(&sweep(point(x, 6.0), &motion, shift)).1;
         let moved_m = (at(0.049) - at(0.0)) * sampling().range_resolution_m;
@@ -226,7 +206,11 @@ fn a_radar_of_its_own_measures_a_point_where_it_is() {
         range_offset_m: Some(0.0),
         ..SensorConfig::default()
     };
-    sensor.validate().unwrap();
+    let config = SimulationConfig {
+        sensor: sensor.clone(),
+        ..SimulationConfig::default()
+    };
+    config.validate().unwrap();
     let scan = measured(
         point(0.0, -60.25),
         &Twist::default(),
@@ -245,58 +229,17 @@ fn a_radar_of_its_own_measures_a_point_where_it_is() {
     assert!(wide <= 3, "{wide} bins within 3 dB");
 }
 
-/// Mean power, and the share of bins above 60.
-fn statistics(scans: &[OwnedScan]) -> (f64, f64) {
-    let powers = || {
-        scans
-            .iter()
-            .flat_map(|scan| (0..scan.geometry.azimuths).flat_map(|a| scan.view().row(a)))
-    };
-    let count = powers().count() as f64;
-    let mean = powers().map(|&power| f64::from(power)).sum::<f64>() / count;
-    (
-        mean,
-        powers().filter(|&&power| power > 60).count() as f64 / count,
-    )
-}
-
-fn simulated() -> Vec<OwnedScan> {
-    let simulator = Simulator::new(&SimulationConfig::default()).unwrap();
-    [0, 20, 40]
-        .map(|index| simulator.render_scan(index).scan)
-        .to_vec()
-}
-
 #[test]
 fn powers_are_distributed_as_in_a_street() {
-    let (mean, bright) = statistics(&simulated());
+    let simulator = Simulator::new(&SimulationConfig::default()).unwrap();
+    let scans = [0, 20, 40].map(|index| simulator.render_scan(index));
+    let rows = scans
+        .iter()
+        .flat_map(|scan| (0..AZIMUTHS).flat_map(|row| scan.view().row(row)));
+    let powers: Vec<f64> = rows.map(|power| f64::from(*power)).collect();
+    let count = powers.len() as f64;
+    let mean = powers.iter().sum::<f64>() / count;
+    let bright = powers.iter().filter(|power| **power > 60.0).count() as f64 / count;
     assert!((6.0..22.0).contains(&mean), "mean {mean}");
     assert!((0.008..0.045).contains(&bright), "share above 60: {bright}");
-}
-
-#[test]
-fn powers_resemble_real_oxford_scans() {
-    let Some(data) = std::env::var_os("GYRE_DATA") else {
-        println!("skipped: GYRE_DATA is not set");
-        return;
-    };
-    let folder = std::path::Path::new(&data).join("oxford-2019-01-10-14-36-48");
-    let mut dataset = gyre_datasets::open(&folder, &DatasetOptions::default()).unwrap();
-    let real: Vec<OwnedScan> = (0..3)
-        .map(|index| {
-            let mut scan = OwnedScan::with_limits(dataset.limits());
-            scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            scan
-        })
-        .collect();
-    let (real, ours) = (statistics(&real), statistics(&simulated()));
-    println!("mean power and share above 60: real {real:?}, simulated {ours:?}");
-    assert!(
-        (0.5..2.0).contains(&(ours.0 / real.0)),
-        "means {ours:?} and {real:?}"
-    );
-    assert!(
-        (0.5..2.0).contains(&(ours.1 / real.1)),
-        "shares above 60 {ours:?} and {real:?}"
-    );
 }

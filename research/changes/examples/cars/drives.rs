@@ -9,7 +9,7 @@ use gyre_estimation::{Constraint, G2o};
 use gyre_geometry::pose;
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
-use gyre_slam::localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
+use gyre_slam::localisation::{DriveSearch, Localiser, Map};
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
 use gyre_worlds::drive::{DriveConfig, DriveKind};
 use gyre_worlds::weather::WeatherConfig;
@@ -134,7 +134,6 @@ fn placed([first, second]: [Vec<Keyframe>; 2]) -> Outcome<[Vec<Keyframe>; 2]> {
     let config = OdometryConfig::default();
     let mut localiser = Localiser::new(
         Map::new(first)?,
-        LocaliserOptions::default(),
         &config.refinement,
         config.points.capacity,
     )?;

@@ -4,8 +4,7 @@
 use std::path::{Path, absolute};
 
 use gyre_calibration::{
-    Drive, GyroCalibration, GyroError, WheelCalibration, WheelError, calibrate_gyro,
-    calibrate_wheels,
+    ClockError, Drive, GyroCalibration, WheelCalibration, calibrate_gyro, calibrate_wheels,
 };
 use gyre_configuration::Configuration;
 use gyre_datasets::{GyroLog, WheelLog};
@@ -18,7 +17,7 @@ use super::Section;
 macro_rules! sensor {
     (
         $sensor:ident: $title:literal, $is:literal, $section:ident, $calibrate:ident,
-        $log:ty, $config:ty, $of_log:path, $found:ty, $error:ty,
+        $log:ty, $config:ty, $of_log:path, $found:ty,
         beside: $beside:expr, read: $read:expr, mean: $mean:expr, toml: $toml:expr
     ) => {
         /// A log and the configuration of its sensor.
@@ -57,7 +56,7 @@ macro_rules! sensor {
                 }
             }
 
-            fn calibrate(&self, drive: &Drive) -> Result<Result<$found, $error>, Failure> {
+            fn calibrate(&self, drive: &Drive) -> Result<Result<$found, ClockError>, Failure> {
                 let track = drive.mean_track()?;
                 let log = self.log.path.display();
                 print::line(format_args!("{:<21} {log}", $title))?;
@@ -103,7 +102,7 @@ macro_rules! sensor {
 
 sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
-    GyroLog, GyroConfig, GyroKind::Log, GyroCalibration, GyroError,
+    GyroLog, GyroConfig, GyroKind::Log, GyroCalibration,
     beside: GyroLog::beside,
     read: |file: &Path, _: &GyroConfig| GyroLog::read(file),
     mean: GyroCalibration::mean,
@@ -112,7 +111,7 @@ sensor! {
 
 sensor! {
     Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
-    WheelLog, WheelsConfig, WheelsKind::Log, WheelCalibration, WheelError,
+    WheelLog, WheelsConfig, WheelsKind::Log, WheelCalibration,
     beside: |folder: &Path| WheelLog::find(folder).ok(),
     read: |file: &Path, config: &WheelsConfig| WheelLog::read(file, config.m_per_tick),
     mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {

@@ -8,7 +8,7 @@ use std::{
 use gyre_geometry::Pose;
 use gyre_mapping::{Evidence, MapError, grid};
 use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
-use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
+use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_stage::{clock, observer::ObservedRun};
 use gyre_storage::LogError;
 use thiserror::Error;
@@ -108,15 +108,11 @@ fn follow(
 
 impl LiveMap {
     fn open(out: &Path, settings: &MapSettings, radar: Pose) -> Result<Self, LiveMapError> {
-        let options = TrajectoryOptions {
-            kind: settings.estimator,
-            ..TrajectoryOptions::default()
-        };
         Ok(Self {
             settings: settings.clone(),
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
-            estimator: TrajectoryEstimator::new(options),
+            estimator: TrajectoryEstimator::new(settings.estimator),
             radar,
             evidence: Evidence::new(&settings.options, &std::env::temp_dir())
                 .map_err(MapError::from)?,

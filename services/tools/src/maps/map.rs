@@ -16,7 +16,7 @@ use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_geometry::Pose;
 use gyre_mapping::{
-    Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
+    Drawing, Evidence, MapOptions, Origin, TileSource, write_geotiff, write_pgm, write_web_tiles,
 };
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, georeference, map_options, require_results};

@@ -7,11 +7,10 @@ use crate::{
     CalibrationError, Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
     drift::{self, MAX_REVISITS},
     facts::FACTS,
-    overlap::{Pair, System, along, overlaps, slopes},
+    overlap::{System, along, overlaps, slopes},
     revisits,
 };
 
-/// Solutions of the linearised residuals, at most.
 const ROUNDS: usize = 4;
 /// A round whose change is below this share of the standard deviations is the last.
 const CONVERGED: f64 = 0.5;
@@ -26,40 +25,33 @@ const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
 /// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
 const ROW_TIME_SHARE: f64 = 0.05;
-/// Revisits needed for the drift.
 const MIN_REVISITS: usize = 5;
 /// Facts that are solved for together, as far as the drive determines them. The others only
 /// confirm: odometry needs no correction of them.
 pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
-/// A fact with its change against the configured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
     pub fact: Fact,
     /// Change against the configured value, in the fact's unit.
     pub change: Estimate,
-    /// The estimate from the overlap of scans alone.
     pub by_overlap: Estimate,
     /// The estimate from the drift between revisits alone, if there are any.
     pub by_drift: Option<Estimate>,
 }
 
 impl FactEstimate {
-    /// Returns whether the drive adds knowledge about the fact.
     pub fn is_useful(&self) -> bool {
         self.change.sigma < self.fact.useful_sigma()
     }
 }
 
-/// The constants of a radar, estimated from a drive.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     /// All facts in their order. The eccentricity to the side and the times of rows are checks,
     /// with the other facts as found.
     pub facts: [FactEstimate; FACTS],
-    /// Places that were seen again.
     pub revisits: Vec<Revisit>,
-    /// Pairs of scans that were compared.
     pub pairs: usize,
     /// The last solution changed the facts by less than their standard deviations. Otherwise they
     /// are not to be trusted.
@@ -69,50 +61,35 @@ pub struct Calibration {
     pub proposed: Vec<Fact>,
     /// Mean overlap of the pairs as configured, and with the facts that the drive determines.
     pub overlap: [f64; 2],
-    /// The mounting, by the corrected track.
     pub mounting: Option<Mounting>,
     /// The track as configured, and the one with the proposed facts.
     pub before: Track,
-    /// See [`Self::before`].
     pub after: Track,
 }
 
 impl Calibration {
-    /// Returns the changes of the facts that are corrected.
-    pub fn change(&self) -> FactVector {
-        change_of(&self.facts, &self.proposed)
-    }
-
     /// Returns the mean overlap of the pairs as configured, and with these changes of the facts.
     pub(crate) fn overlap_with(
         &self,
         drive: &Drive,
         change: &FactVector,
     ) -> Result<[f64; 2], CalibrationError> {
-        let (none, after) = (FactVector::zeros(), drive.mean_track_with(change)?);
+        let after = drive.mean_track_with(change)?;
         let pairs = pairs(&self.before, &self.revisits);
-        Ok(overlaps(
-            drive,
-            &pairs,
-            [(&self.before, &none), (&after, change)],
-        ))
+        Ok(overlaps(drive, &pairs, [&self.before, &after]))
     }
 }
 
-fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
-    let mut change = FactVector::zeros();
-    for &fact in corrected {
-        change[fact as usize] = facts[fact as usize].change.value;
-    }
-    change
-}
-
-/// Finds the facts of a drive.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
-    let none = FactVector::zeros();
-    let before = drive.mean_track_with(&none)?;
-    require_motion(drive, &before)?;
-    let revisits = evenly(revisits::find(drive, &before, &none)?, &before);
+    let before = drive.mean_track()?;
+    let path_m = before.path_m().last().copied().unwrap_or_default();
+    if path_m < 100.0 {
+        let scans = drive.sweeps.len();
+        return Err(CalibrationError::Unusable(format!(
+            "{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more, so give a longer recording or a larger --scans"
+        )));
+    }
+    let revisits = evenly(revisits::find(drive, &before)?, &before);
     let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
     let mut facts = solution.facts;
     let mut proposed = solution.determined();
@@ -125,10 +102,13 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         }
         proposed = solution.determined();
     }
-    let change = change_of(&facts, &proposed);
+    let mut change = FactVector::zeros();
+    for &fact in &proposed {
+        change[fact as usize] = facts[fact as usize].change.value;
+    }
     let mut after = drive.mean_track_with(&change)?;
     let pairs = pairs(&before, &revisits);
-    let overlap = overlaps(drive, &pairs, [(&before, &none), (&after, &change)]);
+    let overlap = overlaps(drive, &pairs, [&before, &after]);
     if overlap[1] < overlap[0] {
         proposed.clear();
         after = before.clone();
@@ -160,23 +140,22 @@ impl Solution {
         revisits: &[Revisit],
         free: &[Fact],
     ) -> Result<Self, CalibrationError> {
-        let (mut at, mut change) = (before.clone(), FactVector::zeros());
-        let mut found = round(drive, &at, revisits, &change, free)?;
+        let mut at = before.clone();
+        let mut found = round(drive, &at, revisits, free)?;
         for _ in 1..ROUNDS {
             if found.has_converged() {
                 break;
             }
-            change += found.step();
-            at = drive.mean_track_with(&change)?;
-            found = round(drive, &at, revisits, &change, free)?;
+            at = drive.mean_track_with(&(at.change + found.step()))?;
+            found = round(drive, &at, revisits, free)?;
         }
         let by_drift = match free.contains(&Fact::EccentricityCos) {
-            true => drift_of(drive, &at, revisits, &change)?,
+            true => drift_of(drive, &at, revisits)?,
             false => None,
         };
         Ok(Self {
             free: free.to_vec(),
-            facts: facts(drive, &found, &change, by_drift),
+            facts: facts(drive, &found, &at.change, by_drift),
             round: found,
         })
     }
@@ -191,18 +170,6 @@ impl Solution {
     }
 }
 
-fn require_motion(drive: &Drive, track: &Track) -> Result<(), CalibrationError> {
-    let path_m = track.path_m().last().copied().unwrap_or_default();
-    match path_m < 100.0 {
-        true => Err(CalibrationError::TooShort {
-            scans: drive.sweeps.len(),
-            path_m,
-        }),
-        false => Ok(()),
-    }
-}
-
-/// The solution around one change of the facts.
 struct Round {
     free: Vec<Fact>,
     solved: [Estimate; FACTS],
@@ -229,10 +196,9 @@ fn evenly(mut revisits: Vec<Revisit>, track: &Track) -> Vec<Revisit> {
     revisits.into_iter().step_by(stride).collect()
 }
 
-/// The pairs of scans along a track, and the revisits.
-fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Pair> {
+fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
     let mut pairs = along(track);
-    pairs.extend(revisits.iter().map(Pair::from));
+    pairs.extend_from_slice(revisits);
     pairs
 }
 
@@ -240,20 +206,18 @@ fn round(
     drive: &Drive,
     track: &Track,
     revisits: &[Revisit],
-    change: &FactVector,
     free: &[Fact],
 ) -> Result<Round, CalibrationError> {
-    let system = System::measure(drive, track, &pairs(track, revisits), change);
-    let solved = system.solve(free).ok_or(CalibrationError::Undetermined)?;
-    let unknown = [Estimate {
-        value: 0.0,
-        sigma: f64::INFINITY,
-    }; FACTS];
-    let checked = system.solve(&Fact::ALL).unwrap_or(unknown);
+    let system = System::measure(drive, track, &pairs(track, revisits));
+    let undetermined = || {
+        let reason = "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones";
+        CalibrationError::Unusable(reason.to_owned())
+    };
+    let unknown = [Estimate::UNKNOWN; FACTS];
     Ok(Round {
         free: free.to_vec(),
-        solved,
-        checked,
+        solved: system.solve(free).ok_or_else(undetermined)?,
+        checked: system.solve(&Fact::ALL).unwrap_or(unknown),
         pairs: system.len(),
     })
 }
@@ -264,40 +228,26 @@ fn drift_of(
     drive: &Drive,
     at: &Track,
     revisits: &[Revisit],
-    change: &FactVector,
 ) -> Result<Option<Estimate>, ConfigError> {
     if revisits.len() < MIN_REVISITS {
         return Ok(None);
     }
     let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
-        let mut shifted = *change;
+        let mut shifted = at.change;
         shifted[Fact::EccentricityCos as usize] += by_rad;
         let track = drive.mean_track_with(&shifted)?;
-        Ok(drift::residuals(
-            &track,
-            &aligned(drive, &track, revisits, &shifted),
-        ))
+        Ok(drift::residuals(&track, &aligned(drive, &track, revisits)))
     };
     let slopes = (shifted(DRIFT_STEP_RAD)? - shifted(-DRIFT_STEP_RAD)?) / (2.0 * DRIFT_STEP_RAD);
-    let here = aligned(drive, at, revisits, change);
+    let here = aligned(drive, at, revisits);
     let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
-    let configured = change[Fact::EccentricityCos as usize];
-    Ok(found.map(|found| Estimate {
-        value: found.value + configured,
-        ..found
-    }))
+    let configured = at.change[Fact::EccentricityCos as usize];
+    Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
-/// The revisits with their poses aligned under a change of the facts.
-fn aligned(
-    drive: &Drive,
-    track: &Track,
-    revisits: &[Revisit],
-    change: &FactVector,
-) -> Vec<Revisit> {
-    let pairs: Vec<Pair> = revisits.iter().map(Pair::from).collect();
-    let slopes = slopes(drive, track, &pairs, change);
-    let poses = revisits.iter().zip(slopes);
+/// The revisits with their poses aligned under the facts of a track.
+fn aligned(drive: &Drive, track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
+    let poses = revisits.iter().zip(slopes(drive, track, revisits));
     poses
         .map(|(revisit, slope)| Revisit {
             pose: slope.map_or(revisit.pose, |slope| slope.pose),
@@ -325,10 +275,7 @@ fn facts(
             true => found.solved[k],
             false => found.checked[k],
         };
-        let by_overlap = Estimate {
-            value: solved.value + change[k],
-            sigma: solved.sigma.hypot(floor),
-        };
+        let by_overlap = Estimate::new(solved.value + change[k], solved.sigma.hypot(floor));
         let by_drift = by_drift.filter(|_| fact == Fact::EccentricityCos);
         let change = by_drift.map_or(by_overlap, |by_drift| by_overlap.combined(&by_drift));
         FactEstimate {

@@ -11,9 +11,7 @@ use crate::{
 /// The turn or the distance from one scan to the next, by the radar alone and by another sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
-    /// The stamp of the later scan, ns.
     pub stamp_ns: i64,
-    /// The time between them, ns.
     pub interval_ns: i64,
     /// By the radar, rad or m; `None` where it does not measure it.
     pub radar: Option<f64>,
@@ -40,11 +38,8 @@ pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let turns = turns(&stamps, &steps, &starts);
     let peak = search::nearest(&turns, &log)?;
     let [_, _, delay_s] = Fit::new(&turns, &log, &peak, has_bias)?.parameters;
-    Some(Estimate {
-        // By the turns that a search finds right gyros are up to 0.4 of an interval late.
-        sigma: delay_s.sigma.hypot(0.2 * interval_s),
-        ..delay_s
-    })
+    // By the turns that a search finds right gyros are up to 0.4 of an interval late.
+    Some(delay_s.with_error(0.2 * interval_s))
 }
 
 #[cfg(test)]

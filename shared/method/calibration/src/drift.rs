@@ -44,27 +44,14 @@ pub(crate) fn solve(
     let left = residuals + slopes * value;
     // Residuals larger than the covariance widen it; smaller residuals do not narrow it.
     let excess = left.dot(&factor.solve(&left)) / (left.len().max(2) - 1) as f64;
-    (information > 0.0).then(|| Estimate {
-        value,
-        sigma: (excess.max(1.0) / information).sqrt(),
-    })
+    (information > 0.0).then(|| Estimate::new(value, (excess.max(1.0) / information).sqrt()))
 }
 
 /// The covariance of the residuals: of the motions between and of the alignments.
 fn covariance(track: &Track, revisits: &[Revisit]) -> DMatrix<f64> {
     let count = revisits.len();
     let mut all = DMatrix::zeros(3 * count, 3 * count);
-    let first = revisits
-        .iter()
-        .map(|revisit| revisit.earlier)
-        .min()
-        .unwrap_or(0);
-    let last = revisits
-        .iter()
-        .map(|revisit| revisit.later)
-        .max()
-        .unwrap_or(0);
-    for motion in first + 1..=last {
+    for motion in 1..track.motions.len() {
         let noise = track.motions[motion].covariance;
         let touched: Vec<(usize, Matrix3<f64>)> = revisits
             .iter()

@@ -25,32 +25,26 @@ const DIRECTIONS: usize = 360;
 /// Motion from scan to scan above which the vehicle moves, m.
 const MOVING_M: f64 = 0.5;
 
-/// A scan of the drive.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// Number of the scan in the recording.
     pub number: usize,
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
     /// Time since the scan before, s; 0 where the chain of motions starts.
     pub interval_s: f64,
-    /// The motion that the search found.
     pub searched: Pose,
     /// The points as measured under the configured facts.
     pub points: Vec<SparsePoint>,
-    /// Times of the rows by direction, s.
     row_time_s: Vec<f32>,
 }
 
-/// The scans of a drive.
 pub struct Drive {
     odometry: Odometry,
     config: OdometryConfig,
-    /// The scans in their order.
     pub sweeps: Vec<Sweep>,
     pub(crate) sense: Sign,
+    /// Chirps rise and fall by turns, as the scans report.
     pub(crate) alternates: bool,
-    reflections: OwnReflections,
+    pub(crate) reflections: OwnReflections,
     extractor: PointExtractor,
 }
 
@@ -59,12 +53,11 @@ pub struct Drive {
 pub struct Track {
     /// The poses in the frame of the first scan.
     pub poses: Vec<Pose>,
-    /// The motion to each scan from the one before.
     pub motions: Vec<UncertainMotion>,
-    /// The velocity at each scan.
     pub twists: Vec<Twist>,
-    /// True if the chain of motions starts with a scan.
     starts: Vec<bool>,
+    /// The change of the configured facts.
+    pub(crate) change: FactVector,
 }
 
 impl Drive {
@@ -80,7 +73,6 @@ impl Drive {
         })
     }
 
-    /// Returns the configuration of the odometry.
     pub fn config(&self) -> &OdometryConfig {
         &self.config
     }
@@ -150,18 +142,17 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns whether chirps rise and fall by turns, as the scans report.
-    pub fn alternates(&self) -> bool {
-        self.alternates
+    /// Returns the stamps of the scans, ns, and whether the chain of motions starts with each.
+    pub(crate) fn stamps(&self) -> (Vec<i64>, Vec<bool>) {
+        let stamps = self.sweeps.iter().map(|sweep| sweep.stamp_ns);
+        (stamps.collect(), self.starts())
     }
 
-    /// Returns the reflections of the vehicle itself in the scans.
-    pub fn reflections(&self) -> &OwnReflections {
-        &self.reflections
+    fn starts(&self) -> Vec<bool> {
+        self.sweeps.iter().map(|it| it.interval_s <= 0.0).collect()
     }
 
-    /// Returns the points of a scan under changed facts.
-    pub fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
+    pub(crate) fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
         let points = self.sweeps[scan].points.iter();
         points
             .map(|point| correct(point, change, self.sense, self.alternates))
@@ -175,7 +166,6 @@ impl Drive {
         self.sweeps[scan].row_time_s[direction.min(DIRECTIONS - 1)].into()
     }
 
-    /// Returns the mean of the tracks in both directions of time, as configured.
     pub fn mean_track(&self) -> Result<Track, ConfigError> {
         self.mean_track_with(&FactVector::zeros())
     }
@@ -188,17 +178,13 @@ impl Drive {
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.
-    pub fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
+    fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
         let mut motions = vec![UncertainMotion::identity(); count];
-        let order: Vec<usize> = if reversed {
-            (0..count).rev().collect()
-        } else {
-            (0..count).collect()
-        };
         let mut earlier: Option<(usize, Vec<SparsePoint>)> = None;
-        for (number, &scan) in order.iter().enumerate() {
+        for number in 0..count {
+            let scan = if reversed { count - 1 - number } else { number };
             let mut points = self.points(scan, change);
             if reversed {
                 points.iter_mut().for_each(|point| {
@@ -212,10 +198,9 @@ impl Drive {
                 if sweep.interval_s <= 0.0 {
                     refiner.reset();
                 } else {
-                    let searched = if reversed {
-                        sweep.searched.inverse()
-                    } else {
-                        sweep.searched
+                    let searched = match reversed {
+                        true => sweep.searched.inverse(),
+                        false => sweep.searched,
                     };
                     let refined =
                         refiner.refine(number as u64, &points, from, &searched, sweep.interval_s);
@@ -227,12 +212,12 @@ impl Drive {
             }
             earlier = Some((scan, points));
         }
-        Ok(Track::new(motions, self))
+        Ok(Track::new(motions, self, *change))
     }
 }
 
 impl Track {
-    fn new(motions: Vec<UncertainMotion>, drive: &Drive) -> Self {
+    fn new(motions: Vec<UncertainMotion>, drive: &Drive, change: FactVector) -> Self {
         let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
         for motion in &motions {
             let before = poses.last().copied().unwrap_or_else(Pose::identity);
@@ -243,47 +228,36 @@ impl Track {
         let twists = (0..poses.len())
             .map(|scan| twist_at(&poses, drive, scan))
             .collect();
-        let starts = drive
-            .sweeps
-            .iter()
-            .map(|sweep| sweep.interval_s <= 0.0)
-            .collect();
+        let starts = drive.starts();
         Self {
             poses,
             motions,
             twists,
             starts,
+            change,
         }
     }
 
-    /// Returns the path up to each scan, m.
     pub fn path_m(&self) -> Vec<f64> {
         let mut path_m = 0.0;
-        let steps = self
-            .motions
-            .iter()
-            .map(|motion| motion.motion.translation.vector.norm());
-        steps
-            .map(|step| {
-                path_m += step;
-                path_m
-            })
-            .collect()
+        let up_to = |motion: &UncertainMotion| {
+            path_m += motion.motion.translation.vector.norm();
+            path_m
+        };
+        self.motions.iter().map(up_to).collect()
     }
 
-    /// Returns whether the chain of motions restarts between two scans.
     pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
         self.starts[earlier + 1..=later].contains(&true)
     }
 
-    /// Returns the mean of two tracks of one drive, motion by motion.
-    pub fn mean(&self, other: &Self, drive: &Drive) -> Self {
+    fn mean(&self, other: &Self, drive: &Drive) -> Self {
         let motions = self.motions.iter().zip(&other.motions);
         let motions = motions.map(|(a, b)| UncertainMotion {
             motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
             covariance: a.covariance,
         });
-        Self::new(motions.collect(), drive)
+        Self::new(motions.collect(), drive, self.change)
     }
 }
 

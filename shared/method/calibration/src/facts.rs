@@ -9,7 +9,6 @@ pub const FACTS: usize = 5;
 /// One number for each [`Fact`].
 pub type FactVector = SVector<f64, FACTS>;
 
-/// A square matrix over the facts.
 pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 
 /// A fact that moves the points of a scan.
@@ -29,7 +28,6 @@ pub enum Fact {
 }
 
 impl Fact {
-    /// All facts in the order of [`FactVector`].
     pub const ALL: [Self; FACTS] = [
         Self::RangeOffset,
         Self::EccentricityCos,
@@ -41,22 +39,12 @@ impl Fact {
     /// Returns the standard deviation above which a drive adds nothing to the prior knowledge about
     /// any radar. Of facts that only confirm it is 0.
     pub fn useful_sigma(self) -> f64 {
-        match self {
-            Self::RangeOffset => 0.2,
-            Self::EccentricityCos => 0.6e-3,
-            Self::Doppler => 0.01,
-            Self::EccentricitySin | Self::RowTime => 0.0,
-        }
+        [0.2, 0.6e-3, 0.0, 0.01, 0.0][self as usize]
     }
 
     /// Returns a small change of the fact, for derivatives.
     pub fn step(self) -> f64 {
-        match self {
-            Self::RangeOffset => 0.05,
-            Self::EccentricityCos | Self::EccentricitySin => 1e-3,
-            Self::Doppler => 0.01,
-            Self::RowTime => 0.05,
-        }
+        [0.05, 1e-3, 1e-3, 0.01, 0.05][self as usize]
     }
 }
 
@@ -64,7 +52,6 @@ impl Fact {
 pub(crate) type Sign = f64;
 
 /// Moves a point as measured to where it is measured once the facts are corrected by `change`.
-///
 /// `chirp` is 1, or where chirps alternate the sign of this point's.
 pub(crate) fn correct(
     point: &SparsePoint,
@@ -92,10 +79,7 @@ pub(crate) fn correct(
 }
 
 /// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows,
-/// one column for each fact.
-///
-/// `seen` is the point in that frame, `time_s` the time of its row and `chirp` the sign of its
-/// Doppler shift.
+/// one column for each fact. `time_s` is the time of its row, `chirp` the sign of its Doppler shift.
 pub(crate) fn displacements(
     seen: Vector2<f64>,
     time_s: f64,

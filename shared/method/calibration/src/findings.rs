@@ -13,7 +13,7 @@ use crate::{
     calibrate::SOLVED,
 };
 pub use constant::Constant;
-use constant::{constant, resolution};
+use constant::{Label, constant, resolution};
 
 /// The configuration of the drive before it is calibrated.
 pub struct Configured {
@@ -27,12 +27,21 @@ pub struct Configured {
     pub distance_m: Option<f64>,
 }
 
-/// A configured value that is off by so many standard deviations is wrong.
-const WRONG_SIGMAS: f64 = 3.0;
+/// The key in `[dataset]`, the name, the unit for printing and the factor to it of each constant in
+/// the order of [`SOLVED`].
+const LABELS: [Label; SOLVED.len()] = [
+    ("range_offset_m", "range offset", "m", 1.0),
+    (
+        "azimuth_eccentricity_rad",
+        "encoder eccentricity",
+        "mrad",
+        1e3,
+    ),
+    ("doppler_s", "Doppler shift", "s", 1.0),
+];
 
 pub struct Found {
     pub scans: usize,
-    /// Length of the path, m.
     pub path_m: f64,
     has_settled: bool,
     /// Mean overlap of scans of one place as configured, and with the drive's findings.
@@ -54,53 +63,31 @@ impl Found {
         calibration: &Calibration,
         configured: &Configured,
     ) -> Result<Self, CalibrationError> {
-        let path_m = calibration
-            .after
-            .path_m()
-            .last()
-            .copied()
-            .unwrap_or_default();
+        let path_m = calibration.after.path_m().last().copied();
+        let path_m = path_m.unwrap_or_default();
         let geometry = &configured.geometry;
         // If the scans contain the direction of chirps, its sign is the chirp's.
-        let doppler_s = match (drive.alternates(), f64::from(geometry.doppler_s)) {
+        let doppler_s = match (drive.alternates, f64::from(geometry.doppler_s)) {
             (true, configured) => configured.abs(),
             (false, configured) => configured,
         };
-        let fact = |fact: Fact| &calibration.facts[fact as usize];
-        let constants = vec![
-            constant(
-                "range_offset_m",
-                "range offset",
-                ("m", 1.0),
-                geometry.range_offset_m.into(),
-                fact(Fact::RangeOffset),
-                calibration,
-            ),
-            constant(
-                "azimuth_eccentricity_rad",
-                "encoder eccentricity",
-                ("mrad", 1e3),
-                configured.eccentricity_rad,
-                fact(Fact::EccentricityCos),
-                calibration,
-            ),
-            constant(
-                "doppler_s",
-                "Doppler shift",
-                ("s", 1.0),
-                doppler_s,
-                fact(Fact::Doppler),
-                calibration,
-            ),
+        let values: [f64; 3] = [
+            geometry.range_offset_m.into(),
+            configured.eccentricity_rad,
+            doppler_s,
         ];
+        let constants = (0..SOLVED.len()).map(|k| {
+            let fact = &calibration.facts[SOLVED[k] as usize];
+            constant(LABELS[k], values[k], fact, calibration)
+        });
         Ok(Self {
             scans: drive.sweeps.len(),
             path_m,
             has_settled: calibration.has_settled,
             overlap: calibration.overlap,
-            constants,
+            constants: constants.collect(),
             resolution: resolution(path_m, configured)?,
-            min_range_m: drive.reflections().min_range_m(configured.min_range_m),
+            min_range_m: drive.reflections.min_range_m(configured.min_range_m),
             others: others(drive, calibration, configured),
         })
     }
@@ -125,7 +112,6 @@ impl Found {
         }
     }
 
-    /// Returns the changes of the facts that are proposed.
     pub(crate) fn change(&self) -> FactVector {
         let mut change = FactVector::zeros();
         for (fact, constant) in SOLVED.into_iter().zip(&self.constants) {
@@ -147,7 +133,6 @@ impl Found {
         self
     }
 
-    /// Returns the constants that are written.
     pub fn proposed(&self) -> impl Iterator<Item = &Constant> {
         let solved = self
             .constants
@@ -194,10 +179,9 @@ fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> 
              it moves each pose along the path",
                 1.0 + row_time.value,
                 row_time.sigma,
-                if (row_time.value).abs() > WRONG_SIGMAS * row_time.sigma {
-                    ", which contradicts them"
-                } else {
-                    ""
+                match row_time.contradicts(0.0) {
+                    true => ", which contradicts them",
+                    false => "",
                 }
             ),
         ],
@@ -250,7 +234,7 @@ fn mounting(mounting: &Mounting) -> String {
 }
 
 fn reflections(drive: &Drive, configured: &Configured) -> String {
-    let own = drive.reflections();
+    let own = &drive.reflections;
     match (own.end_m(), own.min_range_m(configured.min_range_m)) {
         (None, _) => "too few moving scans to tell them".to_owned(),
         (Some(end_m), _) if end_m >= OwnReflections::REACH_M => format!(

@@ -1,28 +1,10 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
 //! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
-//! So two scans of one place from different poses cannot coincide, whatever their relative pose:
-//! the slope of their overlap by each constant, at the relative pose that is best for it, shows the
-//! direction of the right one. Wrong constants also make the track drift, and a road that is driven
-//! twice lies twice. Both are residuals of the constants, and [`calibrate`] solves them.
-//!
-//! Reading order:
-//! - [`Fact`]: the constants, and the fields of displacements;
-//! - [`Drive`]: the scans as points; [`Track`]: the poses by odometry in both directions of time;
-//! - `pair`, `image`: two scans with their relative pose and the slope of their overlap;
-//! - `overlap`: all pairs of a drive, solved for the constants, with the jackknife over blocks of
-//!   the drive;
-//! - `revisits`, `drift`: places that are seen again, and the conclusions from the drift between
-//!   them about the eccentricity;
-//! - [`calibrate`]: the method;
-//! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
-//! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
-//!   section of a configuration; [`svg`]: a place seen twice, before and after;
-//! - [`calibrate_gyro`], [`calibrate_wheels`]: the clock and the axes of a gyro, the clock and the
-//!   scale of the wheels, by the same track; [`delay()`]: the clock of either, by the motions of a
-//!   run;
-//! - [`Study`]: a drive with all these results, and the joint conclusion from several drives of one
-//!   radar.
+//! So two scans of one place from different poses cannot coincide: the slope of their overlap by each
+//! constant, at the relative pose that is best for it, shows the direction of the right one. Wrong
+//! constants also make the track drift. [`calibrate`] solves both; [`calibrate_gyro`] and
+//! [`calibrate_wheels`] find the clocks of the other sensors by the same track.
 
 mod calibrate;
 mod delay;
@@ -49,24 +31,53 @@ pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
 pub use findings::{Configured, Found};
-pub use gyro::{GyroCalibration, GyroError, calibrate_gyro};
+pub use gyro::{ClockError, GyroCalibration, calibrate_gyro};
 pub use mounting::Mounting;
 pub use own_reflections::OwnReflections;
 pub use picture::svg;
 pub use revisits::Revisit;
 pub use section::toml;
 pub use study::Study;
-pub use wheels::{WheelCalibration, WheelError, calibrate_wheels};
+pub use wheels::{WheelCalibration, calibrate_wheels};
+
+use nalgebra::SVector;
+
+/// A configured value that is off by so many standard deviations is wrong.
+const WRONG_SIGMAS: f64 = 3.0;
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// The standard deviation.
     pub sigma: f64,
 }
 
 impl Estimate {
+    pub(crate) const UNKNOWN: Self = Self::new(0.0, f64::INFINITY);
+
+    pub(crate) const fn new(value: f64, sigma: f64) -> Self {
+        Self { value, sigma }
+    }
+
+    /// Returns the estimate with an independent error added, of this standard deviation.
+    pub(crate) fn with_error(self, sigma: f64) -> Self {
+        Self::new(self.value, self.sigma.hypot(sigma))
+    }
+
+    pub(crate) fn contradicts(&self, configured: f64) -> bool {
+        (configured - self.value).abs() > WRONG_SIGMAS * self.sigma
+    }
+
+    pub(crate) fn verdict(&self, configured: Option<f64>) -> String {
+        let Some(value) = configured else {
+            return String::new();
+        };
+        match self.contradicts(value) {
+            true => format!(", configured {value:.4}: CONTRADICTS the configured value"),
+            false => format!(", configured {value:.4}: agrees with the configured value"),
+        }
+    }
+
     /// Returns the mean of two independent estimates, weighted by their information. If the
     /// difference exceeds their standard deviations, the standard deviation of the mean is larger
     /// accordingly.
@@ -81,25 +92,35 @@ impl Estimate {
     }
 }
 
+/// Blocks of the drive for the jackknife.
+pub(crate) const BLOCKS: usize = 12;
+
+/// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block of
+/// the drive.
+pub(crate) fn jackknife<const N: usize>(
+    solve: impl Fn(Option<usize>) -> Option<SVector<f64, N>>,
+) -> Option<[Estimate; N]> {
+    let all = solve(None)?;
+    let mut variance = SVector::<f64, N>::zeros();
+    for block in 0..BLOCKS {
+        let apart = solve(Some(block))? - all;
+        variance += apart.component_mul(&apart);
+    }
+    let share = (BLOCKS - 1) as f64 / BLOCKS as f64;
+    let estimate = |k: usize| Estimate::new(all[k], (share * variance[k]).sqrt());
+    Some(std::array::from_fn(estimate))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn estimates_that_contradict_each_other_give_a_wider_one() {
-        let near = Estimate {
-            value: 1.0,
-            sigma: 0.1,
-        };
-        let agreeing = near.combined(&Estimate {
-            value: 1.1,
-            sigma: 0.1,
-        });
+        let near = Estimate::new(1.0, 0.1);
+        let agreeing = near.combined(&Estimate::new(1.1, 0.1));
         assert!((agreeing.value - 1.05).abs() < 1e-9 && agreeing.sigma < 0.08);
-        let contradicting = near.combined(&Estimate {
-            value: 2.0,
-            sigma: 0.1,
-        });
+        let contradicting = near.combined(&Estimate::new(2.0, 0.1));
         assert!((contradicting.value - 1.5).abs() < 1e-9 && contradicting.sigma > 0.4);
     }
 }

@@ -3,14 +3,13 @@
 use gyre_geometry::Twist;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::Estimate;
+use crate::{BLOCKS, Estimate, jackknife};
 
 /// Slower scans contribute little, m/s.
 const MIN_SPEED_MPS: f64 = 3.0;
 /// Directions of motion farther from straight ahead are no driving, rad.
 const MAX_SLIP_RAD: f64 = 0.5;
 const MIN_SCANS: usize = 30;
-const BLOCKS: usize = 12;
 
 /// The mounting of the radar, from the direction of motion in its frame: yaw + curvature x distance
 /// ahead of the rear axle.
@@ -29,42 +28,32 @@ impl Mounting {
         let rows: Vec<[f64; 2]> = twists
             .iter()
             .filter(|twist| twist.speed_mps() > MIN_SPEED_MPS)
-            .map(|twist| {
+            .map(|it| {
                 [
-                    twist.yaw_rate_radps / twist.speed_mps(),
-                    twist.vy_mps.atan2(twist.vx_mps),
+                    it.yaw_rate_radps / it.speed_mps(),
+                    it.vy_mps.atan2(it.vx_mps),
                 ]
             })
             .filter(|[_, slip_rad]| slip_rad.abs() < MAX_SLIP_RAD)
             .collect();
-        let all = fit(rows.iter()).filter(|_| rows.len() >= MIN_SCANS)?;
-        let mut variance = Vector2::zeros();
-        for block in 0..BLOCKS {
-            let kept = rows
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| k * BLOCKS / rows.len() != block);
-            let apart = fit(kept.map(|(_, row)| row))? - all;
-            variance += apart.component_mul(&apart);
+        let count = rows.len();
+        if count < MIN_SCANS {
+            return None;
         }
-        let sigma = (variance * ((BLOCKS - 1) as f64 / BLOCKS as f64)).map(f64::sqrt);
+        let [slip_rad, ahead_m] = jackknife(|left_out| {
+            let rows = rows.iter().enumerate();
+            fit(rows.filter(|(k, _)| Some(k * BLOCKS / count) != left_out))
+        })?;
         // The vehicle's straight ahead lies at the fitted direction in the radar's frame.
-        let yaw_rad = Estimate {
-            value: -all.x,
-            sigma: sigma.x,
-        };
-        let ahead_m = Estimate {
-            value: all.y,
-            sigma: sigma.y,
-        };
+        let yaw_rad = Estimate::new(-slip_rad.value, slip_rad.sigma);
         Some(Self { yaw_rad, ahead_m })
     }
 }
 
 /// The least-squares line through (curvature, direction).
-fn fit<'a>(rows: impl Iterator<Item = &'a [f64; 2]>) -> Option<Vector2<f64>> {
+fn fit<'a>(rows: impl Iterator<Item = (usize, &'a [f64; 2])>) -> Option<Vector2<f64>> {
     let (mut normal, mut side) = (Matrix2::zeros(), Vector2::zeros());
-    for [curvature, slip_rad] in rows {
+    for (_, [curvature, slip_rad]) in rows {
         let row = Vector2::new(1.0, *curvature);
         normal += row * row.transpose();
         side += row * *slip_rad;

@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 use std::thread;
 
 use crate::{
-    Drive, Estimate, Fact, FactMatrix, FactVector, Revisit, Track,
+    BLOCKS, Drive, Estimate, Fact, FactMatrix, FactVector, Revisit, Track,
     facts::FACTS,
+    jackknife,
     pair::{PairSlope, View, compare},
 };
 
@@ -19,20 +20,8 @@ const SPACING_M: f64 = 2.5;
 const MAX_PAIRS: usize = 1200;
 /// Views that a thread keeps: the scans within the longest baseline.
 const VIEWS: usize = 24;
-/// Blocks of the drive for the jackknife.
-const BLOCKS: usize = 12;
 
-/// Two scans of one place.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pair {
-    pub later: usize,
-    pub earlier: usize,
-    /// The pose of the later scan in the frame of the earlier one.
-    pub pose: gyre_geometry::Pose,
-}
-
-/// Returns pairs of scans along the path.
-pub(crate) fn along(track: &Track) -> Vec<Pair> {
+pub(crate) fn along(track: &Track) -> Vec<Revisit> {
     let path_m = track.path_m();
     let length_m = path_m.last().copied().unwrap_or_default();
     let spacing_m = SPACING_M.max(length_m * BASELINES_M.len() as f64 / MAX_PAIRS as f64);
@@ -49,7 +38,7 @@ pub(crate) fn along(track: &Track) -> Vec<Pair> {
             let earlier = path_m.partition_point(|there_m| *there_m < here_m - baseline_m);
             if earlier < later && !track.is_broken(earlier, later) {
                 let pose = track.poses[earlier].inv_mul(&track.poses[later]);
-                pairs.push(Pair {
+                pairs.push(Revisit {
                     later,
                     earlier,
                     pose,
@@ -60,27 +49,12 @@ pub(crate) fn along(track: &Track) -> Vec<Pair> {
     pairs
 }
 
-impl From<&Revisit> for Pair {
-    fn from(revisit: &Revisit) -> Self {
-        Self {
-            later: revisit.later,
-            earlier: revisit.earlier,
-            pose: revisit.pose,
-        }
-    }
-}
-
-/// The slopes of all pairs under one change of the facts; `None` for a pair that is not determined.
-pub(crate) fn slopes(
-    drive: &Drive,
-    track: &Track,
-    pairs: &[Pair],
-    change: &FactVector,
-) -> Vec<Option<PairSlope>> {
+/// The slopes of all pairs under the facts of a track; `None` for a pair that is not determined.
+pub(crate) fn slopes(drive: &Drive, track: &Track, pairs: &[Revisit]) -> Vec<Option<PairSlope>> {
     let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let share = pairs.len().div_ceil(threads).max(1);
     thread::scope(|scope| {
-        let of = |pairs| move || slopes_of(drive, track, pairs, change);
+        let of = |pairs| move || slopes_of(drive, track, pairs);
         let workers: Vec<_> = pairs
             .chunks(share)
             .map(|pairs| scope.spawn(of(pairs)))
@@ -92,12 +66,7 @@ pub(crate) fn slopes(
     })
 }
 
-fn slopes_of(
-    drive: &Drive,
-    track: &Track,
-    pairs: &[Pair],
-    change: &FactVector,
-) -> Vec<Option<PairSlope>> {
+fn slopes_of(drive: &Drive, track: &Track, pairs: &[Revisit]) -> Vec<Option<PairSlope>> {
     let mut views = BTreeMap::new();
     let mut slopes = Vec::with_capacity(pairs.len());
     for pair in pairs {
@@ -105,28 +74,22 @@ fn slopes_of(
             views.pop_first();
         }
         for scan in [pair.later, pair.earlier] {
-            let view = || View::new(drive, scan, change, &track.twists[scan]);
+            let view = || View::new(drive, scan, track);
             views.entry(scan).or_insert_with(view);
         }
-        slopes.push(compare(
-            drive,
-            &views[&pair.later],
-            &views[&pair.earlier],
-            &pair.pose,
-        ));
+        let [later, earlier] = [pair.later, pair.earlier].map(|scan| &views[&scan]);
+        slopes.push(compare(drive, later, earlier, &pair.pose));
     }
     slopes
 }
 
-/// Returns the mean overlap of the same pairs of scans under several tracks with their changes of
-/// the facts.
+/// Returns the mean overlap of the same pairs of scans under several tracks with their facts.
 pub(crate) fn overlaps<const N: usize>(
     drive: &Drive,
-    pairs: &[Pair],
-    tracks: [(&Track, &FactVector); N],
+    pairs: &[Revisit],
+    tracks: [&Track; N],
 ) -> [f64; N] {
-    let of = |(track, change): (&Track, &FactVector)| slopes(drive, track, pairs, change);
-    let all = tracks.map(of);
+    let all = tracks.map(|track| slopes(drive, track, pairs));
     // A pair that one of them does not determine would count for the others alone.
     let common: Vec<usize> = (0..pairs.len())
         .filter(|&pair| all.iter().all(|slopes| slopes[pair].is_some()))
@@ -145,17 +108,17 @@ pub(crate) struct System {
 }
 
 impl System {
-    /// Measures the slopes at a change of the facts, and one step of each fact from there.
-    pub fn measure(drive: &Drive, track: &Track, pairs: &[Pair], change: &FactVector) -> Self {
-        let here = slopes(drive, track, pairs, change);
+    /// Measures the slopes under the facts of a track, and one step of each fact from there.
+    pub fn measure(drive: &Drive, track: &Track, pairs: &[Revisit]) -> Self {
+        let here = slopes(drive, track, pairs);
         let mut rows: Vec<_> = here
             .iter()
             .map(|slope| slope.map(|slope| (slope.slope, FactMatrix::zeros())))
             .collect();
         for fact in Fact::ALL {
-            let mut stepped = *change;
-            stepped[fact as usize] += fact.step();
-            for (row, there) in rows.iter_mut().zip(slopes(drive, track, pairs, &stepped)) {
+            let mut stepped = track.clone();
+            stepped.change[fact as usize] += fact.step();
+            for (row, there) in rows.iter_mut().zip(slopes(drive, &stepped, pairs)) {
                 *row = row
                     .take()
                     .zip(there)
@@ -176,7 +139,6 @@ impl System {
         }
     }
 
-    /// Returns the number of pairs.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
@@ -185,17 +147,7 @@ impl System {
     /// deviations by the jackknife over blocks of the drive; the facts that are not in `free` keep
     /// their values. `None` if the pairs do not determine them.
     pub fn solve(&self, free: &[Fact]) -> Option<[Estimate; FACTS]> {
-        let value = self.solve_without(free, None)?;
-        let mut variance = FactVector::zeros();
-        for block in 0..BLOCKS {
-            let apart = self.solve_without(free, Some(block))? - value;
-            variance += apart.component_mul(&apart);
-        }
-        let scale = (BLOCKS - 1) as f64 / BLOCKS as f64;
-        Some(std::array::from_fn(|k| Estimate {
-            value: value[k],
-            sigma: (scale * variance[k]).sqrt(),
-        }))
+        jackknife(|left_out| self.solve_without(free, left_out))
     }
 
     fn solve_without(&self, free: &[Fact], left_out: Option<usize>) -> Option<FactVector> {

@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 
 use gyre_radar::PolarScan;
 
-/// Depth of a cell, m.
 const CELL_M: f64 = 0.25;
 const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;
 const SECTORS: usize = 90;
@@ -13,7 +12,6 @@ const SECTORS: usize = 90;
 const SHARE: f64 = 0.9;
 const MIN_SCANS: usize = 50;
 
-/// Counts the scans with power in each cell around the vehicle.
 #[derive(Clone, Debug)]
 pub struct OwnReflections {
     counts: Vec<usize>,

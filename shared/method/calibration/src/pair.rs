@@ -4,7 +4,7 @@ use gyre_geometry::{Pose, Twist};
 use nalgebra::{Matrix3, Rotation2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::{
-    drive::Drive,
+    drive::{Drive, Track},
     facts::{FACTS, FactVector, displacements},
     image::Image,
 };
@@ -39,23 +39,22 @@ pub(crate) struct PairSlope {
     /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are
     /// right it vanishes.
     pub slope: FactVector,
-    /// The overlap, from 0 to 1.
     pub overlap: f64,
 }
 
 impl View {
-    pub fn new(drive: &Drive, scan: usize, change: &FactVector, twist: &Twist) -> Self {
-        let points = drive.points(scan, change);
+    pub fn new(drive: &Drive, scan: usize, track: &Track) -> Self {
+        let points = drive.points(scan, &track.change);
+        let twist = &track.twists[scan];
         let refinement = &drive.config().refinement;
         let points: Vec<Seen> = points
             .iter()
             .filter(|point| point.weight > 0.0)
             .map(|point| {
                 let at = point.deskewed(twist).coords;
-                let chirp = if drive.alternates {
-                    f64::from(point.doppler_s).signum()
-                } else {
-                    1.0
+                let chirp = match drive.alternates {
+                    true => f64::from(point.doppler_s).signum(),
+                    false => 1.0,
                 };
                 Seen {
                     at,
@@ -70,11 +69,7 @@ impl View {
             let drawn: Vec<[f64; 3]> = drawn.map(|p| [p.at.x, p.at.y, p.weight]).collect();
             Image::draw(&drawn, refinement.cell_m, refinement.reach_m)
         };
-        let chirps: &[f64] = if drive.alternates {
-            &[1.0, -1.0]
-        } else {
-            &[1.0]
-        };
+        let chirps = &[1.0, -1.0][..1 + usize::from(drive.alternates)];
         Self {
             scan,
             twist: *twist,
@@ -92,12 +87,6 @@ impl View {
             [_, falling] => (falling, -1.0),
             images => (&images[0], 1.0),
         }
-    }
-
-    /// Returns the displacement by the facts of what lies at a place in this view.
-    fn displacement(&self, drive: &Drive, at: Vector2<f64>, chirp: f64) -> Displacement {
-        let time_s = drive.row_time_s(self.scan, at);
-        displacements(at, time_s, chirp, &self.twist, drive.sense)
     }
 }
 
@@ -154,56 +143,51 @@ fn sum(drive: &Drive, a: &View, b: &View, pose: &Pose, facts: bool) -> Sums {
     for point in &a.points {
         let turned = rotation * point.at;
         let at = turned + translation;
-        sums.weight += point.weight;
-        let (image, chirp) = b.image_for(point);
-        let Some(reading) = image.read(at) else {
-            sums.cost += point.weight;
-            continue;
-        };
         let along =
             SMatrix::<f64, 2, 3>::from_columns(&[Vector2::x(), Vector2::y(), quarter(turned)]);
-        let missing = sums.add(point.weight, reading.value, reading.slope, &along);
-        if facts {
-            let relative = rotation * point.displacement - b.displacement(drive, at, chirp);
-            sums.slope += relative.transpose() * reading.slope * (point.weight * missing);
-        }
+        sums.add(drive, point, b, at, &along, facts.then_some(&rotation));
     }
     let back = rotation.inverse();
     for point in &b.points {
         let at = back * (point.at - translation);
-        sums.weight += point.weight;
-        let (image, chirp) = a.image_for(point);
-        let Some(reading) = image.read(at) else {
-            sums.cost += point.weight;
-            continue;
-        };
         let along = SMatrix::<f64, 2, 3>::from_columns(&[
             -(back * Vector2::x()),
             -(back * Vector2::y()),
             -quarter(at),
         ]);
-        let missing = sums.add(point.weight, reading.value, reading.slope, &along);
-        if facts {
-            let relative = back * point.displacement - a.displacement(drive, at, chirp);
-            sums.slope += relative.transpose() * reading.slope * (point.weight * missing);
-        }
+        sums.add(drive, point, a, at, &along, facts.then_some(&back));
     }
     sums
 }
 
 impl Sums {
+    /// Adds a point that lies `at` a place of a view and moves `along`; with its `turn` into the
+    /// view also the slopes by the facts.
     fn add(
         &mut self,
-        weight: f64,
-        value: f64,
-        slope: Vector2<f64>,
+        drive: &Drive,
+        point: &Seen,
+        view: &View,
+        at: Vector2<f64>,
         along: &SMatrix<f64, 2, 3>,
-    ) -> f64 {
-        let missing = 1.0 - value;
-        let j: SVector<f64, 3> = along.transpose() * slope;
-        self.cost += weight * missing * missing;
-        self.gradient += j * (weight * missing);
-        self.information += j * j.transpose() * weight;
-        missing
+        turn: Option<&Rotation2<f64>>,
+    ) {
+        self.weight += point.weight;
+        let (image, chirp) = view.image_for(point);
+        let Some(reading) = image.read(at) else {
+            self.cost += point.weight;
+            return;
+        };
+        let missing = 1.0 - reading.value;
+        let j: SVector<f64, 3> = along.transpose() * reading.slope;
+        self.cost += point.weight * missing * missing;
+        self.gradient += j * (point.weight * missing);
+        self.information += j * j.transpose() * point.weight;
+        if let Some(turn) = turn {
+            let time_s = drive.row_time_s(view.scan, at);
+            let displaced = displacements(at, time_s, chirp, &view.twist, drive.sense);
+            let relative = *turn * point.displacement - displaced;
+            self.slope += relative.transpose() * reading.slope * (point.weight * missing);
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use gyre_geometry::Pose;
 
-use crate::{Calibration, Drive, FactVector, Track};
+use crate::{Calibration, Drive, Track};
 
 /// Side of a panel, px, and its reach, m.
 const SIDE: f64 = 560.0;
@@ -12,7 +12,6 @@ const REACH_M: f64 = 60.0;
 const HEADER: f64 = 56.0;
 /// Scans to each side of the two that are drawn with them.
 const AROUND: usize = 2;
-/// Fainter points are left out.
 const MIN_WEIGHT: f32 = 0.3;
 
 pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
@@ -26,16 +25,15 @@ pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
         drive.sweeps[later].number,
         2.0 * REACH_M
     );
-    let none = FactVector::zeros();
     let found = match calibration.proposed.is_empty() {
         true => "nothing is proposed: as configured",
         false => "as proposed",
     };
     let panels = [
-        ("as configured", &calibration.before, none),
-        (found, &calibration.after, calibration.change()),
+        ("as configured", &calibration.before),
+        (found, &calibration.after),
     ];
-    for (k, (name, track, change)) in panels.into_iter().enumerate() {
+    for (k, (name, track)) in panels.into_iter().enumerate() {
         let left = 16.0 + k as f64 * (SIDE + 16.0);
         let base = track.poses[earlier];
         let _ = writeln!(
@@ -48,7 +46,7 @@ pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
             2.0 * REACH_M
         );
         for (scan, colour) in [(earlier, "#0062b2"), (later, "#d55e00")] {
-            let path = points(drive, track, &base, scan, &change);
+            let path = points(drive, track, &base, scan);
             let _ = writeln!(
                 text,
                 "<path d=\"{path}\" stroke=\"{colour}\" stroke-width=\"0.3\" stroke-linecap=\"round\" stroke-opacity=\"0.5\"/>"
@@ -74,13 +72,13 @@ fn scans(calibration: &Calibration) -> (usize, usize) {
 }
 
 /// The points of the scans around one, as dots of a path, in the frame of `base`, ahead upwards.
-fn points(drive: &Drive, track: &Track, base: &Pose, scan: usize, change: &FactVector) -> String {
+fn points(drive: &Drive, track: &Track, base: &Pose, scan: usize) -> String {
     let mut path = String::new();
     let last = track.poses.len() - 1;
     for scan in scan.saturating_sub(AROUND)..=(scan + AROUND).min(last) {
         let (pose, twist) = (base.inv_mul(&track.poses[scan]), &track.twists[scan]);
         for point in drive
-            .points(scan, change)
+            .points(scan, &track.change)
             .iter()
             .filter(|point| point.weight > MIN_WEIGHT)
         {

@@ -2,18 +2,16 @@
 
 use std::convert::Infallible;
 
-use gyre_geometry::{OdometryMotion, Pose, SparsePoint, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, UncertainMotion};
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose,
+    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, SUBMAP_REACH_M, ScanPose,
 };
 
-use crate::{CalibrationError, Drive, Track, facts::FactVector};
+use crate::{CalibrationError, Drive, Track};
 
-/// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Revisit {
     pub later: usize,
-    /// The earlier scan.
     pub earlier: usize,
     /// The pose of the later scan in the frame of the earlier one.
     pub pose: Pose,
@@ -29,16 +27,10 @@ impl KeyframeSource for &Keyframes {
     }
 }
 
-/// Finds the revisits of a drive along its track.
-pub fn find(
-    drive: &Drive,
-    track: &Track,
-    change: &FactVector,
-) -> Result<Vec<Revisit>, CalibrationError> {
-    let options = LoopOptions::default();
-    let keyframes = Keyframes(keyframes(drive, track, change));
+pub fn find(drive: &Drive, track: &Track) -> Result<Vec<Revisit>, CalibrationError> {
+    let keyframes = Keyframes(keyframes(drive, track));
     let config = drive.config();
-    let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
+    let mut closer = LoopCloser::new(SUBMAP_REACH_M, &config.refinement, config.points.capacity)?;
     for keyframe in &keyframes.0 {
         closer.push(keyframe).map_err(ClosingError::from)?;
     }
@@ -58,7 +50,7 @@ pub fn find(
     Ok(found)
 }
 
-fn keyframes(drive: &Drive, track: &Track, change: &FactVector) -> Vec<Keyframe> {
+fn keyframes(drive: &Drive, track: &Track) -> Vec<Keyframe> {
     let mut builder = KeyframeBuilder::default();
     let mut pose = UncertainMotion::identity();
     let mut keyframes = Vec::new();
@@ -74,8 +66,7 @@ fn keyframes(drive: &Drive, track: &Track, change: &FactVector) -> Vec<Keyframe>
             interval_s: sweep.interval_s,
         });
         if let Some(mut keyframe) = made {
-            let points: Vec<SparsePoint> = drive.points(scan, change);
-            keyframe.points = points;
+            keyframe.points = drive.points(scan, &track.change);
             keyframe.twist = track.twists[scan];
             keyframes.push(keyframe);
         }

@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use crate::findings::Found;
 
-/// Returns the file's text.
 pub fn toml(found: &Found) -> String {
     let mut text = format!(
         "# Found by gyre calibrate from {} scans, {:.0} m.\n\n[dataset]\n",
@@ -15,7 +14,7 @@ pub fn toml(found: &Found) -> String {
         let _ = writeln!(
             text,
             "{} = {:.digits$} # \u{b1} {:.digits$}: {}",
-            constant.key, constant.found.value, constant.found.sigma, constant.basis
+            constant.label.0, constant.found.value, constant.found.sigma, constant.basis
         );
     }
     for constant in found.kept() {
@@ -26,7 +25,7 @@ pub fn toml(found: &Found) -> String {
         let _ = writeln!(
             text,
             "# {} stays as configured: {:.5} \u{b1} {:.5} {reason}",
-            constant.key, constant.found.value, constant.found.sigma
+            constant.label.0, constant.found.value, constant.found.sigma
         );
     }
     // Last, since a section begins: the keys before are of the dataset.
@@ -41,7 +40,6 @@ pub fn toml(found: &Found) -> String {
     text
 }
 
-/// Two digits of the standard deviation.
 fn digits(sigma: f64) -> usize {
     (1.0 - sigma.log10().floor()).clamp(1.0, 9.0) as usize
 }

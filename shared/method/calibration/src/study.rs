@@ -4,16 +4,13 @@ use std::iter;
 
 use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
 
-/// A drive and its findings.
 pub struct Study {
     pub drive: Drive,
     pub calibration: Calibration,
-    /// The constants beside the configured ones.
     pub found: Found,
 }
 
 impl Study {
-    /// Finds the constants of a drive.
     pub fn new(drive: Drive, configured: &Configured) -> Result<Self, CalibrationError> {
         let calibration = calibrate(&drive)?;
         let found = Found::new(&drive, &calibration, configured)?;

@@ -6,21 +6,19 @@
 use std::path::Path;
 
 use gyre_samples::{Sample, WheelsConfig};
-use thiserror::Error;
 
 use crate::{
     Drive, Estimate, Track,
     gyro::{
-        MAX_LATE_S,
+        ClockError, MAX_LATE_S, PERIOD_SHARE,
         angles::Angles,
         fit::Fit,
-        search::{MIN_TURNS, NoPeak, Peak, peak},
+        log_keys,
+        search::{MIN_TURNS, NoPeak, peak},
         turns::turns,
     },
 };
 
-/// Least standard deviation of the offset, periods of the log: its speeds are interpolated.
-const PERIOD_SHARE: f64 = 0.1;
 /// Least standard deviation of the scale: the radar's own, and tyres that warm.
 const SCALE_SIGMA: f64 = 2e-3;
 /// An offset that is known less well is refused, s: while braking at 5 m/s² it is half a m/s.
@@ -31,84 +29,26 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// The clock and the scale of the wheels, by the distances of the radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
-    /// The delay of the wheels' stamps, s.
     pub delay_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
-    /// Correlation of the distances with the radar's.
     pub correlation: f64,
     /// Number of distances that were compared, of a second each.
     pub distances: usize,
 }
 
-/// Why a drive does not determine the clock of the wheels.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum WheelError {
-    #[error(
-        "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {seconds} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
-    )]
-    Apart {
-        /// Distances that the log has samples for, at most.
-        seconds: usize,
-    },
-    #[error(
-        "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
-        best[0], best[1], rival[0], rival[1]
-    )]
-    Ambiguous {
-        /// The best offset, s, and its correlation.
-        best: [f64; 2],
-        rival: [f64; 2],
-    },
-    #[error(
-        "the offset of the clocks is not determined: parts of the drive lead to different ones"
-    )]
-    Unsettled,
-    #[error(
-        "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
-        .0.value, .0.sigma
-    )]
-    Steady(Estimate),
-    #[error(
-        "the radar drives {0:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)"
-    )]
-    Scale(f64),
-}
-
-impl From<NoPeak> for WheelError {
-    fn from(none: NoPeak) -> Self {
-        match none {
-            NoPeak::Apart { turns } => Self::Apart { seconds: turns },
-            NoPeak::Ambiguous { best, rival } => {
-                let of = |it: Peak| [it.delay_s, it.correlation];
-                Self::Ambiguous {
-                    best: of(best),
-                    rival: of(rival),
-                }
-            }
-        }
-    }
-}
-
 /// Finds the offset and the scale of the wheels by a track of the drive.
-///
 /// Over `max_gap_s` without samples their speed is not interpolated.
 pub fn calibrate_wheels(
     drive: &Drive,
     track: &Track,
     samples: &[Sample],
     max_gap_s: f64,
-) -> Result<WheelCalibration, WheelError> {
-    let stamps: Vec<i64> = drive.sweeps.iter().map(|sweep| sweep.stamp_ns).collect();
+) -> Result<WheelCalibration, ClockError> {
     let driven = track.motions.iter().map(|it| it.motion.translation.x);
-    let starts: Vec<bool> = drive.sweeps.iter().map(|it| it.interval_s <= 0.0).collect();
-    calibrate_distances(
-        &stamps,
-        &driven.collect::<Vec<_>>(),
-        &starts,
-        samples,
-        max_gap_s,
-    )
+    let driven: Vec<f64> = driven.collect();
+    let (stamps, starts) = drive.stamps();
+    calibrate_distances(&stamps, &driven, &starts, samples, max_gap_s)
 }
 
 /// As [`calibrate_wheels`], from the distances since the scans before, m.
@@ -118,30 +58,44 @@ fn calibrate_distances(
     starts: &[bool],
     samples: &[Sample],
     max_gap_s: f64,
-) -> Result<WheelCalibration, WheelError> {
+) -> Result<WheelCalibration, ClockError> {
     let first_ns = stamps.first().copied().unwrap_or_default();
     let distances = turns(stamps, driven_m, starts);
     let log = Angles::new(samples, first_ns, max_gap_s);
-    let peak = peak(&distances, &log)?;
-    let fit = Fit::new(&distances, &log, &peak, false).ok_or(WheelError::Unsettled)?;
+    let peak = peak(&distances, &log).map_err(refusal)?;
+    let fit = Fit::new(&distances, &log, &peak, false).ok_or_else(ClockError::unsettled)?;
     let [scale, _, delay_s] = fit.parameters;
-    let floored = |estimate: Estimate, floor: f64| Estimate {
-        sigma: estimate.sigma.hypot(floor),
-        ..estimate
-    };
-    let delay_s = floored(delay_s, PERIOD_SHARE * log.period_s());
+    let delay_s = delay_s.with_error(PERIOD_SHARE * log.period_s());
     if !SCALES.contains(&scale.value) {
-        return Err(WheelError::Scale(scale.value));
+        return Err(ClockError(format!(
+            "the radar drives {:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)",
+            scale.value
+        )));
     }
     match delay_s.sigma <= MAX_LATE_SIGMA_S {
         true => Ok(WheelCalibration {
             delay_s,
-            scale: floored(scale, SCALE_SIGMA),
+            scale: scale.with_error(SCALE_SIGMA),
             correlation: peak.correlation,
             distances: fit.turns,
         }),
-        false => Err(WheelError::Steady(delay_s)),
+        false => Err(ClockError(format!(
+            "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
+            delay_s.value, delay_s.sigma
+        ))),
     }
+}
+
+fn refusal(none: NoPeak) -> ClockError {
+    ClockError(match none {
+        NoPeak::Apart { turns } => format!(
+            "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
+        ),
+        NoPeak::Ambiguous { best, rival } => format!(
+            "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
+            best.delay_s, best.correlation, rival.delay_s, rival.correlation
+        ),
+    })
 }
 
 impl WheelCalibration {
@@ -161,10 +115,7 @@ impl WheelCalibration {
     pub fn toml(&self, file: Option<&Path>, m_per_tick: Option<f64>) -> String {
         let tick = m_per_tick.map(|metres| format!("m_per_tick = {metres}\n"));
         let tick = tick.unwrap_or_default();
-        let kind = match file.map(|file| toml::Value::from(file.display().to_string())) {
-            Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
-            None => "kind = \"auto\"\n".to_owned(),
-        };
+        let kind = log_keys(file);
         let (late, scale) = (self.delay_s, self.scale);
         format!(
             "\n[wheels]\n{kind}{tick}delay_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
@@ -177,14 +128,9 @@ impl WheelCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside the configured values if wheels are used.
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
-            let verdict = match (value - found.value).abs() > WRONG_SIGMAS * found.sigma {
-                _ if !configured.is_used() => String::new(),
-                true => format!(", configured {value:.4}: CONTRADICTS the configured value"),
-                false => format!(", configured {value:.4}: agrees with the configured value"),
-            };
+            let verdict = found.verdict(configured.is_used().then_some(value));
             format!(
                 "{name:<21} {:.4} \u{b1} {:.4}{unit}{verdict}",
                 found.value, found.sigma
@@ -203,9 +149,6 @@ impl WheelCalibration {
     }
 }
 
-/// A configured value that is off by so many standard deviations is wrong.
-const WRONG_SIGMAS: f64 = 3.0;
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -216,7 +159,6 @@ mod tests {
     const START_NS: i64 = 1_549_986_607_000_000_000;
     const SECONDS: i64 = 120;
 
-    /// A speed that changes as in a town, m/s, by a time, s.
     fn speed(time_s: f64, seed: f64) -> f64 {
         let waves = (1..7).map(|k| {
             let pace = 0.07 * f64::from(k) + 0.013 * seed;
@@ -268,32 +210,22 @@ mod tests {
     fn another_drive_another_unit_and_a_steady_speed_are_refused() {
         let (stamps, driven) = radar(1.0);
         let starts = vec![false; stamps.len()];
-        let refused = |driven: &[f64], log: &[Sample]| {
-            calibrate_distances(&stamps, driven, &starts, log, 0.25).unwrap_err()
+        let refused = |driven: &[f64], log: &[Sample], expected: &[&str]| {
+            let found = calibrate_distances(&stamps, driven, &starts, log, 0.25);
+            let reason = found.unwrap_err().to_string();
+            let is_said = expected.iter().any(|it| reason.contains(it));
+            assert!(is_said, "{reason}");
         };
-        let km_h = refused(&driven, &wheels(1.0, 0.5, 1.0 / 3.6));
-        assert!(
-            matches!(km_h, WheelError::Scale(scale) if (scale - 0.278).abs() < 0.01),
-            "{km_h}"
-        );
+        let in_km_h = wheels(1.0, 0.5, 1.0 / 3.6);
+        refused(&driven, &in_km_h, &["the radar drives 0.27"]);
         let steady = vec![2.5; driven.len()];
-        let log: Vec<Sample> = wheels(1.0, 0.0, 1.0)
-            .iter()
-            .map(|sample| Sample::speed(sample.stamp_ns, 10.0))
-            .collect();
-        assert!(matches!(
-            refused(&steady, &log),
-            WheelError::Ambiguous { .. }
-        ));
-        let other = refused(&driven, &wheels(5.0, 0.0, 1.0));
-        assert!(
-            matches!(
-                other,
-                WheelError::Ambiguous { .. } | WheelError::Unsettled | WheelError::Steady(_)
-            ),
-            "{other}"
-        );
-        let later: Vec<Sample> = wheels(1.0, 3600.0, 1.0);
-        assert!(matches!(refused(&driven, &later), WheelError::Apart { .. }));
+        let mut log = wheels(1.0, 0.0, 1.0);
+        for sample in &mut log {
+            *sample = Sample::speed(sample.stamp_ns, 10.0);
+        }
+        refused(&steady, &log, &["but about as well with"]);
+        let other = ["the speed changes", "parts of the drive"];
+        refused(&driven, &wheels(5.0, 0.0, 1.0), &other);
+        refused(&driven, &wheels(1.0, 3600.0, 1.0), &["the log covers"]);
     }
 }

@@ -15,7 +15,7 @@ pub const CHI_SQUARE_99_9_PLANE: f64 = 13.816;
 /// A measured relative pose of two keyframes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constraint {
-    /// The keyframe that the motion is measured from, counted from 0.
+    /// Keyframes are counted from 0.
     pub from: usize,
     /// The keyframe whose pose is measured. A loop may lead from the later keyframe to the earlier
     /// one.
@@ -23,11 +23,9 @@ pub struct Constraint {
     /// The pose of keyframe `to` in the frame of keyframe `from`, and the covariance of its (x, y,
     /// yaw) along the axes of `from`.
     pub motion: UncertainMotion,
-    /// Where the measurement comes from.
     pub kind: Kind,
 }
 
-/// The source of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// The motion from the last keyframe to a new one. It is never rejected.
@@ -41,7 +39,6 @@ pub enum Kind {
 }
 
 impl Constraint {
-    /// Creates the odometry constraint from keyframe `from` to the next one.
     pub fn odometry(from: usize, motion: UncertainMotion) -> Self {
         Self {
             from,
@@ -61,17 +58,19 @@ impl Constraint {
         }
     }
 
-    /// Checks that an estimator with `keyframes` keyframes can take the constraint.
     pub(crate) fn check(&self, keyframes: usize) -> Result<(), EstimationError> {
         let &Self { from, to, .. } = self;
         let last = keyframes - 1;
-        if from == to {
-            return Err(EstimationError::SameKeyframe(from));
-        }
-        match self.kind {
-            Kind::Odometry if (from, to) != (last, last + 1) => {
-                return Err(EstimationError::Discontinuous { from, to, last });
-            }
+        let [x, y, yaw] = gyre_geometry::xy_yaw(&self.motion.motion);
+        let is_finite = x.is_finite() && y.is_finite() && yaw.is_finite();
+        let refusal = match self.kind {
+            _ if from == to => format!(
+                "the constraint of keyframe {from} with itself says nothing: a constraint needs two keyframes"
+            ),
+            Kind::Odometry if (from, to) != (last, last + 1) => format!(
+                "the odometry constraint from keyframe {from} to {to} does not continue the trajectory: it must lead from the last \
+                 keyframe, {last}, to the next one"
+            ),
             Kind::Loop { .. } if from.max(to) > last => {
                 return Err(EstimationError::UnknownKeyframe {
                     from,
@@ -79,16 +78,16 @@ impl Constraint {
                     keyframes,
                 });
             }
-            _ => {}
-        }
-        let [x, y, yaw] = gyre_geometry::xy_yaw(&self.motion.motion);
-        if !(x.is_finite() && y.is_finite() && yaw.is_finite()) {
-            return Err(EstimationError::NotFinite { from, to });
-        }
-        if !self.motion.has_covariance() {
-            return Err(EstimationError::Covariance { from, to });
-        }
-        Ok(())
+            _ if !is_finite => {
+                format!("the motion measured from keyframe {from} to {to} is not finite")
+            }
+            _ if !self.motion.has_covariance() => format!(
+                "the covariance of the motion from keyframe {from} to {to} is not positive definite: every measured motion needs the \
+                 uncertainty of its x, y and yaw"
+            ),
+            _ => return Ok(()),
+        };
+        Err(EstimationError::Refused(refusal))
     }
 }
 
@@ -98,30 +97,24 @@ pub struct Verdict {
     /// Squared normalised difference of the measured motion from the predicted one; 3 is expected
     /// of a right loop.
     pub chi_square: f64,
-    /// The result of the test.
     pub outcome: Outcome,
 }
 
-/// The result of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// The constraint is part of the estimate.
     Accepted,
-    /// The constraint contradicts the estimate and is not part of it.
     Rejected,
     /// The constraint agrees with the estimate, and its group has been counted in full: it is not
     /// part of the estimate.
     Redundant,
 }
 
-/// Checks that a keyframe is one of `keyframes`.
 pub(crate) fn keyframe_exists(keyframe: usize, keyframes: usize) -> Result<(), EstimationError> {
     match keyframe < keyframes {
         true => Ok(()),
-        false => Err(EstimationError::NoKeyframe {
-            keyframe,
-            keyframes,
-        }),
+        false => Err(EstimationError::Refused(format!(
+            "there is no keyframe {keyframe}: there are {keyframes}, counted from 0"
+        ))),
     }
 }
 
@@ -133,16 +126,9 @@ pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> 
     })
 }
 
-/// Returns the information of `members` loops of one group relative to one loop, if the errors of
-/// any two of them have the correlation `correlation` in 0..=1: the information of the mean of
-/// equally correlated measurements.
-pub(crate) fn group_information(members: usize, correlation: f64) -> f64 {
-    let members = members as f64;
-    members / (1.0 + (members - 1.0).max(0.0) * correlation)
-}
-
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 
@@ -155,51 +141,22 @@ mod tests {
 
     #[test]
     fn constraints_that_no_estimator_can_take_are_refused_with_the_reason() {
-        use EstimationError::*;
         let flat = UncertainMotion {
             covariance: Matrix3::zeros(),
             ..motion(1.0)
         };
-        let cases = [
-            (
-                Constraint::odometry(1, motion(1.0)),
-                Discontinuous {
-                    from: 1,
-                    to: 2,
-                    last: 4,
-                },
-            ),
-            (
-                Constraint::closing(5, 0, motion(1.0)),
-                UnknownKeyframe {
-                    from: 5,
-                    to: 0,
-                    keyframes: 5,
-                },
-            ),
-            (Constraint::closing(3, 3, motion(1.0)), SameKeyframe(3)),
-            (
-                Constraint::closing(0, 3, motion(f64::NAN)),
-                NotFinite { from: 0, to: 3 },
-            ),
-            (
-                Constraint::closing(0, 3, flat),
-                Covariance { from: 0, to: 3 },
-            ),
-        ];
-        for (constraint, expected) in cases {
-            assert_eq!(constraint.check(5), Err(expected));
+        let nan = motion(f64::NAN);
+        for (constraint, expected) in [
+            (Constraint::odometry(1, motion(1.0)), "does not continue"),
+            (Constraint::closing(5, 0, motion(1.0)), "there are 5"),
+            (Constraint::closing(3, 3, motion(1.0)), "with itself"),
+            (Constraint::closing(0, 3, nan), "is not finite"),
+            (Constraint::closing(0, 3, flat), "not positive definite"),
+        ] {
+            let refused = constraint.check(5).unwrap_err().to_string();
+            assert!(refused.contains(expected), "{refused}");
         }
         assert_eq!(Constraint::odometry(4, motion(1.0)).check(5), Ok(()));
         assert_eq!(Constraint::closing(4, 0, motion(1.0)).check(5), Ok(()));
-    }
-
-    #[test]
-    fn a_group_counts_from_once_to_as_often_as_it_has_members() {
-        assert_eq!(group_information(0, 1.0), 0.0);
-        assert_eq!(group_information(1, 0.3), 1.0);
-        assert_eq!(group_information(10, 1.0), 1.0);
-        assert_eq!(group_information(10, 0.0), 10.0);
-        assert!((group_information(3, 0.5) - 1.5).abs() < 1e-15);
     }
 }

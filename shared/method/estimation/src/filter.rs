@@ -1,72 +1,38 @@
 //! The trajectory-oriented extended Kalman filter of Checchin et al.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance::lever};
 use nalgebra::{DMatrix, Matrix3, MatrixXx3, Vector3};
 
-use crate::constraint::{chi_square, group_information, keyframe_exists};
+use crate::constraint::{chi_square, keyframe_exists};
 use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
-
-/// A loop that adds less information to its group than this share of its own is redundant.
-const MIN_SHARE: f64 = 1e-9;
 
 /// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the
 /// third by less than a millimetre.
 const LINEARISATIONS: usize = 3;
 
-/// Options of [`TrajectoryFilter`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct FilterOptions {
-    /// The largest number of keyframes. The covariance takes 72 bytes times its square, and a loop
-    /// costs time in proportion.
-    pub max_keyframes: usize,
-    /// A loop whose chi-square is larger is rejected.
-    pub gate: f64,
-    /// The correlation of the errors of any two loops of one group, 0 to 1.
-    pub group_correlation: f64,
-}
-
-impl Default for FilterOptions {
-    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups that count as
-    /// one loop each.
-    fn default() -> Self {
-        Self {
-            max_keyframes: 2000,
-            gate: CHI_SQUARE_99_9,
-            group_correlation: 1.0,
-        }
-    }
-}
-
-/// The extended Kalman filter over the poses of all keyframes.
-///
-/// The state is the pose of each keyframe, and there is no map (Checchin et al., Sec. 4.1). The
-/// first pose is known exactly. A new keyframe costs time in proportion to the number of keyframes,
-/// a loop to its square, and no measurement is linearised again after later ones: use
-/// [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
-///
-/// The paper's filter keeps the covariance of x, y and yaw of each pose. This filter keeps the
-/// covariance of a small motion of the world that takes the estimated pose to the true one. To
-/// first order both are the same, and [`TrajectoryFilter::pose`] converts. But here an error of yaw
-/// moves the poses after it around an arc instead of along its tangent, so a correction after a
-/// long drift is as good as the graph's, and the Jacobians of Eqs. 2 and 3 are simpler.
+/// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
+/// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number
+/// of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long trajectories.
+/// The paper's filter keeps the covariance of x, y and yaw of each pose, this filter the covariance
+/// of a small motion of the world that takes the estimated pose to the true one: to first order the
+/// same. An error of yaw moves the poses after it around an arc instead of along its tangent, and
+/// the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
-    options: FilterOptions,
+    max_keyframes: usize,
     poses: Vec<Pose>,
     /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
     /// beyond the poses are reserve.
     covariance: DMatrix<f64>,
-    /// Loops accepted of each group.
-    groups: BTreeMap<u64, usize>,
+    /// Groups that a loop has been counted of.
+    groups: BTreeSet<u64>,
 }
 
-/// A relative pose as an observation of the state.
 struct Observation {
     ends: [usize; 2],
-    /// The relative pose as predicted.
     predicted: Pose,
     /// Jacobian H of its x, y and yaw with respect to the error of the second pose; for the first
     /// pose it has the opposite sign.
@@ -74,22 +40,22 @@ struct Observation {
 }
 
 impl TrajectoryFilter {
+    /// The usual number of keyframes, with a covariance of 288 MB: it takes 72 bytes times the
+    /// square of the number, and a loop costs time in proportion.
+    pub const MAX_KEYFRAMES: usize = 2000;
+
     /// Creates a filter with keyframe 0 at `start`, known exactly.
-    pub fn new(start: Pose, options: FilterOptions) -> Self {
+    pub fn new(start: Pose, max_keyframes: usize) -> Self {
         Self {
-            options,
+            max_keyframes,
             poses: vec![start],
             covariance: DMatrix::zeros(3, 3),
-            groups: BTreeMap::new(),
+            groups: BTreeSet::new(),
         }
     }
 
     /// Takes a constraint: an odometry constraint adds a keyframe, a loop is tested and corrects
-    /// all poses.
-    ///
-    /// The result depends a little on the order of loops, as each is linearised at the estimate
-    /// that it finds. A filter cannot take information back: in a group of dependent loops, each
-    /// later loop adds its increase of the group's information.
+    /// all poses. Of a group of dependent loops only the first counts.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -101,19 +67,6 @@ impl TrajectoryFilter {
         }
     }
 
-    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et
-    /// al., Eq. 3): the initial guess of their registration (Eq. 4).
-    pub fn predict(&self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
-        keyframe_exists(from.max(to), self.poses.len())?;
-        let observation = self.observe([from, to]);
-        let covariance = observation.project(&self.against(&observation));
-        Ok(UncertainMotion {
-            motion: observation.predicted,
-            covariance: 0.5 * (covariance + covariance.transpose()),
-        })
-    }
-
-    /// Returns the poses of all keyframes.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
@@ -133,11 +86,8 @@ impl TrajectoryFilter {
         })
     }
 
-    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2).
-    ///
-    /// The error of the last pose moves the new one along with it: the Jacobian of Eq. 2 is the
-    /// identity. Eq. 2 prints the covariance of the whole state beside it; its columns of the last
-    /// pose are meant.
+    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2). The error of the last
+    /// pose moves the new one along with it: the Jacobian of Eq. 2 is the identity.
     fn augment(&mut self, motion: &UncertainMotion) -> Result<(), EstimationError> {
         let count = self.poses.len();
         self.reserve(count + 1)?;
@@ -163,7 +113,7 @@ impl TrajectoryFilter {
 
     /// Makes room for the covariance of `count` keyframes, and for more to come.
     fn reserve(&mut self, count: usize) -> Result<(), EstimationError> {
-        let limit = self.options.max_keyframes;
+        let limit = self.max_keyframes;
         if count > limit {
             return Err(EstimationError::TooManyKeyframes { limit });
         }
@@ -190,14 +140,13 @@ impl TrajectoryFilter {
             chi_square,
             outcome,
         };
-        if chi_square.is_nan() || chi_square > self.options.gate {
+        if chi_square.is_nan() || chi_square > CHI_SQUARE_99_9 {
             return verdict(Outcome::Rejected);
         }
-        let share = self.share(group);
-        if share < MIN_SHARE {
+        if group.is_some_and(|group| !self.groups.insert(group)) {
             return verdict(Outcome::Redundant);
         }
-        match self.correct(first, measured, measured.covariance / share) {
+        match self.correct(first, measured) {
             Some(()) => verdict(Outcome::Accepted),
             None => verdict(Outcome::Rejected),
         }
@@ -206,13 +155,8 @@ impl TrajectoryFilter {
     /// Corrects all poses by an observation: the iterated update, which linearises the observation
     /// again at the corrected poses. `None` if the covariance of the innovation is singular;
     /// nothing is changed then.
-    fn correct(
-        &mut self,
-        first: Observation,
-        measured: &UncertainMotion,
-        noise: Matrix3<f64>,
-    ) -> Option<()> {
-        let ends = first.ends;
+    fn correct(&mut self, first: Observation, measured: &UncertainMotion) -> Option<()> {
+        let (ends, noise) = (first.ends, measured.covariance);
         let prior = ends.map(|keyframe| self.poses[keyframe]);
         let mut errors = [Vector3::zeros(); 2];
         let mut observation = first;
@@ -236,17 +180,6 @@ impl TrajectoryFilter {
             *pose = exp(&(gain.fixed_rows::<3>(3 * keyframe) * innovation)) * *pose;
         }
         Some(())
-    }
-
-    /// Returns the increase of a group's information by its next loop, relative to one loop, and
-    /// counts the loop.
-    fn share(&mut self, group: Option<u64>) -> f64 {
-        let Some(group) = group else { return 1.0 };
-        let members = self.groups.entry(group).or_default();
-        let information = |members| group_information(members, self.options.group_correlation);
-        let share = information(*members + 1) - information(*members);
-        *members += 1;
-        share
     }
 
     fn observe(&self, ends: [usize; 2]) -> Observation {
@@ -278,7 +211,6 @@ impl TrajectoryFilter {
         used.fill_lower_triangle_with_upper_triangle();
     }
 
-    /// Returns the columns of a keyframe in the covariance.
     fn columns(&self, keyframe: usize) -> MatrixXx3<f64> {
         let size = nalgebra::Dyn(3 * self.poses.len());
         self.covariance

@@ -1,10 +1,8 @@
 //! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2` and `FIX` of the first vertex.
 //!
-//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, and an edge
-//! carries its information matrix. The error of a [`Constraint`] lies along the axes of `from`, and
-//! it carries a covariance. Both give the same chi-square; reading and writing rotate and invert
-//! the matrix. A file has no groups and no kinds: the first edge from each keyframe to the next one
-//! is read as odometry, all others as independent loops.
+//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an information
+//! matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance. The first edge
+//! from each keyframe to the next one is read as odometry, all others as independent loops.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -25,62 +23,15 @@ pub struct G2o {
     pub constraints: Vec<Constraint>,
 }
 
-/// Errors of [`G2o::parse`].
+/// What is wrong with a text, and in which line, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum G2oError {
-    #[error(
-        "line {line}: {tag:?} is not read, only VERTEX_SE2, EDGE_SE2, FIX of the first vertex, and comments"
-    )]
-    Tag {
-        /// The line, counted from 1.
-        line: usize,
-        tag: String,
-    },
-    /// A line has too few or too many fields, or one that is not a finite number.
-    #[error("line {line}: {tag} needs {needed}, each a finite number")]
-    Fields {
-        /// The line, counted from 1.
-        line: usize,
-        tag: &'static str,
-        needed: &'static str,
-    },
-    #[error("line {line}: vertex {id} appears a second time")]
-    Twice {
-        /// The line, counted from 1.
-        line: usize,
-        id: u64,
-    },
-    #[error(
-        "line {line}: the information matrix of the edge from {from} to {to} is not positive definite"
-    )]
-    Information {
-        /// The line, counted from 1.
-        line: usize,
-        /// The vertex that the motion is measured from.
-        from: u64,
-        /// The vertex that is measured.
-        to: u64,
-    },
-    /// An edge names a vertex that the file does not have, or a vertex is fixed that is not the
-    /// first one.
-    #[error("line {line}: vertex {id} {problem}")]
-    Vertex {
-        /// The line, counted from 1.
-        line: usize,
-        id: u64,
-        problem: &'static str,
-    },
-    #[error(
-        "there is no edge from vertex {from} to the next one, {to}: a trajectory needs odometry between all its keyframes"
-    )]
-    Gap {
-        /// The earlier vertex.
-        from: u64,
-        to: u64,
-    },
-    #[error("there is no EDGE_SE2")]
-    Empty,
+#[error("{0}")]
+pub struct G2oError(String);
+
+impl G2oError {
+    fn at(line: usize, reason: impl std::fmt::Display) -> Self {
+        Self(format!("line {line}: {reason}"))
+    }
 }
 
 struct RawEdge {
@@ -97,7 +48,6 @@ struct Raw {
 }
 
 impl G2o {
-    /// Reads the text of a g2o file.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
         let mut raw = Raw::default();
         for (number, line) in text.lines().enumerate() {
@@ -159,7 +109,8 @@ impl Raw {
                 let needed = "an id, x, y and yaw";
                 let ([id], [x, y, yaw]) = fields(words, line, "VERTEX_SE2", needed)?;
                 if self.vertices.insert(id, pose(x, y, yaw)).is_some() {
-                    return Err(G2oError::Twice { line, id });
+                    let reason = format!("vertex {id} appears a second time");
+                    return Err(G2oError::at(line, reason));
                 }
             }
             Some("EDGE_SE2") => {
@@ -168,10 +119,13 @@ impl Raw {
                     fields::<2, 9>(words, line, "EDGE_SE2", needed)?;
                 let motion = pose(x, y, yaw);
                 let [from, to] = ends;
-                let covariance = unpack(&information)
-                    .cholesky()
-                    .ok_or(G2oError::Information { line, from, to })?
-                    .inverse();
+                let Some(factor) = unpack(&information).cholesky() else {
+                    let reason = format!(
+                        "the information matrix of the edge from {from} to {to} is not positive definite"
+                    );
+                    return Err(G2oError::at(line, reason));
+                };
+                let covariance = factor.inverse();
                 let axes = axes(&motion);
                 let motion = UncertainMotion {
                     motion,
@@ -184,8 +138,12 @@ impl Raw {
                 self.fixed.push((line, id));
             }
             Some(tag) => {
-                let tag = tag.to_owned();
-                return Err(G2oError::Tag { line, tag });
+                return Err(G2oError::at(
+                    line,
+                    format!(
+                        "{tag:?} is not read, only VERTEX_SE2, EDGE_SE2, FIX of the first vertex, and comments"
+                    ),
+                ));
             }
         }
         Ok(())
@@ -193,7 +151,7 @@ impl Raw {
 
     fn resolve(self) -> Result<G2o, G2oError> {
         if self.edges.is_empty() {
-            return Err(G2oError::Empty);
+            return Err(G2oError("there is no EDGE_SE2".to_owned()));
         }
         let ids: BTreeSet<u64> = match self.vertices.is_empty() {
             true => self.edges.iter().flat_map(|edge| edge.ends).collect(),
@@ -202,17 +160,16 @@ impl Raw {
         let keyframes: BTreeMap<u64, usize> = ids.iter().copied().zip(0..).collect();
         for (line, id) in self.fixed {
             if keyframes.get(&id) != Some(&0) {
-                let problem = "is fixed, but only the first vertex can be";
-                return Err(G2oError::Vertex { line, id, problem });
+                let reason = format!("vertex {id} is fixed, but only the first vertex can be");
+                return Err(G2oError::at(line, reason));
             }
         }
         let mut odometry: Vec<Option<Constraint>> = vec![None; ids.len() - 1];
         let mut loops = Vec::new();
         for RawEdge { line, ends, motion } in self.edges {
             let keyframe = |id| {
-                let problem = "is not in the file";
-                let missing = G2oError::Vertex { line, id, problem };
-                keyframes.get(&id).copied().ok_or(missing)
+                let missing = || G2oError::at(line, format!("vertex {id} is not in the file"));
+                keyframes.get(&id).copied().ok_or_else(missing)
             };
             let (from, to) = (keyframe(ends[0])?, keyframe(ends[1])?);
             match odometry.get_mut(from) {
@@ -223,9 +180,11 @@ impl Raw {
             }
         }
         let ids: Vec<u64> = ids.into_iter().collect();
-        let gap = |k: usize| G2oError::Gap {
-            from: ids[k],
-            to: ids[k + 1],
+        let gap = |k: usize| {
+            let (from, to) = (ids[k], ids[k + 1]);
+            G2oError(format!(
+                "there is no edge from vertex {from} to the next one, {to}: a trajectory needs odometry between all its keyframes"
+            ))
         };
         let odometry = odometry.into_iter().enumerate();
         let odometry = odometry.map(|(k, constraint)| constraint.ok_or_else(|| gap(k)));
@@ -238,15 +197,17 @@ impl Raw {
     }
 }
 
-/// Returns the ids and the numbers of a line that has exactly these.
 fn fields<'a, const IDS: usize, const NUMBERS: usize>(
     words: impl Iterator<Item = &'a str>,
     line: usize,
-    tag: &'static str,
-    needed: &'static str,
+    tag: &str,
+    needed: &str,
 ) -> Result<([u64; IDS], [f64; NUMBERS]), G2oError> {
     let words: Vec<_> = words.collect();
-    let wrong = || G2oError::Fields { line, tag, needed };
+    let wrong = || {
+        let reason = format!("{tag} needs {needed}, each a finite number");
+        G2oError::at(line, reason)
+    };
     let (ids, numbers) = words.split_at_checked(IDS).ok_or_else(wrong)?;
     let ids: Option<Vec<u64>> = ids.iter().map(|word| word.parse().ok()).collect();
     let finite = |word: &&str| word.parse().ok().filter(|number: &f64| number.is_finite());

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use gyre_geometry::{Pose, UncertainMotion};
 
-use crate::constraint::{chi_square, group_information};
+use crate::constraint::chi_square;
 use crate::kernel::Kernel;
 use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
@@ -22,31 +22,25 @@ pub use positions::{Position, WeightedPosition, align};
 use solve::Weights;
 use system::System;
 
-/// Options of [`PoseGraph`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraphOptions {
     /// A loop whose chi-square against the odometry is larger is rejected.
     pub gate: f64,
     /// The weight of a loop that disagrees with the other constraints.
     pub kernel: Kernel,
-    /// The correlation of the errors of any two loops of one group, 0 to 1.
-    pub group_correlation: f64,
-    /// The largest number of linearisations of one solution.
     pub max_iterations: usize,
     /// A solution is found when a step lowers the cost by less than this share of it.
     pub tolerance: f64,
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups that
-    /// count as one loop each.
+    /// Returns a gate at 99.9 %, and dynamic covariance scaling from a quarter of it.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
             kernel: Kernel::DynamicCovarianceScaling {
                 phi: 0.25 * CHI_SQUARE_99_9,
             },
-            group_correlation: 1.0,
             max_iterations: 100,
             tolerance: 1e-5,
         }
@@ -54,20 +48,15 @@ impl Default for GraphOptions {
 }
 
 /// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least
-/// squares.
-///
-/// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it
-/// comes, so that the verdict does not depend on earlier loops, and all against each other by the
-/// kernel when the graph is solved.
+/// squares. Each loop is tested against the odometry alone when it comes, and all loops against each
+/// other by the kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     state: State,
     odometry: Vec<Edge>,
     loops: Vec<Closing>,
-    /// Number of loops of each group.
     groups: BTreeMap<u64, usize>,
     positions: Vec<Measured>,
-    /// The normal equations of the present constraints; `None` after a constraint was added.
     system: Option<System>,
     /// True if the system is factorised, undamped, at the present poses.
     factorised: bool,
@@ -81,22 +70,18 @@ struct State {
     frame: Option<Pose>,
 }
 
-/// A loop that passed the gate.
 struct Closing {
     edge: Edge,
     group: Option<u64>,
     /// Chi-square against the odometry alone.
     gate_chi_square: f64,
-    /// The kernel's weight.
     weight: f64,
 }
 
 /// A loop of a [`PoseGraph`] that passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedLoop {
-    /// The keyframe that the motion is measured from.
     pub from: usize,
-    /// The keyframe whose pose is measured.
     pub to: usize,
     /// Squared normalised difference of the measured motion from the estimate; 3 is expected of a
     /// right loop.
@@ -105,7 +90,6 @@ pub struct WeightedLoop {
     pub weight: f64,
 }
 
-/// The result of solving a pose graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
     /// Half the sum of the squared normalised residuals, with loops after the kernel.
@@ -180,7 +164,6 @@ impl PoseGraph {
         Ok(self.verdict(self.against_odometry(&edge)))
     }
 
-    /// Removes all loops. The poses stay where they are until the next solution.
     pub fn clear_loops(&mut self) {
         self.loops.clear();
         self.groups.clear();
@@ -197,10 +180,10 @@ impl PoseGraph {
     /// first pose stays fixed where it is put.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
         if poses.len() != self.state.poses.len() {
-            return Err(EstimationError::StartPoses {
-                poses: poses.len(),
-                keyframes: self.state.poses.len(),
-            });
+            let (poses, keyframes) = (poses.len(), self.state.poses.len());
+            return Err(EstimationError::Refused(format!(
+                "there are {poses} poses to start from, and {keyframes} keyframes: each keyframe needs one"
+            )));
         }
         self.state.poses.copy_from_slice(poses);
         self.factorised = false;
@@ -246,16 +229,12 @@ impl PoseGraph {
             .chain(loops)
     }
 
-    /// Returns the edge of a constraint that the graph can take.
     fn edge(&self, constraint: &Constraint) -> Result<Edge, EstimationError> {
         constraint.check(self.state.poses.len())?;
-        let &Constraint {
-            from, to, motion, ..
-        } = constraint;
-        Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })
+        let ends = [constraint.from, constraint.to];
+        Edge::new(ends, constraint.motion).ok_or(EstimationError::Singular)
     }
 
-    /// Marks the system as out of date.
     fn forget_system(&mut self) {
         self.system = None;
         self.factorised = false;
@@ -303,9 +282,9 @@ impl PoseGraph {
         });
     }
 
-    /// Returns how much a loop counts because of others of its group: 1 if it is alone.
+    /// Returns how much a loop counts because of others of its group, which count as one together.
     fn share(&self, closing: &Closing) -> f64 {
         let members = closing.group.map_or(1, |group| self.groups[&group]);
-        group_information(members, self.options.group_correlation) / members as f64
+        1.0 / members as f64
     }
 }

@@ -1,7 +1,6 @@
 //! Robust kernels: how much a loop counts that disagrees with the rest.
 
 /// A robust kernel of the chi-square of a loop.
-///
 /// The cost of a loop is half of a concave function of its chi-square c; the derivative of this
 /// function is the loop's weight.
 #[derive(Debug, Clone, Copy, PartialEq)]

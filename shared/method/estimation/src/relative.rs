@@ -15,11 +15,8 @@ pub(crate) struct Relative {
 }
 
 impl Relative {
-    /// Predicts the relative pose of two keyframes.
-    ///
-    /// Checchin et al., Eq. 3: T = (-)((-) x_to (+) x_from). The outer inverse makes this equal to
-    /// (-) x_from (+) x_to, the pose of `to` seen from `from`, which is the direction of a
-    /// [`Constraint`](crate::Constraint).
+    /// Predicts the pose of `to` in the frame of `from`: Checchin et al., Eq. 3,
+    /// T = (-)((-) x_to (+) x_from), whose outer inverse makes this (-) x_from (+) x_to.
     pub fn predict(from: &Pose, to: &Pose) -> Self {
         let motion = from.inv_mul(to);
         let apart = to.translation.vector - from.translation.vector;

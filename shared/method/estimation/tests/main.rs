@@ -5,7 +5,6 @@
 
 mod common;
 
-mod consistency;
 mod filter;
 mod g2o;
 mod graph;

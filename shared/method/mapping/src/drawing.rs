@@ -16,18 +16,12 @@ const APART_CELLS: f64 = 3.0;
 /// frame.
 pub struct Drawing {
     evidence: Evidence,
-    first: Option<First>,
+    /// The first keyframe, in the frame of the given poses, and in the frame of odometry.
+    first: Option<[Pose; 2]>,
     /// The keyframes by odometry, in the map frame.
     odometry: Vec<Pose>,
     /// True if odometry has them elsewhere.
     is_corrected: bool,
-}
-
-/// The first keyframe, in the frame of the given poses, and in the frame of odometry.
-#[derive(Clone, Copy)]
-struct First {
-    pose: Pose,
-    odometry: Pose,
 }
 
 impl Drawing {
@@ -42,12 +36,10 @@ impl Drawing {
         })
     }
 
-    /// Draws the next keyframe at `pose`.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), MapError> {
         let odometry = keyframe.pose.motion;
-        let pose = *pose;
-        let first = *self.first.get_or_insert(First { pose, odometry });
-        let (pose, odometry) = (first.pose.inv_mul(&pose), first.odometry.inv_mul(&odometry));
+        let [first, by_odometry] = self.first.get_or_insert([*pose, odometry]);
+        let (pose, odometry) = (first.inv_mul(pose), by_odometry.inv_mul(&odometry));
         self.evidence.draw(keyframe, &pose)?;
         let apart_m = (pose.translation.vector - odometry.translation.vector).norm();
         self.is_corrected |= apart_m > APART_CELLS * self.evidence.options().cell_m;
@@ -55,7 +47,6 @@ impl Drawing {
         Ok(())
     }
 
-    /// Returns the evidence of the keyframes.
     pub fn evidence(&mut self) -> &mut Evidence {
         &mut self.evidence
     }
@@ -67,7 +58,9 @@ impl Drawing {
     /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
     /// loop, and with odometry's trajectory if it differs.
     pub fn png(&mut self, trajectory: &[Pose], loops: &[[Pose; 2]]) -> Result<Vec<u8>, MapError> {
-        let map_from_given = self.first.map_or(Pose::identity(), |it| it.pose.inverse());
+        let map_from_given = self
+            .first
+            .map_or(Pose::identity(), |[first, _]| first.inverse());
         let trajectory: Vec<Pose> = trajectory
             .iter()
             .map(|pose| map_from_given * pose)
@@ -76,10 +69,9 @@ impl Drawing {
         let loops: Vec<[Point2<f64>; 2]> = loops.iter().map(|ends| ends.map(place)).collect();
         let overlay = Overlay {
             trajectory: &[&trajectory],
-            odometry: if self.is_corrected {
-                &self.odometry
-            } else {
-                &[]
+            odometry: match self.is_corrected {
+                true => &self.odometry,
+                false => &[],
             },
             loops: &loops,
         };

@@ -1,9 +1,6 @@
 //! The evidence of keyframes, tile by tile.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
-};
+use std::{collections::BTreeMap, path::Path};
 
 use gyre_geometry::Pose;
 use gyre_slam::Keyframe;
@@ -11,8 +8,8 @@ use gyre_storage::StorageError;
 use nalgebra::Point2;
 
 use crate::{
-    MapOptions, OptionError,
-    store::{BLOCK, BLOCKS, ONE, Tile, TileStore},
+    MapError, MapOptions, OptionError, TileSource,
+    store::{BLOCK, BLOCKS, ONE, TileStore},
     tile::{Cell, TILE_CELLS, TileImage, TileIndex},
     view::View,
 };
@@ -27,25 +24,17 @@ const PRIOR: f64 = 1.0;
 /// Looks from nearby of a cell that is well known.
 const WELL_KNOWN: f64 = 8.0;
 
-/// The evidence of keyframes at their poses about the cells of a map: how often each returned power
-/// of how often it was looked at.
-///
-/// It is independent of the order of drawing keyframes, and of the places where they were drawn
-/// before.
-///
-/// Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
+/// The evidence of keyframes at their poses about the cells of a map, in whatever order they were
+/// drawn. Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
 pub struct Evidence {
     options: MapOptions,
     view: View,
     store: TileStore,
-    /// The pose of each drawn keyframe, by its `seq`.
     drawn: BTreeMap<u64, Pose>,
-    changed: BTreeSet<TileIndex>,
     /// The contribution of a keyframe to a tile: the cell and the amount.
     returned: BTreeMap<TileIndex, Vec<(u32, u32)>>,
 }
 
-/// A change of the drawing.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     Draw,
@@ -73,7 +62,6 @@ impl Evidence {
             options: options.clone(),
             store: TileStore::new(folder, IN_MEMORY),
             drawn: BTreeMap::new(),
-            changed: BTreeSet::new(),
             returned: BTreeMap::new(),
         })
     }
@@ -84,17 +72,6 @@ impl Evidence {
 
     pub fn keyframes(&self) -> usize {
         self.drawn.len()
-    }
-
-    /// Returns the tiles that some keyframe touches, in rising order.
-    pub fn tiles(&self) -> Vec<TileIndex> {
-        self.store.tiles().collect()
-    }
-
-    /// Returns the tiles that have changed since the last call, also those that are no more, in
-    /// rising order.
-    pub fn take_changed(&mut self) -> BTreeSet<TileIndex> {
-        std::mem::take(&mut self.changed)
     }
 
     /// Returns whether a keyframe at `pose` (in the map frame) should be drawn: it is not drawn
@@ -124,6 +101,7 @@ impl Evidence {
         let tiles = TileIndex::around(&centre, options.reach_m, options.cell_m);
         let tiles: Vec<TileIndex> = tiles.collect();
         self.collect_returns(&tiles, pose);
+        let map_to_keyframe = pose.inverse();
         for &index in &tiles {
             if change == Change::Draw {
                 self.store.enter(index);
@@ -132,18 +110,22 @@ impl Evidence {
                 for &(cell, amount) in &self.returned[&index] {
                     change.apply(&mut tile.returned[cell as usize], amount);
                 }
-                let looks = Looks {
-                    view: &self.view,
-                    map_to_keyframe: pose.inverse(),
-                    cell_m: self.options.cell_m,
+                let look = |place: Point2<f64>| self.view.look(&(map_to_keyframe * place).coords);
+                let [x, y] = index.corner();
+                let middle_m = |corner: i64, block: usize| {
+                    (corner as f64 + (block as f64 + 0.5) * BLOCK as f64) * self.options.cell_m
                 };
-                looks.change(index, tile, change);
+                for (row, looked) in tile.looked.chunks_exact_mut(BLOCKS).enumerate() {
+                    for (column, looked) in looked.iter_mut().enumerate() {
+                        let look = look(Point2::new(middle_m(x, column), middle_m(y, row)));
+                        change.apply(looked, (look * f64::from(ONE)).round() as u32);
+                    }
+                }
             }
             if change == Change::Erase {
                 self.store.leave(index);
             }
         }
-        self.changed.extend(tiles);
         Ok(())
     }
 
@@ -154,13 +136,13 @@ impl Evidence {
             self.returned.entry(*tile).or_default().clear();
         }
         let (per_m, returned) = (1.0 / self.options.cell_m, &mut self.returned);
-        self.view.returns(|sample| {
-            let place = pose * sample.place * per_m;
+        self.view.returns(|place, amount| {
+            let place = pose * place * per_m;
             let corner = place.map(|at| (at - 0.5).floor());
             let over = place.map(|at| at - 0.5) - corner;
             for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                 let share = |far: i32, over: f64| if far == 1 { over } else { 1.0 - over };
-                let amount = sample.amount * share(x, over.x) * share(y, over.y);
+                let amount = amount * share(x, over.x) * share(y, over.y);
                 let (tile, cell) = locate(
                     corner.x as i64 + i64::from(x),
                     corner.y as i64 + i64::from(y),
@@ -172,11 +154,22 @@ impl Evidence {
             }
         });
     }
+}
 
-    /// Makes the image of a tile, and returns whether some keyframe touches it.
-    pub fn image(&mut self, index: TileIndex, image: &mut TileImage) -> Result<bool, StorageError> {
+impl TileSource for Evidence {
+    fn cell_m(&self) -> f64 {
+        self.options.cell_m
+    }
+
+    /// The tiles that some keyframe touches.
+    fn tiles(&self) -> Vec<TileIndex> {
+        self.store.tiles().collect()
+    }
+
+    fn read(&mut self, index: TileIndex, image: &mut TileImage) -> Result<(), MapError> {
         let Some(tile) = self.store.get(index)? else {
-            return Ok(false);
+            image.cells.fill(Cell::default());
+            return Ok(());
         };
         for (row, cells) in image.cells.chunks_exact_mut(TILE_CELLS).rev().enumerate() {
             for (column, cell) in cells.iter_mut().enumerate() {
@@ -184,7 +177,7 @@ impl Evidence {
                 *cell = quantise(tile.returned[row * TILE_CELLS + column], looked);
             }
         }
-        Ok(true)
+        Ok(())
     }
 }
 
@@ -205,28 +198,5 @@ fn quantise(returned: u32, looked: u32) -> Cell {
     Cell {
         evidence: (255.0 * share.sqrt()).round() as u8,
         looked: (255.0 * (looked / WELL_KNOWN).min(1.0)).round() as u8,
-    }
-}
-
-/// The visibility of the blocks of a tile from a keyframe.
-struct Looks<'a> {
-    view: &'a View,
-    map_to_keyframe: Pose,
-    cell_m: f64,
-}
-
-impl Looks<'_> {
-    fn change(&self, index: TileIndex, tile: &mut Tile, change: Change) {
-        let [x, y] = index.corner();
-        let middle_m = |corner: i64, block: usize| {
-            (corner as f64 + (block as f64 + 0.5) * BLOCK as f64) * self.cell_m
-        };
-        for (row, looked) in tile.looked.chunks_exact_mut(BLOCKS).enumerate() {
-            for (column, looked) in looked.iter_mut().enumerate() {
-                let place = Point2::new(middle_m(x, column), middle_m(y, row));
-                let look = self.view.look(&(self.map_to_keyframe * place).coords);
-                change.apply(looked, (look * f64::from(ONE)).round() as u32);
-            }
-        }
     }
 }

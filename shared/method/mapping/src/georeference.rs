@@ -8,15 +8,12 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Latitude of the frame's origin, the sensor at the first keyframe, degrees.
     pub latitude_deg: f64,
-    /// Longitude, degrees.
     pub longitude_deg: f64,
     /// Heading of the frame's x axis, degrees clockwise from true north.
     pub heading_deg: f64,
 }
 
-/// A place that cannot be the origin of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
     "the origin {}, {}, {} is none: latitude from -80 to 84, longitude from -180 to 180 and heading from -360 to 360 degrees are needed",
@@ -94,23 +91,24 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    fn georeference([latitude_deg, longitude_deg, heading_deg]: [f64; 3]) -> Georeference {
+        let origin = Origin {
+            latitude_deg,
+            longitude_deg,
+            heading_deg,
+        };
+        Georeference::new(Some(origin)).unwrap()
+    }
+
     #[test]
     fn the_frame_of_a_map_lies_on_the_earth_by_its_heading() {
         // Near Edinburgh, on the central meridian of zone 30.
-        let origin = Origin {
-            latitude_deg: 55.95,
-            longitude_deg: -3.0,
-            heading_deg: 90.0,
-        };
-        let east = Georeference::new(Some(origin)).unwrap();
+        let east = georeference([55.95, -3.0, 90.0]);
         assert_eq!(east.epsg, Some(32_630));
         // Grid north is true north there, and the easting 500 km.
         assert!((east.offset.x - 500_000.0).abs() < 1e-3, "{}", east.offset);
-        assert!(
-            (east.offset.y - 6_200_551.0).abs() < 100.0,
-            "{}",
-            east.offset
-        );
+        let off_m = (east.offset.y - 6_200_551.0).abs();
+        assert!(off_m < 100.0, "{}", east.offset);
         let ahead = east.matrix * Vector2::new(1.0, 0.0);
         assert!((ahead - Vector2::new(0.9996, 0.0)).norm() < 1e-9);
         let left = east.matrix * Vector2::new(0.0, 1.0);
@@ -120,22 +118,11 @@ mod tests {
     #[test]
     fn a_step_to_true_north_ends_where_its_latitude_says() {
         for longitude_deg in [-5.5, -3.0, -0.5] {
-            let origin = Origin {
-                latitude_deg: 51.75,
-                longitude_deg,
-                heading_deg: 0.0,
-            };
-            let [here, there] = [0.0, 0.001].map(|north| {
-                let origin = Origin {
-                    latitude_deg: origin.latitude_deg + north,
-                    ..origin
-                };
-                Georeference::new(Some(origin)).unwrap()
-            });
+            let [here, there] =
+                [0.0, 0.001].map(|north| georeference([51.75 + north, longitude_deg, 0.0]));
             let moved = there.offset - here.offset;
             let direction = here.matrix * Vector2::new(1.0, 0.0);
-            let angle =
-                (direction.x * moved.y - direction.y * moved.x) / (direction.norm() * moved.norm());
+            let angle = direction.perp(&moved) / (direction.norm() * moved.norm());
             assert!(angle.abs() < 1e-5, "{longitude_deg}: {angle}");
         }
     }

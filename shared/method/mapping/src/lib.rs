@@ -1,37 +1,20 @@
 //! Maps of keyframes: how often each place returned power of how often it was looked at.
 //!
-//! Reading order:
-//! - [`Evidence`]: keyframes drawn at their poses, taken out again and drawn elsewhere;
-//! - [`TileImage`]: a square of 256 x 256 cells, as it is stored; [`TileSource`]: a map as its
-//!   tiles;
-//! - [`write_map`], [`Map`]: a map as a folder;
-//! - [`map_png`]: a map as one picture with the trajectory in it; [`legible`]: cells for it;
-//! - [`write_pgm`], [`write_geotiff`], [`write_web_tiles`]: a map in the forms of other programs.
-//!
-//! # Method
 //! 1. The points of a keyframe are deskewed and freed of the Doppler shift by its velocity.
-//! 2. A sector of one degree was looked at as far as the farthest return within the beam. A radar
-//!    sees past and over things, so that the nearest return hides nothing; beyond the farthest
-//!    return, open ground and ground hidden by a hill or a truck are indistinguishable.
-//! 3. A look weighs half at 30 m, and less beyond: nearby the beam is narrow.
-//! 4. A return is spread along its arc as its bearing is uncertain, and adds its weight to the
-//!    cells there.
-//! 5. The evidence of a cell is its returns divided by its looks, with one extra look that returned
+//! 2. A sector of one degree was looked at as far as the farthest return within the beam: a radar
+//!    sees past and over things. A look weighs half at 30 m, and less beyond.
+//! 3. A return is spread along its arc as its bearing is uncertain, and adds its weight there.
+//! 4. The evidence of a cell is its returns divided by its looks, with one extra look that returned
 //!    nothing. So what moves fades, and a street is no brighter for being driven often.
 //!
-//! Sums are integers. A corrected pose takes a keyframe out and draws it elsewhere without a trace,
-//! and the map is the same whatever the order.
-//!
-//! # Frames and units
-//! Those of [`gyre_geometry`]. The map frame is the frame of the poses. Rows of pictures run from
-//! the highest y to the lowest, columns from the lowest x to the highest.
+//! Sums are integers, so that the map is the same whatever the order. The map frame is the frame of
+//! the poses. Rows of pictures run from the highest y to the lowest.
 
 mod drawing;
 mod evidence;
 mod export;
 mod georeference;
 mod map;
-mod occupancy;
 mod options;
 mod picture;
 mod pixels;
@@ -46,7 +29,6 @@ pub use evidence::Evidence;
 pub use export::{Grid, grid, write_geotiff, write_pgm, write_web_tiles};
 pub use georeference::{Origin, OriginError};
 pub use map::{Map, require_tiles_only, write_map};
-pub use occupancy::Occupancy;
 pub use options::{MapOptions, OptionError};
 pub use picture::{Overlay, legible, map_png};
 pub use source::{MapError, TileSource};

@@ -16,7 +16,6 @@ use crate::{
     pixels,
 };
 
-/// The version of the folder's form.
 const VERSION: i64 = 1;
 const MANIFEST: &str = "map.toml";
 const TILES: &str = "tiles";
@@ -27,7 +26,6 @@ const MAX_TILE_BYTES: u64 = 1 << 20;
 /// Tiles of a map: 7,000 km of streets.
 const MAX_TILES: usize = 500_000;
 
-/// The content of `map.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
@@ -41,7 +39,6 @@ struct Manifest {
     origin: Option<Origin>,
 }
 
-/// A map that was opened.
 #[derive(Debug)]
 pub struct Map {
     folder: PathBuf,
@@ -107,7 +104,6 @@ pub fn require_tiles_only(folder: &Path) -> Result<(), MapError> {
     tiles_in(folder).map(drop)
 }
 
-/// Returns the paths of the tiles in a folder, drafts included.
 fn tiles_in(folder: &Path) -> Result<Vec<PathBuf>, MapError> {
     let tiles = folder.join(TILES);
     if !tiles.exists() {
@@ -134,7 +130,6 @@ fn tile_path(folder: &Path, tile: TileIndex) -> PathBuf {
 }
 
 impl Map {
-    /// Opens the map in `folder`.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let refused = |reason: String| MapError::NotAMap {
             path: folder.to_owned(),
@@ -147,14 +142,18 @@ impl Map {
         }
         let text = storage::read_text(&path, storage::SETTINGS)
             .map_err(StorageError::at("read", &path))?;
-        let version = Self::version(&text).map_err(&refused)?;
+        let unreadable = |error: toml::de::Error| refused(format!("map.toml: {}", error.message()));
+        let table: toml::Table = toml::from_str(&text).map_err(unreadable)?;
+        // Other versions of this program write the version in the same form.
+        let Some(version) = table.get("version").and_then(toml::Value::as_integer) else {
+            return Err(refused("map.toml has no version".to_owned()));
+        };
         if version != VERSION {
             return Err(refused(format!(
                 "its version is {version}, and this program reads version {VERSION}: use the gyre that drew it, or draw it again with gyre map"
             )));
         }
-        let manifest: Manifest = toml::from_str(&text)
-            .map_err(|error| refused(format!("map.toml: {}", error.message())))?;
+        let manifest: Manifest = toml::Value::Table(table).try_into().map_err(unreadable)?;
         manifest.options.validate()?;
         if manifest.tile_cells != TILE_CELLS || manifest.tiles.len() > MAX_TILES {
             return Err(refused(format!(
@@ -171,25 +170,14 @@ impl Map {
         })
     }
 
-    /// The version, which other versions of this program write in the same form.
-    fn version(text: &str) -> Result<i64, String> {
-        let table: toml::Table =
-            toml::from_str(text).map_err(|error| format!("map.toml: {}", error.message()))?;
-        let version = table.get("version").and_then(toml::Value::as_integer);
-        version.ok_or_else(|| "map.toml has no version".to_owned())
-    }
-
-    /// Returns the options that it was drawn with.
     pub fn options(&self) -> &MapOptions {
         &self.manifest.options
     }
 
-    /// Returns the place of its frame on the earth, if that is known.
     pub fn origin(&self) -> Option<Origin> {
         self.manifest.origin
     }
 
-    /// Returns the number of keyframes it was drawn from.
     pub fn keyframes(&self) -> usize {
         self.manifest.keyframes
     }
@@ -216,7 +204,6 @@ impl TileSource for Map {
     }
 }
 
-/// Decodes the PNG file of a tile.
 fn decode(bytes: &[u8], image: &mut TileImage) -> Result<(), String> {
     let damaged = |error: png::DecodingError| format!("the tile is damaged: {error}");
     let mut reader = png::Decoder::new(Cursor::new(bytes))

@@ -7,7 +7,6 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapOptions {
-    /// Side of a cell, m.
     pub cell_m: f64,
     /// Range of the nearest returns, m: nothing nearer was looked at.
     pub near_m: f64,
@@ -32,41 +31,25 @@ impl Default for MapOptions {
     }
 }
 
-/// An option that is out of bounds.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("the map's {name} is {value}, but must be {bounds}")]
-pub struct OptionError {
-    pub name: &'static str,
-    pub value: f64,
-    pub bounds: &'static str,
-}
+#[error("the map's {0}")]
+pub struct OptionError(String);
 
 impl MapOptions {
-    /// Checks the bounds of all options.
     pub fn validate(&self) -> Result<(), OptionError> {
-        let option = |fits: bool, name, value, bounds| match fits {
-            true => Ok(()),
-            false => Err(OptionError {
-                name,
-                value,
-                bounds,
-            }),
+        let within = |name: &str, value: f64, (least, most): (f64, f64), bounds: &str| {
+            let refused = || OptionError(format!("{name} is {value}, but must be {bounds}"));
+            let fits = (least..=most).contains(&value);
+            fits.then_some(()).ok_or_else(refused)
         };
-        let fits = (0.05..=5.0).contains(&self.cell_m);
-        option(fits, "cell_m", self.cell_m, "0.05 to 5")?;
-        let fits = (0.0..=1000.0).contains(&self.near_m);
-        option(fits, "near_m", self.near_m, "0 to 1000")?;
-        let fits = self.reach_m > self.near_m
-            && (self.cell_m..=2000.0 * self.cell_m).contains(&self.reach_m);
-        option(
-            fits,
-            "reach_m",
-            self.reach_m,
-            "beyond near_m, and 1 to 2000 cells",
-        )?;
-        let fits = (0.1..=1e4).contains(&self.half_weight_m);
-        option(fits, "half_weight_m", self.half_weight_m, "0.1 to 10000")?;
-        let fits = (0.0..=5.0).contains(&self.bearing_deg);
-        option(fits, "bearing_deg", self.bearing_deg, "0 to 5")
+        within("cell_m", self.cell_m, (0.05, 5.0), "0.05 to 5")?;
+        within("near_m", self.near_m, (0.0, 1000.0), "0 to 1000")?;
+        let beyond = self.cell_m.max(self.near_m.next_up());
+        let reach = (beyond, 2000.0 * self.cell_m);
+        let bounds = "beyond near_m, and 1 to 2000 cells";
+        within("reach_m", self.reach_m, reach, bounds)?;
+        let half = (0.1, 1e4);
+        within("half_weight_m", self.half_weight_m, half, "0.1 to 10000")?;
+        within("bearing_deg", self.bearing_deg, (0.0, 5.0), "0 to 5")
     }
 }

@@ -37,7 +37,6 @@ pub struct Overlay<'a> {
     pub trajectory: &'a [&'a [Pose]],
     /// The trajectory by odometry alone, drawn thin; empty where it is the same.
     pub odometry: &'a [Pose],
-    /// Both ends of each loop.
     pub loops: &'a [[Point2<f64>; 2]],
 }
 
@@ -65,7 +64,7 @@ pub fn map_png(source: &mut impl TileSource, overlay: &Overlay<'_>) -> Result<Ve
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let ground = Ground::read(source, &extent)?;
     let mut canvas = Canvas::over(&ground)?;
-    let view = canvas.view();
+    let view = canvas.view;
     draw_paths(&mut canvas, &view, overlay);
     draw_footer(&mut canvas, overlay);
     pixels::encode(canvas.width(), png::ColorType::Rgb, &canvas.rgb())

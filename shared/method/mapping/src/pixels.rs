@@ -38,7 +38,6 @@ pub fn unite(cells: impl Iterator<Item = Cell> + Clone) -> Cell {
     }
 }
 
-/// The colours of a map.
 const UNKNOWN: [f32; 3] = [17.0, 20.0, 26.0];
 const FREE: [f32; 3] = [34.0, 41.0, 54.0];
 const WEAK: [f32; 3] = [176.0, 106.0, 44.0];

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use gyre_storage::StorageError;
 use thiserror::Error;
 
-use crate::{Cell, Evidence, OptionError, TileImage, TileIndex, georeference::OriginError};
+use crate::{OptionError, TileImage, TileIndex, georeference::OriginError};
 
-/// A map that cannot be drawn, written or read.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error(transparent)]
@@ -22,45 +21,20 @@ pub enum MapError {
     Tile { path: PathBuf, reason: String },
     #[error("the map is empty: no keyframe was drawn")]
     Empty,
+    /// Cells along x and along y, and the form.
     #[error(
-        "the map has {columns} x {rows} cells, too many for {form}: choose larger cells, or the map's folder"
+        "the map has {} x {} cells, too many for {}: choose larger cells, or the map's folder", .0[0], .0[1], .1
     )]
-    TooLarge {
-        /// Cells along x.
-        columns: usize,
-        /// Cells along y.
-        rows: usize,
-        form: &'static str,
-    },
+    TooLarge([usize; 2], &'static str),
     #[error("cannot encode a picture: {0}")]
     Encode(String),
 }
 
-/// A map, tile by tile.
 pub trait TileSource {
-    /// The side of a cell, m.
     fn cell_m(&self) -> f64;
 
-    /// The tiles in rising order.
     fn tiles(&self) -> Vec<TileIndex>;
 
     /// Reads a tile; one that does not exist is blank.
     fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError>;
-}
-
-impl TileSource for Evidence {
-    fn cell_m(&self) -> f64 {
-        self.options().cell_m
-    }
-
-    fn tiles(&self) -> Vec<TileIndex> {
-        Evidence::tiles(self)
-    }
-
-    fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError> {
-        if !self.image(tile, image)? {
-            image.cells.fill(Cell::default());
-        }
-        Ok(())
-    }
 }

@@ -14,13 +14,11 @@ use crate::tile::{CELLS, TILE_CELLS, TileIndex};
 /// Cells per side of a block: how often it was looked at varies slowly, and is kept for a block
 /// rather than a cell.
 pub const BLOCK: usize = 4;
-/// Blocks per side of a tile.
 pub const BLOCKS: usize = TILE_CELLS / BLOCK;
 /// One look from nearby, and one return of full weight in it.
 pub const ONE: u32 = 1 << 14;
 
 /// The evidence about the cells of a tile, in units of [`ONE`].
-///
 /// Integers, so that a keyframe is taken out again without a trace, and sums do not depend on their
 /// order.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -31,12 +29,9 @@ pub struct Tile {
     pub looked: [u32; BLOCKS * BLOCKS],
 }
 
-/// A tile that keyframes look at.
 #[derive(Default)]
 struct Entry {
-    /// The number of keyframes that touch it.
     keyframes: u32,
-    /// When it was last used.
     used: u64,
     /// The tile, while it is in memory.
     tile: Option<Box<Tile>>,
@@ -59,7 +54,6 @@ pub struct TileStore {
 }
 
 impl TileStore {
-    /// Keeps at most `max_in_memory` tiles in memory, and the others in a file in `folder`.
     pub fn new(folder: &Path, max_in_memory: usize) -> Self {
         Self {
             entries: BTreeMap::new(),
@@ -73,12 +67,10 @@ impl TileStore {
         }
     }
 
-    /// Returns the tiles in rising order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.entries.keys().copied()
     }
 
-    /// Counts one keyframe more that touches the tile.
     pub fn enter(&mut self, index: TileIndex) {
         self.entries.entry(index).or_default().keyframes += 1;
     }

@@ -11,11 +11,7 @@ pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent
     let [columns, rows] = extent.cells();
     match columns * rows <= MAX_CELLS {
         true => Ok(extent),
-        false => Err(MapError::TooLarge {
-            columns,
-            rows,
-            form,
-        }),
+        false => Err(MapError::TooLarge([columns, rows], form)),
     }
 }
 

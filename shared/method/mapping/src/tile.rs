@@ -7,16 +7,13 @@ use nalgebra::{Point2, Vector2};
 /// Cells per side of a tile, as web maps have them.
 pub const TILE_CELLS: usize = 256;
 
-/// The number of cells of a tile.
 pub(crate) const CELLS: usize = TILE_CELLS * TILE_CELLS;
 
 /// A tile's place: tile (0, 0) has its corner of lowest x and y at the origin of the map frame. It
 /// is written as `X_Y`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileIndex {
-    /// Number of the tile along x, from 0 at the origin.
     pub x: i32,
-    /// Number of the tile along y.
     pub y: i32,
 }
 
@@ -50,7 +47,6 @@ fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
     tile(at_m - reach_m)..=tile(at_m + reach_m)
 }
 
-/// A cell of a tile as it is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Cell {
@@ -61,7 +57,23 @@ pub struct Cell {
     pub looked: u8,
 }
 
-/// The cells of a tile.
+/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a
+/// sixteenth of the power it might have.
+const KNOWN_LOOKED: u8 = 16;
+const OCCUPIED_EVIDENCE: u8 = 64;
+
+impl Cell {
+    /// Returns the first value for a cell that was hardly looked at, the second for a free one, and
+    /// the third for an occupied one.
+    pub(crate) fn occupancy(self, [unknown, free, occupied]: [u8; 3]) -> u8 {
+        match self {
+            cell if cell.looked < KNOWN_LOOKED => unknown,
+            cell if cell.evidence >= OCCUPIED_EVIDENCE => occupied,
+            _ => free,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileImage {
     /// Row after row, from the highest y down; in each row the lowest x first.
@@ -77,7 +89,6 @@ impl Default for TileImage {
 }
 
 impl TileImage {
-    /// Returns the rows, from the highest y down.
     pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Cell]> {
         self.cells.chunks_exact(TILE_CELLS)
     }
@@ -86,14 +97,11 @@ impl TileImage {
 /// The smallest rectangle of tiles around all tiles of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileExtent {
-    /// The tile of lowest x and y.
     pub min: TileIndex,
-    /// The tile of highest x and y.
     pub max: TileIndex,
 }
 
 impl TileExtent {
-    /// Returns the extent of `tiles`; `None` without any.
     pub fn of(tiles: &[TileIndex]) -> Option<Self> {
         let first = *tiles.first()?;
         let around = |extent: Self, tile: &TileIndex| Self {
@@ -113,7 +121,6 @@ impl TileExtent {
         Some(tiles.iter().fold(start, around))
     }
 
-    /// Returns the columns and rows of cells.
     pub fn cells(&self) -> [usize; 2] {
         let count = |min: i32, max: i32| (max.abs_diff(min) as usize + 1) * TILE_CELLS;
         [count(self.min.x, self.max.x), count(self.min.y, self.max.y)]

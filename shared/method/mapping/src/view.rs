@@ -8,7 +8,6 @@ use nalgebra::{Point2, Vector2};
 
 use crate::MapOptions;
 
-/// Sectors of one degree.
 const SECTORS: usize = 360;
 /// Sectors to either side that a return speaks for: a return hides weaker ones at its range within
 /// the beam, so that not every azimuth has points of a wall that all of them see.
@@ -19,30 +18,16 @@ const FULL_CELL_M: f64 = 0.2;
 /// A return is spread along its arc over so many standard deviations to either side.
 const SPREAD_SIGMAS: f64 = 2.0;
 
-/// The free space and the returns of a keyframe, in its own frame.
-///
-/// A radar sees past and over things, and where nothing returns power it may have looked at open
-/// ground, or at nothing for a hill or a truck. So a sector was looked at as far as its farthest
-/// return.
+/// The free space and the returns of a keyframe, in its own frame. Where nothing returns power it may
+/// have looked at open ground or at nothing, so a sector counts as far as its farthest return.
 pub struct View {
     options: MapOptions,
     points: Submap,
-    /// The farthest range of a look into each sector, m.
     farthest_m: [f64; SECTORS],
     own_m: [f64; SECTORS],
 }
 
-/// A part of a return.
-#[derive(Clone, Copy)]
-pub(crate) struct Sample {
-    /// The place in the frame of the keyframe, m.
-    pub(crate) place: Point2<f64>,
-    /// The amount that it adds to its place.
-    pub(crate) amount: f64,
-}
-
 impl View {
-    /// Starts without a keyframe.
     pub fn new(options: &MapOptions) -> Self {
         Self {
             options: options.clone(),
@@ -52,17 +37,12 @@ impl View {
         }
     }
 
-    /// Looks through the eyes of a keyframe.
     pub fn take(&mut self, keyframe: &Keyframe) {
         self.points.start(&keyframe.points, &keyframe.twist);
         self.own_m.fill(0.0);
-        for [x_m, y_m, weight] in self.points.points() {
-            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
-            // NaN is in no sector.
-            if weight > 0.0 && place.norm().is_finite() {
-                let own_m = &mut self.own_m[sector(&place)];
-                *own_m = own_m.max(place.norm());
-            }
+        for (place, _) in places(&self.points) {
+            let own_m = &mut self.own_m[sector(&place)];
+            *own_m = own_m.max(place.norm());
         }
         for (k, farthest_m) in self.farthest_m.iter_mut().enumerate() {
             let beam = (0..=2 * BEAM_SECTORS)
@@ -84,29 +64,22 @@ impl View {
 
     /// Returns the places of all returns, m, with their weights from 0 to 1.
     pub fn points(&self) -> impl Iterator<Item = (Vector2<f64>, f64)> {
-        let points = self.points.points();
-        let places = points.map(|[x_m, y_m, weight]| {
-            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
-            (place, f64::from(weight))
-        });
-        // NaN is nowhere.
-        places.filter(|(place, weight)| *weight > 0.0 && place.norm().is_finite())
+        places(&self.points)
     }
 
-    /// Calls `take` with the parts of all returns.
-    pub(crate) fn returns(&self, mut take: impl FnMut(Sample)) {
+    /// Calls `take` with the place of each part of a return, m, and the amount that it adds there.
+    pub(crate) fn returns(&self, mut take: impl FnMut(Point2<f64>, f64)) {
         let share = FULL_CELL_M / self.options.cell_m;
-        for [x_m, y_m, weight] in self.points.points() {
-            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
-            let amount = share * f64::from(weight) * self.look(&place);
-            if amount > 0.0 && place.norm().is_finite() {
+        for (place, weight) in places(&self.points) {
+            let amount = share * weight * self.look(&place);
+            if amount > 0.0 {
                 self.spread(&place, amount, &mut take);
             }
         }
     }
 
     /// Spreads a return along its arc as its bearing is uncertain, in parts a cell apart.
-    fn spread(&self, place: &Vector2<f64>, amount: f64, take: &mut impl FnMut(Sample)) {
+    fn spread(&self, place: &Vector2<f64>, amount: f64, take: &mut impl FnMut(Point2<f64>, f64)) {
         let sigma_m = self.options.bearing_deg.to_radians() * place.norm();
         let side = (SPREAD_SIGMAS * sigma_m / self.options.cell_m).round() as i32;
         let tangent = Vector2::new(-place.y, place.x) / place.norm().max(f64::MIN_POSITIVE);
@@ -117,12 +90,19 @@ impl View {
         };
         let total: f64 = (-side..=side).map(share).sum();
         for k in -side..=side {
-            take(Sample {
-                place: Point2::from(place + tangent * aside_m(k)),
-                amount: amount * share(k) / total,
-            });
+            let place = Point2::from(place + tangent * aside_m(k));
+            take(place, amount * share(k) / total);
         }
     }
+}
+
+/// The places of points with their weights. NaN is nowhere.
+fn places(points: &Submap) -> impl Iterator<Item = (Vector2<f64>, f64)> {
+    let places = points.points().map(|[x_m, y_m, weight]| {
+        let place = Vector2::new(f64::from(x_m), f64::from(y_m));
+        (place, f64::from(weight))
+    });
+    places.filter(|(place, weight)| *weight > 0.0 && place.norm().is_finite())
 }
 
 fn sector(place: &Vector2<f64>) -> usize {

@@ -8,7 +8,6 @@ const SCALE: f64 = 1000.0;
 
 /// Assigns columns to rows, each to one at most, so that as many as possible of the allowed pairs
 /// are made, and of all such assignments the sum of the costs is least (Kuhn and Munkres).
-///
 /// `costs` has a row for each track and a column for each measurement; `None` is not allowed.
 /// Returns the column of each row.
 pub fn assign(costs: &[Vec<Option<f64>>]) -> Vec<Option<usize>> {
@@ -52,7 +51,6 @@ mod tests {
         (pairs.len(), pairs.iter().sum())
     }
 
-    /// All assignments, one after the other.
     fn all(rows: usize, columns: usize) -> Vec<Vec<Option<usize>>> {
         (0..rows).fold(vec![Vec::new()], |partial, _| {
             let mut longer = Vec::new();

@@ -1,15 +1,14 @@
 //! The section `[objects]` of a configuration.
 
 use gyre_masking::networks::PlanesError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The largest score, so that an object that has gone ends soon.
 pub(crate) const MAX_SCORE: f64 = 4.0;
 
 /// The kind of the tracking.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectsKind {
     /// No objects.
@@ -21,7 +20,7 @@ pub enum ObjectsKind {
 
 /// The tracking of moving objects: the section `[objects]`.
 ///
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ObjectsConfig {
     /// `none` or `tracks`. Default `none`.
@@ -44,36 +43,28 @@ impl Default for ObjectsConfig {
     }
 }
 
-/// An error of the tracking of objects.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ObjectsError {
-    #[error("objects.{key} is {value}, but must be {bounds}")]
-    Setting {
-        key: &'static str,
-        value: f64,
-        bounds: &'static str,
-    },
-    #[error("{0}")]
-    Network(String),
-}
+#[error("{0}")]
+pub struct ObjectsError(String);
 
 impl From<PlanesError> for ObjectsError {
     fn from(error: PlanesError) -> Self {
-        Self::Network(error.to_string())
+        Self(error.to_string())
     }
 }
 
 impl ObjectsConfig {
-    /// Returns whether objects are tracked.
     pub fn is_on(&self) -> bool {
         self.kind == ObjectsKind::Tracks
     }
 
-    /// Checks the bounds of all settings.
     pub fn validate(&self) -> Result<(), ObjectsError> {
-        let require = |key, value, (low, high), bounds| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => Err(ObjectsError::Setting { key, value, bounds }),
+        let require = |key: &str, value: f64, (low, high), bounds: &str| {
+            let refused = || format!("objects.{key} is {value}, but must be {bounds}");
+            match (low..=high).contains(&value) {
+                true => Ok(()),
+                false => Err(ObjectsError(refused())),
+            }
         };
         let likely = (0.01, 0.99);
         require("even_likely", self.even_likely, likely, "0.01 to 0.99")?;

@@ -10,11 +10,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use crate::raster::{Memory, PLANES, SIDE};
 use crate::{ObjectsError, PlacedScan};
 
-/// The network in the program.
 const NETWORK: &str = "gyre:models/objects.onnx";
 /// Cells of the output, a side: each is as large as two by two of the input.
 const OUT: usize = SIDE / 2;
-/// Values of a cell.
 const VALUES: usize = 11;
 /// Side of a cell of the output, m.
 const OUT_M: f64 = 2.0 * crate::raster::CELL_M;
@@ -25,21 +23,17 @@ const SIZE_M: [f64; 2] = [4.5, 1.9];
 /// Distance within which only the most likely detection counts, m.
 const ALONE_M: f64 = 2.5;
 
-/// Finds vehicles that move in the last scans.
 pub(crate) struct Detector {
     network: PlanesNetwork,
     memory: Memory,
 }
 
-/// A vehicle as a scan shows it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Detection {
     /// The centre in the frame of the odometry at the time of its azimuth, with the Doppler shift
     /// of its motion, m.
     pub at: Point2<f64>,
-    /// The velocity, m/s.
     pub velocity: Vector2<f64>,
-    /// Unit vector in its heading.
     pub heading: Vector2<f64>,
     /// Length and width, m.
     pub size_m: [f64; 2],
@@ -88,9 +82,8 @@ impl Detector {
                 found.push(detection);
             }
         }
-        let azimuths = azimuths(points, &deskewed);
         for detection in &mut found {
-            detection.place(&scan.pose, &azimuths);
+            detection.place(&scan.pose, points, &deskewed);
         }
         Ok(found)
     }
@@ -100,7 +93,6 @@ impl Detector {
 struct Output(Vec<f32>);
 
 impl Output {
-    /// Returns a value of the cell in a row and a column.
     fn value(&self, plane: usize, [row, column]: [usize; 2]) -> f32 {
         const HALF: usize = OUT / 2;
         let part = 4 * plane + 2 * (row % 2) + column % 2;
@@ -146,40 +138,23 @@ impl Output {
 impl Detection {
     /// Transforms it from the frame of the sensor to the odometry frame, at the time of the azimuth
     /// that shows it.
-    fn place(&mut self, pose: &Pose, azimuths: &[Azimuth]) {
+    fn place(&mut self, pose: &Pose, points: &[SparsePoint], deskewed: &[Point2<f64>]) {
         let here_rad = bearing_rad(&self.at);
-        let apart_rad = |it: &Azimuth| {
-            let apart_rad = (it.bearing_rad - here_rad).abs();
+        let apart_rad = |from_sensor: &Point2<f64>| {
+            let apart_rad = (bearing_rad(from_sensor) - here_rad).abs();
             apart_rad.min(TAU - apart_rad)
         };
-        let shown_by = azimuths
-            .iter()
-            .min_by(|a, b| apart_rad(a).total_cmp(&apart_rad(b)));
-        let (time_s, doppler_s) = shown_by.map_or((0.0, 0.0), |it| (it.time_s, it.doppler_s));
+        let apart = deskewed.iter().map(apart_rad).zip(points);
+        let shown_by = apart.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (time_s, doppler_s) = shown_by.map_or((0.0, 0.0), |(_, point)| {
+            (f64::from(point.time_s), f64::from(point.doppler_s))
+        });
         let away = pose.rotation * self.at.coords.try_normalize(1e-9).unwrap_or_default();
         self.at = pose * self.at;
         self.velocity = pose.rotation * self.velocity;
         self.heading = pose.rotation * self.heading;
         self.by_velocity = Matrix2::identity() * time_s + away * away.transpose() * doppler_s;
     }
-}
-
-/// The bearing and the time of a point.
-struct Azimuth {
-    bearing_rad: f64,
-    time_s: f64,
-    doppler_s: f64,
-}
-
-/// Returns the bearings and times of points.
-fn azimuths(points: &[SparsePoint], deskewed: &[Point2<f64>]) -> Vec<Azimuth> {
-    let both = points.iter().zip(deskewed);
-    let azimuths = both.map(|(point, from_sensor)| Azimuth {
-        bearing_rad: bearing_rad(from_sensor),
-        time_s: point.time_s.into(),
-        doppler_s: point.doppler_s.into(),
-    });
-    azimuths.collect()
 }
 
 fn bearing_rad(at: &Point2<f64>) -> f64 {
@@ -241,7 +216,7 @@ mod tests {
         // At 30.5 m to the left.
         let mut found = output.read([OUT / 2, OUT / 2 + 30]);
         let deskewed = [ahead, aside].map(|point| point.deskewed(&scan.twist));
-        found.place(&scan.pose, &azimuths(&[ahead, aside], &deskewed));
+        found.place(&scan.pose, &[ahead, aside], &deskewed);
         assert!(
             (found.at - Point2::new(69.5, 0.5)).norm() < 1e-9,
             "{found:?}"

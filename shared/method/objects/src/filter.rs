@@ -1,13 +1,10 @@
 //! The filter of a track: interacting multiple models (Blom and Bar-Shalom, "The interacting
 //! multiple model algorithm for systems with Markovian switching coefficients", 1988), each a
-//! Kalman filter of position and velocity that turns at a rate of its own.
-//!
-//! With a known turn rate the motion is linear in position and velocity (Bar-Shalom, Li and
-//! Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, Sec. 11.7.1): no
-//! model is linearised, and a vehicle that stops has no heading to lose. The prediction errors
-//! determine the turn rate, and the covariance contains its uncertainty.
+//! Kalman filter of position and velocity that turns at a rate of its own, in which the motion is
+//! linear (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and
+//! Navigation", 2001, Sec. 11.7.1).
 
-use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, SMatrix, SVector, Vector2, Vector4};
 
 /// Turn rates of the models over the largest one.
 const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
@@ -50,7 +47,6 @@ struct Estimate {
     covariance: Matrix4<f64>,
 }
 
-/// A measured position of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sighting {
     /// The position, m, as if the object stood.
@@ -67,19 +63,14 @@ pub(crate) struct Sighting {
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
     difference: Vector2<f64>,
-    /// Covariance of that, m².
     covariance: Matrix2<f64>,
     jacobian: Matrix2x4<f64>,
     noise: Matrix2<f64>,
 }
 
 impl Innovation {
-    /// Returns the squared Mahalanobis distance; infinite for a covariance that is singular.
     pub fn chi_square(&self) -> f64 {
-        let inverse = self.covariance.try_inverse();
-        inverse.map_or(f64::INFINITY, |inverse| {
-            (self.difference.transpose() * inverse * self.difference)[0]
-        })
+        mahalanobis(self.difference, self.covariance)
     }
 
     /// Returns minus twice the logarithm of the likelihood, but for a constant: with it a track
@@ -120,22 +111,18 @@ impl Filter {
         }
     }
 
-    /// Returns the position, m.
     pub fn position(&self) -> Point2<f64> {
         Point2::new(self.mean.state[0], self.mean.state[1])
     }
 
-    /// Returns the velocity, m/s.
     pub fn velocity(&self) -> Vector2<f64> {
         Vector2::new(self.mean.state[2], self.mean.state[3])
     }
 
-    /// Returns the covariance of the position, m².
     pub fn position_covariance(&self) -> Matrix2<f64> {
         self.mean.covariance.fixed_view::<2, 2>(0, 0).into()
     }
 
-    /// Returns the covariance of the velocity, (m/s)².
     pub fn velocity_covariance(&self) -> Matrix2<f64> {
         self.mean.covariance.fixed_view::<2, 2>(2, 2).into()
     }
@@ -146,13 +133,6 @@ impl Filter {
         let along = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         let variance = (along.transpose() * self.velocity_covariance() * along)[0];
         (velocity.norm(), variance.max(0.0).sqrt())
-    }
-
-    /// Returns the mean turn rate of the models over their largest, -1 to 1.
-    #[cfg(test)]
-    pub fn turn(&self) -> f64 {
-        let models = self.models.iter().zip(TURNS);
-        models.map(|(model, turn)| model.probability * turn).sum()
     }
 
     /// Predicts the state some seconds later. `heading` is a unit vector, along and across which
@@ -175,12 +155,10 @@ impl Filter {
         self.combine();
     }
 
-    /// Compares with a measured position.
     pub fn innovation(&self, sighting: &Sighting) -> Innovation {
         self.mean.innovation(sighting)
     }
 
-    /// Updates the state by a measured position.
     pub fn update(&mut self, sighting: &Sighting) {
         let innovations = self.models.map(|model| model.estimate.innovation(sighting));
         for (model, innovation) in self.models.iter_mut().zip(&innovations) {
@@ -220,10 +198,7 @@ impl Filter {
     /// Returns the squared Mahalanobis distance of another state from this one.
     pub fn apart(&self, other: &Self) -> f64 {
         let difference = self.mean.state - other.mean.state;
-        let covariance = self.mean.covariance + other.mean.covariance;
-        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
-            (difference.transpose() * inverse * difference)[0]
-        })
+        mahalanobis(difference, self.mean.covariance + other.mean.covariance)
     }
 
     /// Returns the squared Mahalanobis distance between this object, which stood, and the place
@@ -242,9 +217,7 @@ impl Filter {
         let covariance = self.position_covariance()
             + started.position_covariance()
             + way * way.transpose() * 0.25;
-        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
-            (difference.transpose() * inverse * difference)[0]
-        })
+        mahalanobis(difference, covariance)
     }
 
     /// Weighs the models by minus twice the logarithms of their likelihoods.
@@ -334,6 +307,15 @@ fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Esti
         covariance + (part.covariance + apart * apart.transpose()) * (weight / sum)
     });
     Estimate { state, covariance }
+}
+
+pub(crate) fn mahalanobis<const N: usize>(
+    difference: SVector<f64, N>,
+    covariance: SMatrix<f64, N, N>,
+) -> f64 {
+    covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
+        (difference.transpose() * inverse * difference)[0]
+    })
 }
 
 /// The covariance of an acceleration that is constant for some seconds.

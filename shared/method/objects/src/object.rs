@@ -3,7 +3,6 @@
 use gyre_geometry::{Pose, Twist};
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// A scan with its pose and motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedScan {
     /// Time of the scan, the middle of the sweep, ns.
@@ -20,15 +19,11 @@ pub struct PlacedScan {
 pub struct Object {
     /// The identity: counted from 1, and given to no other object of the run.
     pub id: u64,
-    /// The centre, m.
     pub position: Point2<f64>,
-    /// The velocity over ground, m/s.
     pub velocity: Vector2<f64>,
     /// The heading, rad: the direction of the velocity, or the network's heading for a slow object.
     pub yaw_rad: f64,
-    /// The length along the heading, m.
     pub length_m: f64,
-    /// The width across it, m.
     pub width_m: f64,
     /// False if its speed is not significantly above a standing object's.
     pub moving: bool,
@@ -36,15 +31,12 @@ pub struct Object {
     pub age: u32,
     /// Covariance of the centre, m².
     pub position_covariance: Matrix2<f64>,
-    /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
 }
 
-/// The outline of a vehicle, a rectangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outline {
     pub centre: Point2<f64>,
-    /// Unit vector in its heading.
     pub heading: Vector2<f64>,
     /// Length and width, m.
     pub size_m: [f64; 2],
@@ -61,7 +53,6 @@ impl Outline {
         !axes.any(|axis| is_between(&axis))
     }
 
-    /// Returns unit vectors along and across it.
     fn axes(&self) -> [Vector2<f64>; 2] {
         [self.heading, Vector2::new(-self.heading.y, self.heading.x)]
     }

@@ -7,10 +7,8 @@ use nalgebra::{Isometry2, Point2};
 
 use crate::PlacedScan;
 
-/// Cells a side.
 pub(crate) const SIDE: usize = 256;
 const CELLS: usize = SIDE * SIDE;
-/// Side of a cell, m.
 pub(crate) const CELL_M: f64 = 0.5;
 /// Planes: one for each of the last scans, the share of those before, and the range.
 pub(crate) const PLANES: usize = RECENT + 2;
@@ -32,7 +30,6 @@ struct Return {
     weight: f32,
 }
 
-/// A scan that is remembered.
 struct Seen {
     stamp_ns: i64,
     pose: Pose,
@@ -40,14 +37,12 @@ struct Seen {
 }
 
 pub(crate) struct Memory {
-    /// The newest first.
     scans: VecDeque<Seen>,
     /// The planes that were drawn last, kept since fresh memory costs a page fault for each page.
     planes: Vec<f32>,
 }
 
 impl Memory {
-    /// Creates a memory of nothing.
     pub fn new() -> Self {
         let range = |cell: usize| {
             let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);
@@ -83,7 +78,6 @@ impl Memory {
 
     /// Draws the scans around the sensor at the pose of the newest one: planes x SIDE x SIDE, x
     /// ahead in rows, y to the left in columns.
-    ///
     /// A plane of a scan has the largest weight of its returns in each cell; the next one the share
     /// of all scans before these that had a return there, and the last one the range over 64 m.
     pub fn draw(&mut self, pose: &Pose) -> &[f32] {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::config::MAX_SCORE;
 use crate::detector::Detection;
-use crate::filter::{Filter, Sighting};
+use crate::filter::{Filter, Sighting, mahalanobis};
 use crate::object::Outline;
 use crate::{Object, ObjectsConfig};
 
@@ -24,7 +24,6 @@ const HEADING_SIGMA_RAD: f64 = 0.2;
 const GATE: f64 = 50.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
-/// The score below which a track ends.
 const END_SCORE: f64 = -2.0;
 /// Loss of the score by a scan that does not show the object.
 const MISSED_LOSS: f64 = 1.0;
@@ -55,7 +54,7 @@ pub(crate) struct Track {
     size_m: [f64; 2],
     weight: f64,
     /// Identity of an object that was moving once; before it has none.
-    id: Option<u64>,
+    pub id: Option<u64>,
     /// Scans since it was first seen, that one included, and those that showed it.
     age: u32,
     hits: u32,
@@ -65,7 +64,7 @@ pub(crate) struct Track {
     moving: bool,
     /// True if the object is neither seen nor expected any more, or a different track has replaced
     /// it, and if it was about to stand then: the network finds moving objects only.
-    lost: bool,
+    pub lost: bool,
     stopped: bool,
     /// Logarithm of the likelihood ratio of an object to clutter.
     score: f64,
@@ -92,7 +91,6 @@ impl Track {
         }
     }
 
-    /// Predicts it some seconds later.
     pub fn predict(&mut self, dt_s: f64) {
         if !self.stopped {
             self.filter.predict(dt_s, &self.heading);
@@ -110,13 +108,12 @@ impl Track {
         let variance = (detection.sigma_mps * VELOCITY_SIGMAS).powi(2);
         let covariance = self.filter.velocity_covariance() + Matrix2::identity() * variance;
         let faster = detection.velocity - self.filter.velocity();
-        let chi_square = (faster.transpose() * covariance.try_inverse()? * faster)[0];
+        let chi_square = mahalanobis(faster, covariance);
         let spread = covariance.determinant().max(f64::MIN_POSITIVE).ln();
         let cost = place.cost() + chi_square + spread;
         (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
-    /// Updates the track with a detection.
     pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
         self.filter.update(&sighting(detection));
         measure_velocity(&mut self.filter, detection);
@@ -138,13 +135,11 @@ impl Track {
         self.judge_sight();
     }
 
-    /// Notes that a scan does not show it.
     pub fn miss(&mut self) {
         self.score -= MISSED_LOSS;
         self.judge_sight();
     }
 
-    /// Decides whether it is lost.
     fn judge_sight(&mut self) {
         if self.unseen_s > COAST_S || self.score < END_SCORE {
             self.lose();
@@ -157,7 +152,6 @@ impl Track {
         self.stopped = self.filter.velocity().norm() < STOPPING_MPS;
     }
 
-    /// Turns the heading into the direction of the motion.
     fn turn(&mut self) {
         let velocity = self.filter.velocity();
         if velocity.norm() > HEADING_MPS {
@@ -167,10 +161,6 @@ impl Track {
 
     pub fn is_object(&self) -> bool {
         self.id.is_some()
-    }
-
-    pub fn is_lost(&self) -> bool {
-        self.lost
     }
 
     /// Returns whether it has come to its end. An object keeps its identity for longer.
@@ -205,11 +195,6 @@ impl Track {
             && !self.lost
             && self.hits >= BIRTH_HITS
             && self.score >= config.confirm_score
-    }
-
-    /// Makes it a new object.
-    pub fn confirm(&mut self, id: u64) {
-        self.id = Some(id);
     }
 
     /// Makes it the object that another track has lost, which ends.
@@ -265,7 +250,6 @@ impl Track {
     }
 }
 
-/// Returns the position that a detection reports.
 fn sighting(detection: &Detection) -> Sighting {
     Sighting {
         at: detection.at,
@@ -274,7 +258,6 @@ fn sighting(detection: &Detection) -> Sighting {
     }
 }
 
-/// Updates a filter by the velocity of a detection.
 fn measure_velocity(filter: &mut Filter, detection: &Detection) {
     let sigma_mps = detection.sigma_mps * VELOCITY_SIGMAS;
     for axis in [Vector2::x(), Vector2::y()] {
@@ -309,7 +292,6 @@ mod tests {
         }
     }
 
-    /// A track that has been seen so many times.
     fn seen(times: u32, config: &ObjectsConfig) -> Track {
         let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
         for scan in 1..times {
@@ -329,7 +311,7 @@ mod tests {
         let mut track = seen(3, &config);
         assert!((track.position() - Point2::new(16.0, 3.0)).norm() < 0.05);
         assert!(track.judge(&config));
-        track.confirm(7);
+        track.id = Some(7);
         let object = track.object(&config).expect("it is one");
         assert!(object.id == 7 && object.moving && object.age == 3);
     }
@@ -376,12 +358,12 @@ mod tests {
     fn a_lost_object_is_what_begins_where_it_would_be_and_nothing_that_was_beside_it() {
         let config = ObjectsConfig::default();
         let mut lost = seen(4, &config);
-        lost.confirm(1);
+        lost.id = Some(1);
         for _ in 0..8 {
             lost.predict(0.25);
             lost.miss();
         }
-        assert!(lost.is_lost() && !lost.is_over());
+        assert!(lost.lost && !lost.is_over());
         assert_eq!(lost.object(&config), None);
         let begun = |known_s: f64, x: f64| Track {
             known_s,
@@ -395,6 +377,8 @@ mod tests {
         found.take_over(&mut lost);
         assert!(found.id == Some(1) && found.age == 12);
         assert!(lost.is_over() && !found.is_over());
+        lost.score = MAX_SCORE;
+        assert!(!lost.judge(&config), "it becomes none again");
     }
 
     #[test]
@@ -403,7 +387,7 @@ mod tests {
         let mut track = seen(4, &config);
         track.lose();
         assert!(track.is_over());
-        track.confirm(1);
+        track.id = Some(1);
         assert!(!track.is_over() && track.object(&config).is_none());
         track.predict(0.5);
         let begun = Track::new(&detection([8.5, 3.0], [-10.0, 0.0]), &config);
@@ -415,7 +399,7 @@ mod tests {
         let config = ObjectsConfig::default();
         let slow = |scan: u32| detection([20.0 - 0.375 * f64::from(scan), 3.0], [-1.5, 0.0]);
         let mut stopped = Track::new(&slow(0), &config);
-        stopped.confirm(1);
+        stopped.id = Some(1);
         for scan in 1..12 {
             stopped.predict(0.25);
             stopped.update(&slow(scan), &config);
@@ -424,7 +408,7 @@ mod tests {
             stopped.predict(0.25);
             stopped.miss();
         }
-        assert!(stopped.is_lost() && !stopped.is_over());
+        assert!(stopped.lost && !stopped.is_over());
         let place = stopped.position();
         let begun = |ahead_m: f64, velocity: [f64; 2]| {
             let at = [place.x - ahead_m, place.y];
@@ -436,20 +420,5 @@ mod tests {
         assert!(begun(5.0, [-4.0, 0.0]) && begun(2.0, [-4.0, 0.0]) && begun(0.5, [-1.5, 0.0]));
         assert!(!begun(-5.0, [-4.0, 0.0]) && !begun(40.0, [-4.0, 0.0]));
         assert!(!begun(5.0, [4.0, 0.0]));
-    }
-
-    #[test]
-    fn a_lost_object_that_gave_its_identity_away_becomes_none_again_whatever_its_score_is() {
-        let config = ObjectsConfig::default();
-        let mut lost = seen(4, &config);
-        lost.confirm(1);
-        for _ in 0..5 {
-            lost.predict(0.25);
-            lost.miss();
-        }
-        lost.score = MAX_SCORE;
-        assert!(lost.is_lost());
-        Track::new(&detection([0.0, 3.0], [-10.0, 0.0]), &config).take_over(&mut lost);
-        assert!(!lost.judge(&config) && lost.is_over());
     }
 }

@@ -16,7 +16,6 @@ const LEAST_LIKELY: f64 = 0.1;
 /// elsewhere.
 const MAX_GAP_S: f64 = 2.0;
 
-/// Tracks moving objects from scan to scan.
 pub struct ObjectTracker {
     config: ObjectsConfig,
     detector: Detector,
@@ -42,10 +41,8 @@ impl ObjectTracker {
     }
 
     /// Takes the points of the next scan, as measured. Returns the objects at its time: those that
-    /// move, and those that did and stand now.
-    ///
-    /// A scan that is not later than the one before, or later by more than 2 s, ends all
-    /// tracks.
+    /// move, and those that did and stand now. A scan that is not later than the one before, or
+    /// later by more than 2 s, ends all tracks.
     pub fn update(
         &mut self,
         scan: &PlacedScan,
@@ -54,7 +51,8 @@ impl ObjectTracker {
         self.predict(scan.stamp_ns);
         let found = self.detector.detect(scan, points, LEAST_LIKELY)?;
         let rest = self.assign(found);
-        self.begin(&rest);
+        let begun = rest.iter().map(|it| Track::new(it, &self.config));
+        self.tracks.extend(begun);
         self.judge();
         let objects = self.tracks.iter().filter_map(|it| it.object(&self.config));
         self.objects.clear();
@@ -62,21 +60,16 @@ impl ObjectTracker {
         Ok(&self.objects)
     }
 
-    /// Forgets all objects and all that was seen; identities are not given again.
-    fn restart(&mut self) {
-        self.detector.clear();
-        self.tracks.clear();
-        self.objects.clear();
-        self.stamp_ns = None;
-    }
-
-    /// Predicts all tracks at the scan's time.
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
             match dt_s > 0.0 && dt_s <= MAX_GAP_S {
                 true => self.tracks.iter_mut().for_each(|track| track.predict(dt_s)),
-                false => self.restart(),
+                // Identities are not given again.
+                false => {
+                    self.detector.clear();
+                    self.tracks.clear();
+                }
             }
         }
         self.stamp_ns = Some(stamp_ns);
@@ -86,7 +79,7 @@ impl ObjectTracker {
     /// detections.
     fn assign(&mut self, found: Vec<Detection>) -> Vec<Detection> {
         let (objects, others): (Vec<usize>, Vec<usize>) = (0..self.tracks.len())
-            .filter(|index| !self.tracks[*index].is_lost())
+            .filter(|index| !self.tracks[*index].lost)
             .partition(|index| self.tracks[*index].is_object());
         let rest = self.assign_to(&objects, found);
         self.assign_to(&others, rest)
@@ -118,12 +111,6 @@ impl ObjectTracker {
             .collect()
     }
 
-    /// Begins tracks at what belongs to none.
-    fn begin(&mut self, rest: &[Detection]) {
-        let tracks = rest.iter().map(|it| Track::new(it, &self.config));
-        self.tracks.extend(tracks);
-    }
-
     /// Ends tracks, including later tracks of the same vehicle, and decides which move. An object
     /// keeps its identity: two close vehicles may have been confused.
     fn judge(&mut self) {
@@ -131,8 +118,8 @@ impl ObjectTracker {
         self.tracks.sort_by_key(|track| !track.is_object());
         for index in 0..self.tracks.len() {
             let (first, rest) = self.tracks.split_at_mut(index);
-            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0]);
-            if !rest[0].is_lost() && first.iter().any(is_known) {
+            let is_known = |first: &Track| !first.lost && first.is_same(&rest[0]);
+            if !rest[0].lost && first.iter().any(is_known) {
                 rest[0].lose();
             }
         }
@@ -152,7 +139,7 @@ impl ObjectTracker {
         match lost.min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((lost, _)) => found.take_over(&mut self.tracks[lost]),
             None => {
-                found.confirm(self.next_id);
+                found.id = Some(self.next_id);
                 self.next_id += 1;
             }
         }

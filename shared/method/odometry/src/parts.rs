@@ -63,7 +63,7 @@ pub trait Refine: Send + Sync {
 /// let mut odometry = Odometry::with_parts(&config, parts);
 /// # use gyre_simulator::{SimulationConfig, Simulator};
 /// # let drive = Simulator::new(&SimulationConfig { scans: Some(1), ..SimulationConfig::default() })?;
-/// # let scan = drive.render_scan(0).scan;
+/// # let scan = drive.render_scan(0);
 /// odometry.register(&scan.view(), &[])?;
 /// assert!(odometry.raster().slice(s![128.., 122..133]).iter().all(|power| *power == 0.0));
 /// assert!(odometry.raster().iter().any(|power| *power > 0.0));

@@ -36,7 +36,7 @@ fn an_own_dataset_is_registered_and_inspected() {
     let drive = SimulatedDrive::new(&config).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for index in 0..drive.scans() {
-        let scan = drive.simulator().render_scan(index).scan;
+        let scan = drive.simulator().render_scan(index);
         let power: Vec<u8> = scan.view().power().iter().copied().collect();
         let name = format!("{}.u8", scan.geometry.stamp_ns);
         fs::write(folder.path().join(name), power).unwrap();

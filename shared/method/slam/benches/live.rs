@@ -9,8 +9,8 @@ use gyre_estimation::places::Descriptor;
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
-    Keyframe, LoopCandidate, LoopCloser, LoopOptions, LoopOutcome, Place, Query, RecordLog,
-    RecordReader, TrajectoryEstimator, TrajectoryOptions,
+    EstimatorKind, Keyframe, LoopCandidate, LoopCloser, LoopOutcome, Place, Query, RecordLog,
+    RecordReader, SUBMAP_REACH_M, TrajectoryEstimator,
 };
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
@@ -55,8 +55,7 @@ fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
 /// Reads what loop-closure reads when it starts.
 fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     let keyframes = RecordReader::<Keyframe>::open(out).unwrap();
-    let mut closer =
-        LoopCloser::new(LoopOptions::default(), &RefinementConfig::default(), POINTS).unwrap();
+    let mut closer = LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), POINTS).unwrap();
     let mut places = RecordLog::<Place>::open(out).unwrap();
     for index in 0..places.len() {
         let place = places.read(index).unwrap();
@@ -83,7 +82,7 @@ fn trajectory(out: &Path) -> TrajectoryEstimator {
 }
 
 fn pushed(out: &Path) -> TrajectoryEstimator {
-    let mut estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
+    let mut estimator = TrajectoryEstimator::new(EstimatorKind::Graph);
     let mut keyframes = RecordReader::<Keyframe>::open(out).unwrap();
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read_without_points(index).unwrap();

@@ -5,11 +5,9 @@ mod cache;
 
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
-    SUBMAP_REACH_M, neighbours,
+    neighbours,
 };
-use gyre_estimation::{
-    CHI_SQUARE_99_9, Constraint, EstimationError, GraphOptions, Outcome, PoseGraph,
-};
+use gyre_estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
 use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 use thiserror::Error;
@@ -27,36 +25,13 @@ pub trait KeyframeSource {
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
 }
 
-/// Options of [`LoopCloser`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoopOptions {
-    /// Length of the path between a keyframe and the earlier ones that it is compared with, at
-    /// least, m.
-    pub gap_m: f64,
-    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
-    pub submap_reach_m: f64,
-    /// Number of candidates that are verified.
-    pub candidates: usize,
-    /// Distance along the path between two of them, at least, m.
-    pub apart_m: f64,
-    /// Factor of the covariances of loops.
-    pub covariance_scale: f64,
-    /// A loop is rejected if its chi-square against the odometry is larger.
-    pub gate: f64,
-}
-
-impl Default for LoopOptions {
-    fn default() -> Self {
-        Self {
-            gap_m: 100.0,
-            submap_reach_m: SUBMAP_REACH_M,
-            candidates: 3,
-            apart_m: 15.0,
-            covariance_scale: 1.0,
-            gate: CHI_SQUARE_99_9,
-        }
-    }
-}
+/// Length of the path between a keyframe and the earlier ones that it is compared with, at least,
+/// m.
+const GAP_M: f64 = 100.0;
+/// Number of candidates that are verified, and the distance along the path between two, at least,
+/// m.
+const CANDIDATES: usize = 3;
+const APART_M: f64 = 15.0;
 
 /// Errors of [`LoopCloser`].
 #[derive(Debug, Error)]
@@ -69,19 +44,16 @@ pub enum ClosingError<E> {
     Estimation(#[from] EstimationError),
 }
 
-/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival.
-///
-/// A keyframe is described and queried once its submap is complete, which lies as far ahead as
-/// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
-/// they are read again where a submap is drawn.
+/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival. A
+/// keyframe is described and queried once its submap is complete. Descriptors are kept in memory;
+/// points are read again where a submap is drawn.
 pub struct LoopCloser {
-    options: LoopOptions,
+    submap_reach_m: f64,
     describer: Describer,
     verifier: LoopVerifier,
     index: PlaceIndex,
     /// The odometry alone, against which loops are tested.
     odometry: PoseGraph,
-    /// Path up to each keyframe, m.
     path_m: Vec<f64>,
     has_ended: bool,
     /// Number of the keyframe that is queried next.
@@ -92,29 +64,26 @@ pub struct LoopCloser {
 }
 
 impl LoopCloser {
-    /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
-    /// the odometry's.
+    /// Plans the closing of loops between keyframes of at most `capacity` points, whose submaps are
+    /// made of the keyframes up to `submap_reach_m` of the path to each side. `refinement` is the
+    /// odometry's.
     pub fn new(
-        options: LoopOptions,
+        submap_reach_m: f64,
         refinement: &RefinementConfig,
         capacity: usize,
     ) -> Result<Self, ConfigError> {
         let submap = || Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1));
-        let graph = GraphOptions {
-            gate: options.gate,
-            ..GraphOptions::default()
-        };
         Ok(Self {
             describer: Describer::new(),
             verifier: LoopVerifier::new(refinement, capacity)?,
             index: PlaceIndex::default(),
-            odometry: PoseGraph::new(Pose::identity(), graph),
+            odometry: PoseGraph::new(Pose::identity(), GraphOptions::default()),
             path_m: Vec::new(),
             has_ended: false,
             next_query: 0,
             cache: Cache::new(),
             submaps: [submap(), submap()],
-            options,
+            submap_reach_m,
         })
     }
 
@@ -140,7 +109,6 @@ impl LoopCloser {
         self.next_query = keyframe;
     }
 
-    /// Returns the number of keyframes taken.
     pub fn keyframes(&self) -> usize {
         self.path_m.len()
     }
@@ -223,24 +191,19 @@ impl LoopCloser {
     }
 
     fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
-        neighbours(&self.path_m, middle, self.options.submap_reach_m)
+        neighbours(&self.path_m, middle, self.submap_reach_m)
     }
 
     /// The places that look most similar to a keyframe's place.
     fn candidates(&mut self, keyframe: usize) -> Vec<Candidate> {
-        let eligible = self
-            .index
-            .places_until(self.path_m[keyframe] - self.options.gap_m);
+        let eligible = self.index.places_until(self.path_m[keyframe] - GAP_M);
         let Some(descriptor) = self.index.descriptor(keyframe).filter(|_| eligible > 0) else {
             return Vec::new();
         };
-        let found = self
-            .index
-            .query(&descriptor, eligible, self.options.apart_m);
-        found[..found.len().min(self.options.candidates)].to_vec()
+        let found = self.index.query(&descriptor, eligible, APART_M);
+        found[..found.len().min(CANDIDATES)].to_vec()
     }
 
-    /// Draws the submap around a keyframe as the query's (0) or as the candidate's (1).
     fn draw<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -268,12 +231,12 @@ impl LoopCloser {
     ) -> Result<LoopCandidate, EstimationError> {
         let [later, earlier] = &self.submaps;
         let found = self.verifier.verify(later, earlier, candidate);
-        let scaled = self.options.covariance_scale * found.motion.covariance;
+        // As it is read from a file.
         let motion = UncertainMotion {
-            covariance: covariance::unpack(&covariance::pack(&scaled)),
+            covariance: covariance::unpack(&covariance::pack(&found.motion.covariance)),
             ..found.motion
         };
-        let mut outcome = LoopOutcome::from(found.outcome);
+        let mut outcome = found.outcome;
         let mut chi_square = f64::NAN;
         if outcome == LoopOutcome::Accepted {
             let closing = Constraint::closing(candidate.place, keyframe, motion);

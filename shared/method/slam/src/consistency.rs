@@ -1,8 +1,5 @@
-//! Consistency of loops with each other: of a set of loops the largest part that agrees.
-//!
-//! Odometry over a long path is so uncertain that a wrong loop can pass its gate, and one that is
-//! taken bends the whole trajectory. But two loops and the odometry between their ends make a
-//! cycle, and odometry between the ends of two loops of one drive is mostly short.
+//! Consistency of loops with each other. Odometry over a long path is so uncertain that a wrong loop
+//! can pass its gate; but two loops and the mostly short odometry between their ends make a cycle.
 
 use std::cmp::Reverse;
 

@@ -2,11 +2,8 @@
 
 use gyre_geometry::{Pose, interpolate};
 
-/// Corrects the poses of all scans like the keyframes around them.
-///
-/// The pose of a scan continues by odometry from the keyframe before it, and evenly leads to the
-/// keyframe after it: the corrected trajectory does not jump where a keyframe was moved against the
-/// one before.
+/// Corrects the poses of all scans like the keyframes around them: a scan continues by odometry from
+/// the keyframe before it, and evenly leads to the keyframe after it.
 #[derive(Clone, Debug, Default)]
 pub struct Correction {
     keyframes: Vec<Anchor>,
@@ -15,7 +12,6 @@ pub struct Correction {
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
     seq: u64,
-    /// The pose of the odometry frame in the map frame.
     map_from_odometry: Pose,
 }
 

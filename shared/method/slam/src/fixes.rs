@@ -23,37 +23,26 @@ const LEAST_WEIGHT: f64 = 0.25;
 const LEAST_SHARE: f64 = 0.5;
 
 /// Why no fix of a drive is used.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FixRefusal {
     /// None was measured between two keyframes.
+    #[error(
+        "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.delay_s is wrong"
+    )]
     Elsewhere,
     /// Their clock differs from the radar's by this.
+    #[error(
+        "by the speeds of both the fixes are {0} against the radar: add that to gnss.delay_s if it is their clock"
+    )]
     Clock(ClockOffset),
     /// Most of them contradict the others, the odometry or the loops.
+    #[error(
+        "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of another drive"
+    )]
     Contradictory { agreeing: usize, taken: usize },
     /// They are so close together that they do not determine the heading.
+    #[error("the fixes are too near each other for their uncertainty to tell the heading")]
     Undetermined,
-}
-
-impl std::fmt::Display for FixRefusal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Elsewhere => f.write_str(
-                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.delay_s is wrong",
-            ),
-            Self::Clock(offset) => write!(
-                f,
-                "by the speeds of both the fixes are {offset} against the radar: add that to gnss.delay_s if it is their clock"
-            ),
-            Self::Contradictory { agreeing, taken } => write!(
-                f,
-                "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of another drive"
-            ),
-            Self::Undetermined => f.write_str(
-                "the fixes are too near each other for their uncertainty to tell the heading",
-            ),
-        }
-    }
 }
 
 /// The fixes of a log by what became of them. The first three and `taken` are all fixes.
@@ -101,7 +90,6 @@ impl Fixes {
         }
     }
 
-    /// Returns what became of the fixes.
     pub fn counts(&self) -> FixCounts {
         let counted = self.counts.outside + self.counts.thinned + self.counts.far;
         FixCounts {
@@ -198,7 +186,6 @@ impl Fixes {
         self.refusal.clone_from(&before.refusal);
     }
 
-    /// Gives these fixes to the graph.
     pub(crate) fn give(
         &self,
         graph: &mut PoseGraph,
@@ -208,9 +195,8 @@ impl Fixes {
         new.try_for_each(|(_, position)| graph.measure(*position))
     }
 
-    /// Compares the clock of the fixes with the radar's, by their speeds. Returns whether they can
-    /// be used.
-    pub(crate) fn compare_clocks(&mut self, keyframes: &[Stamped]) -> bool {
+    /// Compares the clock of the fixes with the radar's, by their speeds.
+    pub(crate) fn compare_clocks(&mut self, keyframes: &[Stamped]) {
         self.clock = self.offset(keyframes);
         let wrong = self.clock.filter(|clock| self.is_wrong(clock, keyframes));
         self.refusal = match wrong {
@@ -218,10 +204,8 @@ impl Fixes {
             Some(clock) => Some(FixRefusal::Clock(clock)),
             None => None,
         };
-        self.refusal.is_none()
     }
 
-    /// Checks that the graph agrees with most of the fixes.
     pub(crate) fn check(&mut self, graph: &PoseGraph) {
         let taken = graph.positions().count();
         let agreeing = graph.positions().filter(|it| it.weight >= LEAST_WEIGHT);

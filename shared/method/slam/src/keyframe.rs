@@ -27,7 +27,6 @@ pub struct Keyframe {
     /// [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
     pub twist: Twist,
-    /// Length of the path through all keyframes up to this one, m.
     pub path_m: f64,
     /// The points of the scan as measured: with `twist` they are freed of motion and of the Doppler
     /// shift.
@@ -115,10 +114,7 @@ impl Record for Keyframe {
 
 impl RecordReader<Keyframe> {
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
-    /// checked: the checksum covers the whole record.
-    ///
-    /// # Panics
-    /// There are no more than `index` keyframes.
+    /// checked: the checksum covers the whole record. Panics beyond the last keyframe.
     pub fn read_without_points(&mut self, index: usize) -> Result<Keyframe, LogError> {
         self.read_start(index, size_of::<Fixed>())
     }

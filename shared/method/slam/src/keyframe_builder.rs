@@ -7,7 +7,6 @@ use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 
 use crate::Keyframe;
 
-/// A scan with its pose by odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanPose {
     /// The scan's number in the run, from 0 without gaps.
@@ -16,7 +15,6 @@ pub struct ScanPose {
     pub scan: u64,
     /// Time of the scan, the middle of the sweep, ns since 1970 on the sensor's clock.
     pub stamp_ns: i64,
-    /// The pose, in the frame of the first scan.
     pub pose: UncertainMotion,
     /// The motion from the scan before; zero where the chain of motions starts.
     pub motion: OdometryMotion,

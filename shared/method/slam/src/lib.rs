@@ -1,16 +1,4 @@
 //! SLAM on keyframes: the loops of a drive, and the trajectory corrected by them.
-//!
-//! Reading order:
-//! - [`Keyframe`]: a scan whose pose is corrected, with all that a loop or a map needs of it;
-//! - [`SlamConfig`]: the section `[slam]` of a run's configuration;
-//! - [`KeyframeBuilder`]: makes keyframes from the poses of odometry;
-//! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe
-//!   with their verdicts;
-//! - [`RecordLog`]: the files of keyframes, places and queries of a run; [`RecordReader`] follows
-//!   them;
-//! - [`Fixes`]: the fixes of GNSS of a drive;
-//! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
-//! - [`Correction`]: the poses of all scans.
 
 mod closing;
 mod config;
@@ -28,14 +16,15 @@ mod trajectory;
 mod variance;
 mod verdict;
 
-pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
+pub use closing::{ClosingError, KeyframeSource, LoopCloser};
 pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
 pub use fixes::{FixCounts, FixRefusal, Fixes};
+pub use gyre_estimation::places::SUBMAP_REACH_M;
 pub use keyframe::Keyframe;
 pub use keyframe_builder::{KeyframeBuilder, ScanPose};
 pub use loops::{LoopCandidate, LoopOutcome, Query};
 pub use place::Place;
 pub use records::{Record, RecordLog, RecordReader, records_path};
-pub use trajectory::{EstimatorKind, TrajectoryEstimator, TrajectoryOptions};
+pub use trajectory::{EstimatorKind, TrajectoryEstimator};
 pub use verdict::{JudgedLoop, LoopVerdict};

@@ -2,33 +2,16 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_estimation::Constraint;
-use gyre_estimation::places::VerificationOutcome;
+pub use gyre_estimation::places::VerificationOutcome as LoopOutcome;
 use gyre_geometry::UncertainMotion;
 use gyre_storage::LogMagic;
 
 use crate::{Record, exact::ExactMotion};
 
-/// The verdict on a candidate, and the reason of a rejection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LoopOutcome {
-    /// The two keyframes are of the same place.
-    Accepted,
-    /// The correlation of the submaps is too low.
-    LowCorrelation,
-    /// Another motion correlates nearly as well.
-    Ambiguous,
-    /// The points do not determine the motion.
-    Undetermined,
-    /// The motion contradicts the odometry between the two keyframes.
-    ContradictsOdometry,
-}
-
 /// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
-    /// The number of the found keyframe.
     pub place: usize,
-    /// The correlation coefficient of the descriptors.
     pub similarity: f64,
     /// The pose of the queried keyframe in the frame of the found one, with its covariance; a
     /// covariance of zero if the two were not aligned.
@@ -50,7 +33,6 @@ pub struct LoopCandidate {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
     pub keyframe: usize,
-    /// The candidates that were verified.
     pub candidates: Vec<LoopCandidate>,
 }
 
@@ -74,17 +56,6 @@ const OUTCOMES: [LoopOutcome; 5] = [
     LoopOutcome::Undetermined,
     LoopOutcome::ContradictsOdometry,
 ];
-
-impl From<VerificationOutcome> for LoopOutcome {
-    fn from(outcome: VerificationOutcome) -> Self {
-        match outcome {
-            VerificationOutcome::Accepted => Self::Accepted,
-            VerificationOutcome::LowCorrelation => Self::LowCorrelation,
-            VerificationOutcome::Ambiguous => Self::Ambiguous,
-            VerificationOutcome::Undetermined => Self::Undetermined,
-        }
-    }
-}
 
 impl Query {
     /// Returns the accepted loops as constraints from the found keyframe to the queried one, each

@@ -10,11 +10,9 @@ use crate::{Record, exact::ExactMotion};
 /// All that later queries need of a keyframe beside its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
-    /// Path through all keyframes up to this one, m.
     pub path_m: f64,
     /// The motion from the keyframe before, as [`Keyframe::motion`](crate::Keyframe::motion).
     pub motion: UncertainMotion,
-    /// The descriptor of the submap around the keyframe.
     pub descriptor: Descriptor,
 }
 

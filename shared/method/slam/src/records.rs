@@ -1,9 +1,6 @@
-//! The files of keyframes, of places and of queries, for resuming SLAM.
-//!
-//! A keyframe is appended before its pose is journalled. So each pose of the journal that the
-//! selection of keyframes takes has its keyframe. Places and queries follow from the keyframes:
-//! missing ones are computed again, and those beyond the last keyframe are cut off. The end of the
-//! stream is a record without bytes.
+//! The files of keyframes, of places and of queries, for resuming SLAM. A keyframe is appended before
+//! its pose is journalled. Missing places and queries are computed again, and those beyond the last
+//! keyframe are cut off. The end of the stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
@@ -14,7 +11,6 @@ use gyre_storage::{Log, LogError, LogMagic, LogReader};
 
 /// An entry of a file of records.
 pub trait Record: Sized {
-    /// The name of the file, in the folder `journal` of the results.
     const FILE: &'static str;
     /// The start of the file, with the version of the records.
     const MAGIC: LogMagic;
@@ -25,12 +21,10 @@ pub trait Record: Sized {
     fn decode(bytes: &[u8]) -> Option<Self>;
 }
 
-/// Returns the path of such records of the run that writes to `out`.
 pub fn records_path<R: Record>(out: &Path) -> PathBuf {
     out.join("journal").join(R::FILE)
 }
 
-/// A file of records, open for appending.
 #[derive(Debug)]
 pub struct RecordLog<R> {
     log: Log,
@@ -65,7 +59,6 @@ impl<R: Record> RecordLog<R> {
         self.log.len() - usize::from(self.ended)
     }
 
-    /// Returns whether there are no records.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -77,10 +70,7 @@ impl<R: Record> RecordLog<R> {
         self.log.reserve(bytes);
     }
 
-    /// Reads a record.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
+    /// Reads a record; panics beyond the last one.
     pub fn read(&mut self, index: usize) -> Result<R, LogError> {
         self.log.read(index, &mut self.buffer)?;
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
@@ -108,7 +98,6 @@ impl<R: Record> RecordLog<R> {
         self.sync()
     }
 
-    /// Makes all records survive a power failure.
     pub fn sync(&self) -> Result<(), LogError> {
         self.log.sync()
     }
@@ -168,7 +157,6 @@ impl<R: Record> RecordReader<R> {
         self.log.len() - usize::from(self.ended)
     }
 
-    /// Returns whether there were no records.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -179,15 +167,11 @@ impl<R: Record> RecordReader<R> {
         self.log.unchanged().min(self.len())
     }
 
-    /// Returns whether no more records follow.
     pub fn has_ended(&self) -> bool {
         self.ended
     }
 
-    /// Reads a record.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
+    /// Reads a record; panics beyond the last one.
     pub fn read(&mut self, index: usize) -> Result<R, LogError> {
         self.log.read(index, &mut self.buffer)?;
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))

@@ -1,8 +1,8 @@
 //! The poses of keyframes, estimated from odometry and loops.
 
 use gyre_estimation::{
-    Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome, PoseGraph,
-    TrajectoryFilter, Verdict, WeightedPosition,
+    Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter, Verdict,
+    WeightedPosition,
 };
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Matrix3;
@@ -15,7 +15,6 @@ use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 /// proportion to it.
 const GROWTH: usize = 8;
 
-/// The estimator of the poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorKind {
     /// The pose graph: all poses by least squares.
@@ -25,32 +24,15 @@ pub enum EstimatorKind {
     Filter,
 }
 
-/// Options of [`TrajectoryEstimator`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrajectoryOptions {
-    pub kind: EstimatorKind,
-    /// Loops between two stretches of the path of this length count as one: their errors are
-    /// dependent, m.
-    pub group_m: f64,
-}
+/// Loops between two stretches of the path of this length count as one: their errors are dependent,
+/// m.
+const GROUP_M: f64 = 5.0;
 
-impl Default for TrajectoryOptions {
-    fn default() -> Self {
-        Self {
-            kind: EstimatorKind::Graph,
-            group_m: 5.0,
-        }
-    }
-}
-
-/// Estimates the poses of all keyframes from their motions and loops.
-///
-/// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of
-///   the set of loops, and not of when loops came.
-/// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of
-///   the time. Its result may depend a little on when loops came.
+/// Estimates the poses of all keyframes from their motions and loops. The result of
+/// [`TrajectoryEstimator::solve`] does not depend on when loops came; the result of
+/// [`TrajectoryEstimator::update`], in a fraction of the time, may a little.
 pub struct TrajectoryEstimator {
-    options: TrajectoryOptions,
+    kind: EstimatorKind,
     keyframes: Vec<Corrected>,
     odometry: DeadReckoning,
     /// By the later keyframe, then by the earlier one.
@@ -69,23 +51,12 @@ pub struct TrajectoryEstimator {
     estimator: Estimator,
 }
 
-/// A keyframe with its pose by odometry.
 struct Corrected {
     seq: u64,
-    stamp_ns: i64,
-    odometry: Pose,
+    at: Stamped,
     motion: UncertainMotion,
     noise: Matrix3<f64>,
     path_m: f64,
-}
-
-impl Corrected {
-    fn stamped(&self) -> Stamped {
-        Stamped {
-            stamp_ns: self.stamp_ns,
-            odometry: self.odometry,
-        }
-    }
 }
 
 enum Estimator {
@@ -100,7 +71,8 @@ impl Estimator {
                 Self::Graph(Box::new(PoseGraph::new(start, GraphOptions::default())))
             }
             EstimatorKind::Filter => {
-                Self::Filter(TrajectoryFilter::new(start, FilterOptions::default()))
+                let limit = TrajectoryFilter::MAX_KEYFRAMES;
+                Self::Filter(TrajectoryFilter::new(start, limit))
             }
         }
     }
@@ -112,7 +84,20 @@ impl Estimator {
         }
     }
 
-    /// Takes a loop, and notes the verdict.
+    fn graph(&self) -> Option<&PoseGraph> {
+        match self {
+            Self::Graph(graph) => Some(graph),
+            Self::Filter(_) => None,
+        }
+    }
+
+    fn graph_mut(&mut self) -> Option<&mut PoseGraph> {
+        match self {
+            Self::Graph(graph) => Some(graph),
+            Self::Filter(_) => None,
+        }
+    }
+
     fn take(&mut self, it: &mut JudgedLoop) -> Result<(), EstimationError> {
         (it.verdict, it.weight) = match self.apply(&it.constraint)?.outcome {
             Outcome::Accepted => (LoopVerdict::Used, 1.0),
@@ -125,10 +110,10 @@ impl Estimator {
 }
 
 impl TrajectoryEstimator {
-    pub fn new(options: TrajectoryOptions) -> Self {
+    pub fn new(kind: EstimatorKind) -> Self {
         Self {
-            estimator: Estimator::new(Pose::identity(), options.kind),
-            options,
+            estimator: Estimator::new(Pose::identity(), kind),
+            kind,
             keyframes: Vec::new(),
             odometry: DeadReckoning::default(),
             loops: Vec::new(),
@@ -154,17 +139,17 @@ impl TrajectoryEstimator {
     /// whether the next solution has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
-            fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
+            fixes.advance(keyframe, ends[0].at, ends[1].at);
         }
         let before = &self.fixes.positions()[..self.given_fixes];
         let stand = fixes.positions().starts_with(before);
         let have_changed = !stand || fixes.settled() > self.given_fixes;
-        match (stand, &mut self.estimator) {
-            (true, _) => fixes.go_on_from(&self.fixes),
-            (false, Estimator::Graph(graph)) => graph.clear_positions(),
-            (false, Estimator::Filter(_)) => {}
-        }
-        if !stand {
+        if stand {
+            fixes.go_on_from(&self.fixes);
+        } else {
+            if let Some(graph) = self.estimator.graph_mut() {
+                graph.clear_positions();
+            }
             (self.judged_fixes, self.given_fixes) = (0, 0);
         }
         self.fixes = fixes;
@@ -176,7 +161,7 @@ impl TrajectoryEstimator {
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         match self.keyframes.len().checked_sub(1) {
             None => {
-                self.estimator = Estimator::new(keyframe.pose.motion, self.options.kind);
+                self.estimator = Estimator::new(keyframe.pose.motion, self.kind);
             }
             Some(last) => {
                 let motion = Constraint::odometry(last, keyframe.motion);
@@ -186,15 +171,17 @@ impl TrajectoryEstimator {
         self.odometry.push(&keyframe.motion);
         self.keyframes.push(Corrected {
             seq: keyframe.seq,
-            stamp_ns: keyframe.stamp_ns,
-            odometry: keyframe.pose.motion,
+            at: Stamped {
+                stamp_ns: keyframe.stamp_ns,
+                odometry: keyframe.pose.motion,
+            },
             motion: keyframe.motion,
             noise: keyframe.noise,
             path_m: keyframe.path_m,
         });
         if let [.., from, to] = self.keyframes.as_slice() {
-            let from_index = self.keyframes.len() - 2;
-            self.fixes.advance(from_index, from.stamped(), to.stamped());
+            let keyframe = self.keyframes.len() - 2;
+            self.fixes.advance(keyframe, from.at, to.at);
         }
         Ok(())
     }
@@ -210,16 +197,16 @@ impl TrajectoryEstimator {
     /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is
     /// decided by its keyframes.
     pub fn close_loop(&mut self, closing: &Constraint) -> Result<(), EstimationError> {
-        let chi_square = match &self.estimator {
-            Estimator::Graph(graph) => graph.test(closing)?.chi_square,
-            Estimator::Filter(_) => 0.0,
+        let chi_square = match self.estimator.graph() {
+            Some(graph) => graph.test(closing)?.chi_square,
+            None => 0.0,
         };
         self.insert(closing, chi_square)
     }
 
     /// Moves all poses to where they fit best, and judges all loops again.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
-        match self.options.kind {
+        match self.kind {
             EstimatorKind::Graph => {
                 self.judge_all();
                 self.compare_clocks();
@@ -233,7 +220,7 @@ impl TrajectoryEstimator {
     /// to where they fit best. All loops are judged again from time to time, and if one was wrong
     /// the poses begin at the odometry.
     pub fn update(&mut self) -> Result<(), EstimationError> {
-        match self.options.kind {
+        match self.kind {
             EstimatorKind::Graph => self.update_graph(),
             EstimatorKind::Filter => self.update_filter(),
         }
@@ -265,9 +252,9 @@ impl TrajectoryEstimator {
     /// loops. Returns the scale, which is 1 without loops and in the filter. It takes some 1,400
     /// solutions of the equations.
     pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
-        self.scale = match &mut self.estimator {
-            Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
-            Estimator::Filter(_) => 1.0,
+        self.scale = match self.estimator.graph_mut() {
+            Some(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
+            None => 1.0,
         };
         Ok(self.scale)
     }
@@ -277,13 +264,11 @@ impl TrajectoryEstimator {
         &self.loops
     }
 
-    /// Returns the motions between the keyframes.
     pub fn odometry(&self) -> impl Iterator<Item = Constraint> + '_ {
         let motions = self.keyframes.iter().skip(1).enumerate();
         motions.map(|(last, keyframe)| Constraint::odometry(last, keyframe.motion))
     }
 
-    /// Returns the fixes of GNSS, and what became of them.
     pub fn fixes(&self) -> &Fixes {
         &self.fixes
     }
@@ -291,18 +276,16 @@ impl TrajectoryEstimator {
     /// Returns the fixes that the keyframes have, with their weights as of the last solution; none
     /// if they were refused, and in the filter.
     pub fn positions(&self) -> Vec<WeightedPosition> {
-        match &self.estimator {
-            Estimator::Graph(graph) => graph.positions().collect(),
-            Estimator::Filter(_) => Vec::new(),
-        }
+        let graph = self.estimator.graph();
+        graph.map_or(Vec::new(), |graph| graph.positions().collect())
     }
 
     /// Returns the pose of the frame of the first scan in the frame of the fixes, east and north,
     /// with its covariance; `None` without fixes that determine it.
     pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
-        let frame = match &mut self.estimator {
-            Estimator::Graph(graph) => graph.uncertain_frame()?,
-            Estimator::Filter(_) => None,
+        let frame = match self.estimator.graph_mut() {
+            Some(graph) => graph.uncertain_frame()?,
+            None => None,
         };
         Ok(frame.map(|frame| UncertainMotion {
             covariance: frame.covariance * self.scale,
@@ -310,17 +293,15 @@ impl TrajectoryEstimator {
         }))
     }
 
-    /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
-        let keyframes = self.keyframes.iter().map(|it| (it.seq, it.odometry));
+        let keyframes = self.keyframes.iter().map(|it| (it.seq, it.at.odometry));
         Correction::new(keyframes, self.poses())
     }
 
-    /// Starts an estimator with the first keyframe.
     fn start(&self) -> Estimator {
         let start = self.keyframes.first();
-        let start = start.map_or(Pose::identity(), |first| first.odometry);
-        Estimator::new(start, self.options.kind)
+        let start = start.map_or(Pose::identity(), |first| first.at.odometry);
+        Estimator::new(start, self.kind)
     }
 
     fn insert(&mut self, closing: &Constraint, chi_square: f64) -> Result<(), EstimationError> {
@@ -333,8 +314,7 @@ impl TrajectoryEstimator {
                 keyframes,
             });
         }
-        let stretch =
-            |keyframe: usize| (self.keyframes[keyframe].path_m / self.options.group_m) as u64;
+        let stretch = |keyframe: usize| (self.keyframes[keyframe].path_m / GROUP_M) as u64;
         let group = Some(stretch(from) << 32 | stretch(to));
         let judged = JudgedLoop::new(
             Constraint {
@@ -361,7 +341,6 @@ impl TrajectoryEstimator {
         self.compare(|it| it.is_used());
     }
 
-    /// Compares some of the loops with those that speak for all.
     fn compare(&mut self, some: impl Fn(&JudgedLoop) -> bool) {
         for it in self.loops.iter_mut().filter(|it| some(it)) {
             if !self.speakers.accept(&self.odometry, &it.constraint) {
@@ -370,17 +349,16 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Compares the clock of the fixes with the keyframes' clock.
     fn compare_clocks(&mut self) {
-        let stamped: Vec<Stamped> = self.keyframes.iter().map(Corrected::stamped).collect();
+        let stamped: Vec<Stamped> = self.keyframes.iter().map(|it| it.at).collect();
         self.fixes.compare_clocks(&stamped);
         self.judged_fixes = self.fixes.taken();
     }
 
-    /// Solves the graph with all loops that are used and so many fixes, from the odometry. If most
-    /// of the fixes contradict the solution it is made without them.
+    /// Solves the graph with all loops that are used and so many fixes, from the odometry; without
+    /// the fixes if most of them contradict the solution.
     fn solve_graph(&mut self, fixes: usize) -> Result<(), EstimationError> {
-        let Estimator::Graph(graph) = &mut self.estimator else {
+        let Some(graph) = self.estimator.graph_mut() else {
             return Ok(());
         };
         graph.clear_loops();
@@ -427,7 +405,7 @@ impl TrajectoryEstimator {
         {
             return self.solve_graph(settled);
         }
-        let Estimator::Graph(graph) = &mut self.estimator else {
+        let Some(graph) = self.estimator.graph_mut() else {
             return Ok(());
         };
         for it in self.loops.iter_mut().filter(new) {
@@ -443,9 +421,8 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Notes the kernel's weights of the loops that are used.
     fn weigh(&mut self) {
-        let Estimator::Graph(graph) = &self.estimator else {
+        let Some(graph) = self.estimator.graph() else {
             return;
         };
         let mut weights: Vec<_> = graph
@@ -477,7 +454,6 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Takes the new loops into the standing filter.
     fn update_filter(&mut self) -> Result<(), EstimationError> {
         let new = self.loops.iter_mut().filter(|it| !it.is_taken);
         for it in new {

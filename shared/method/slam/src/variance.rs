@@ -27,12 +27,9 @@ impl Residuals {
     }
 }
 
-/// Returns the scale of the covariances of the poses of a solved graph with `loops`.
-///
-/// The errors of odometry are not independent: over some lengths of the path they add up, over
-/// others they cancel. The scale is the largest of the whole graph's scale and the odometry's
-/// scales over stretches of some lengths, so that residuals of all lengths match the covariances,
-/// or are smaller.
+/// Returns the scale of the covariances of the poses of a solved graph with `loops`: the largest of
+/// the whole graph's scale and the odometry's scales over stretches of some lengths, because the
+/// errors of odometry add up over some lengths of the path, and cancel over others.
 pub fn scale(
     graph: &mut PoseGraph,
     odometry: &DeadReckoning,

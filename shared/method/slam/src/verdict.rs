@@ -4,14 +4,11 @@ use std::fmt;
 
 use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 
-/// The verdict of the trajectory on a loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoopVerdict {
-    /// The loop is part of the estimate.
     Used,
     /// It contradicts the odometry between its keyframes; in the filter, the estimate.
     ContradictsOdometry,
-    /// It contradicts most of the other loops.
     ContradictsLoops,
     /// The group has been counted in full (filter alone).
     Redundant,
@@ -57,7 +54,6 @@ impl JudgedLoop {
         judged
     }
 
-    /// Judges the loop by its test against the odometry alone.
     pub(crate) fn judge_by_odometry(&mut self) {
         self.verdict = match self.chi_square <= CHI_SQUARE_99_9 {
             true => LoopVerdict::Used,

@@ -2,12 +2,12 @@
 
 use crate::common::{AROUND, Drive};
 use gyre_scan_matching::RefinementConfig;
-use gyre_slam::{LoopCloser, LoopOptions, LoopOutcome, Place, Query, Record};
+use gyre_slam::{LoopCloser, LoopOutcome, Place, Query, Record, SUBMAP_REACH_M};
 
 const KEYFRAMES: usize = 2 * AROUND + 20;
 
 fn closer() -> LoopCloser {
-    LoopCloser::new(LoopOptions::default(), &RefinementConfig::default(), 400).unwrap()
+    LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), 400).unwrap()
 }
 
 /// The logs of a closer: its places and its queries, encoded.

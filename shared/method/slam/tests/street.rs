@@ -6,9 +6,7 @@ use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_scan_matching::RefinementConfig;
-use gyre_slam::localisation::{
-    Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status,
-};
+use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
 use gyre_slam::{Keyframe, RecordLog};
 use nalgebra::{Matrix3, Point2};
 
@@ -71,8 +69,7 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
 }
 
 fn localiser(street: &[(Point2<f64>, f32)]) -> Localiser {
-    let options = LocaliserOptions::default();
-    Localiser::new(map(street), options, &RefinementConfig::default(), CAPACITY).unwrap()
+    Localiser::new(map(street), &RefinementConfig::default(), CAPACITY).unwrap()
 }
 
 /// Localises scans at some poses, one after the other, with their true motions.
@@ -152,7 +149,7 @@ fn a_drive_is_tracked_and_lost_three_seconds_after_it_has_left_the_map() {
         assert_near(found, truth);
     }
     for (found, truth) in found.iter().zip(&poses) {
-        let away_m = -truth.translation.x - LocaliserOptions::default().reach_m;
+        let away_m = -truth.translation.x - 15.0;
         assert!(away_m < 0.5 || found.fix.is_none(), "{found:?} at {truth}");
         assert!(
             away_m < 31.0 || found.status == Status::Lost,
@@ -212,22 +209,11 @@ fn a_saved_map_finds_the_same_places() {
     assert_eq!(opened.keyframes(), saved.keyframes());
     let points = seen(&street, &pose(99.0, 0.5, 1.0));
     let found = [saved, opened].map(|map| {
-        let options = LocaliserOptions::default();
-        let localiser = Localiser::new(map, options, &RefinementConfig::default(), CAPACITY);
+        let localiser = Localiser::new(map, &RefinementConfig::default(), CAPACITY);
         localiser.unwrap().find(&points, &Twist::default())
     });
     assert!(found[0].is_some());
     assert_eq!(found[0], found[1]);
-}
-
-#[test]
-fn keyframes_that_make_no_map_are_refused() {
-    let refused = |error: MapError| error.to_string();
-    let empty = Map::new(Vec::new()).err().map(refused);
-    assert_eq!(
-        empty.as_deref(),
-        Some("a map needs keyframes: there is none")
-    );
 }
 
 #[test]
@@ -242,6 +228,11 @@ fn a_map_that_was_not_written_to_its_end_is_refused_with_what_to_do() {
     assert_eq!(
         refused(folder.path()),
         "keyframes.log has 100 keyframes and no end, and places.index 151: draw the map again with gyre map"
+    );
+    let none = Map::new(Vec::new()).err().map(|error| error.to_string());
+    assert_eq!(
+        none.as_deref(),
+        Some("a map needs keyframes: there is none")
     );
     let nowhere = refused(&folder.path().join("nowhere"));
     assert!(nowhere.contains("places.index"), "{nowhere}");

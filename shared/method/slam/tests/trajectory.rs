@@ -3,7 +3,7 @@
 use crate::common::{AROUND, Drive};
 use gyre_estimation::Constraint;
 use gyre_geometry::{Pose, UncertainMotion, pose};
-use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions};
+use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,11 +51,7 @@ fn wrong(drive: &Drive, length: usize) -> Vec<Constraint> {
 }
 
 fn odometry(drive: &Drive, kind: EstimatorKind) -> TrajectoryEstimator {
-    let options = TrajectoryOptions {
-        kind,
-        ..TrajectoryOptions::default()
-    };
-    let mut estimator = TrajectoryEstimator::new(options);
+    let mut estimator = TrajectoryEstimator::new(kind);
     drive
         .keyframes
         .iter()
@@ -184,22 +180,19 @@ fn wrong_loops_that_came_first_are_withdrawn() {
 }
 
 #[test]
-fn the_filter_takes_loops_one_by_one() {
+fn the_filter_corrects_as_the_graph_does_one_by_one_too() {
     let drive = Drive::new(KEYFRAMES, 8);
     let right = right(&drive);
-    let all = estimate(&drive, &right, EstimatorKind::Filter);
+    let [graph, filter] =
+        [EstimatorKind::Graph, EstimatorKind::Filter].map(|kind| estimate(&drive, &right, kind));
+    let [by_graph_m, by_filter_m] = [&graph, &filter].map(|it| rms_m(&drive, it.poses()));
+    assert!(
+        (by_graph_m - by_filter_m).abs() < 0.02,
+        "{by_graph_m} m, {by_filter_m} m"
+    );
     let updated = update(&drive, &right, EstimatorKind::Filter);
-    let apart_m = farthest_m(updated.poses(), all.poses());
+    let apart_m = farthest_m(updated.poses(), filter.poses());
     assert!(apart_m < 0.02, "{apart_m} m");
-}
-
-#[test]
-fn the_filter_corrects_as_the_graph_does() {
-    let drive = Drive::new(KEYFRAMES, 8);
-    let right = right(&drive);
-    let [graph, filter] = [EstimatorKind::Graph, EstimatorKind::Filter]
-        .map(|kind| rms_m(&drive, estimate(&drive, &right, kind).poses()));
-    assert!((graph - filter).abs() < 0.02, "{graph} m, {filter} m");
 }
 
 #[test]
@@ -221,7 +214,6 @@ fn covariances_are_scaled_to_the_residuals() {
     };
     let right = right(&stated(1.0));
     let scales = [0.25, 1.0, 4.0, 16.0].map(|factor| scale(factor, &right));
-    println!("{scales:?}");
     for (scale, expected) in scales.into_iter().zip([4.0, 1.0, 0.25, 0.0625]) {
         // The prior of 1 has the weight of a few residuals.
         let between = [0.6 * f64::min(expected, 1.0), 1.4 * f64::max(expected, 1.0)];

@@ -13,7 +13,7 @@ use gyre_messages::flag;
 use gyre_radar::Trajectory;
 use gyre_slam::{
     Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
-    TrajectoryEstimator, TrajectoryOptions, records_path,
+    TrajectoryEstimator, records_path,
 };
 use gyre_terminal::Failure;
 
@@ -67,11 +67,8 @@ impl Slam {
         let gnss = gnss_log(configuration, out.path())?;
         let config = &configuration.gnss;
         let fixes = gnss.as_ref().map(|log| log.on_radar(config));
-        let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
-            kind,
-            ..TrajectoryOptions::default()
-        })
-        .with_fixes(Fixes::new(fixes.unwrap_or_default(), config));
+        let mut estimator = TrajectoryEstimator::new(kind)
+            .with_fixes(Fixes::new(fixes.unwrap_or_default(), config));
         let mut known = Vec::new();
         for index in 0..keyframes.len() {
             // With its points, because the checksum covers the whole record.

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::config::SimulatedGyroConfig;
+use super::SimulatedGyroConfig;
 use crate::{episodes::Episodes, stream::Stream};
 
 /// Time between two stamps while a host catches up, ns.
@@ -11,10 +11,8 @@ const CATCH_UP_NS: i64 = 100_000;
 /// Time between stalls and their duration, s. Samples of a stall are stamped at its end.
 const STALL_EVERY_S: f64 = 2.0;
 const STALL_S: f64 = 0.06;
-/// Share of the samples that are lost.
 const LOST: f64 = 0.02;
 
-/// Stamps samples in their order.
 pub(super) struct Clock<'a> {
     config: &'a SimulatedGyroConfig,
     rng: ChaCha8Rng,
@@ -23,12 +21,11 @@ pub(super) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// The clock of a drive.
     pub fn new(config: &'a SimulatedGyroConfig, seed: u64) -> Self {
-        let stalls = Stream::GyroStalls.generator(seed);
+        let stalls = Stream::GYRO_STALLS.generator(seed);
         Self {
             config,
-            rng: Stream::GyroClock.generator(seed),
+            rng: Stream::GYRO_CLOCK.generator(seed),
             stalls: Episodes::new(STALL_EVERY_S, STALL_S, stalls),
             last_ns: i64::MIN + CATCH_UP_NS,
         }

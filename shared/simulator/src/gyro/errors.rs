@@ -12,7 +12,6 @@ use crate::stream::Stream;
 /// Steps of a log, of a rad/s and of a m/s².
 const LOG_STEPS: [f64; 2] = [1e9, 1e6];
 
-/// A gyro with the errors of one drive.
 pub(super) struct Errors {
     rng: ChaCha8Rng,
     step_radps: f64,
@@ -29,9 +28,8 @@ pub(super) struct Errors {
 }
 
 impl Errors {
-    /// Draws the errors of a drive.
     pub fn new(figures: &GyroFigures, seed: u64) -> Self {
-        let mut rng = Stream::GyroErrors.generator(seed);
+        let mut rng = Stream::GYRO_ERRORS.generator(seed);
         let bias = normal(&mut rng);
         let scale = normal(&mut rng);
         let askew = normal(&mut rng);
@@ -75,7 +73,6 @@ impl Errors {
     }
 }
 
-/// Three numbers of a standard normal distribution.
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }

@@ -6,24 +6,19 @@ use gyre_samples::{Sample, SampleKind};
 
 use super::attitude::MeanMotion;
 use super::clock::Clock;
-use super::config::SimulatedGyroConfig;
 use super::errors::Errors;
-use crate::path::Path;
+use crate::simulator::Simulator;
 
-/// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
 /// The first row of the file, as in the log of RADIATE.
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
-/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
-pub(crate) fn samples(
-    config: &SimulatedGyroConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<Sample>> {
+/// The samples during a drive, by their stamps: rates and accelerations in the gyro's own axes.
+/// `None` without a gyro.
+pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
+    let (config, seed) = (&simulator.config().gyro, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     let figures = config.profile.figures()?;
     let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);
@@ -43,7 +38,7 @@ pub(crate) fn samples(
 }
 
 /// The samples as CSV: a reader gets exactly the numbers of the samples.
-pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
+pub(crate) fn csv(samples: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for sample in samples {
         let _ = write!(text, "{}", sample.stamp_ns);
@@ -52,5 +47,5 @@ pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
         }
         text.push('\n');
     }
-    text.into_bytes()
+    text
 }

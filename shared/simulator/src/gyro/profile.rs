@@ -1,9 +1,7 @@
-//! Gyros that can be bought, by the figures of their data sheets.
-//!
-//! "Typical" figures are taken for standard deviations. No data sheet states how a bias changes
-//! with the temperature inside a vehicle: a change of 1 K over 10 minutes is assumed, and the
-//! accuracy of the mounting is assumed where the sheet has no figure.
+//! Gyros that can be bought, by the figures of their data sheets; "typical" ones as standard
+//! deviations. The temperature is assumed to change by 1 K over 10 minutes.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Degrees in radians.
@@ -13,9 +11,7 @@ const HOUR_S: f64 = 3600.0;
 const TEMPERATURE_S: f64 = 600.0;
 
 /// A gyro.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GyroProfile {
     /// No gyro, and no log.
@@ -34,7 +30,6 @@ pub enum GyroProfile {
 /// The figures of a gyro; standard deviations unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroFigures {
-    /// Samples a second.
     pub rate_hz: f64,
     /// Angle random walk, rad/√s.
     pub noise_rad_per_sqrt_s: f64,
@@ -46,14 +41,12 @@ pub struct GyroFigures {
     pub bias_drift_s: f64,
     /// Error of the scale, a share.
     pub scale_sigma: f64,
-    /// Misalignment about each axis, rad.
     pub misalignment_rad: f64,
     /// Step of the rates, rad/s.
     pub step_radps: f64,
 }
 
 impl GyroProfile {
-    /// The figures of this gyro; `None` for no gyro.
     pub fn figures(self) -> Option<GyroFigures> {
         let exact = GyroFigures {
             rate_hz: 100.0,

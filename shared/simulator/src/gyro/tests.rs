@@ -24,7 +24,7 @@ fn drive(profile: GyroProfile, faults: bool, scans: usize) -> (Simulator, Vec<Sa
         ..SimulationConfig::default()
     };
     let simulator = Simulator::new(&config).unwrap();
-    let samples = simulator.gyro_samples().unwrap();
+    let samples = log::samples(&simulator).unwrap();
     (simulator, samples)
 }
 
@@ -93,7 +93,7 @@ fn each_error_is_as_large_as_its_figure() {
 #[test]
 fn the_numbers_of_the_file_are_those_of_the_samples_which_more_scans_extend() {
     let (_, samples) = drive(GyroProfile::Asm330lhh, true, 20);
-    let text = String::from_utf8(log::csv(&samples)).unwrap();
+    let text = log::csv(&samples);
     let rows: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(rows.len(), samples.len());
     for (row, sample) in rows.iter().zip(&samples) {
@@ -104,7 +104,7 @@ fn the_numbers_of_the_file_are_those_of_the_samples_which_more_scans_extend() {
         }
     }
     let longer = log::csv(&drive(GyroProfile::Asm330lhh, true, 30).1);
-    assert!(longer.starts_with(text.as_bytes()));
+    assert!(longer.starts_with(&text));
 }
 
 #[test]

@@ -7,12 +7,9 @@ use std::f64::consts::PI;
 use super::SideFile;
 use crate::simulator::Simulator;
 
-pub(crate) const FOLDER: &str = "radar";
-
 /// Time over which the yaw rate is taken, seconds.
 const RATE_SPAN_S: f64 = 1e-3;
 
-/// The scan's time, microseconds since 1970.
 pub(crate) fn stamp_us(simulator: &Simulator, index: usize) -> i64 {
     simulator
         .time(index)
@@ -24,10 +21,7 @@ pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
 }
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
-    vec![(
-        "applanix/radar_poses.csv".into(),
-        radar_poses_csv(simulator).into_bytes(),
-    )]
+    vec![("applanix/radar_poses.csv", radar_poses_csv(simulator))]
 }
 
 fn radar_poses_csv(simulator: &Simulator) -> String {

@@ -5,22 +5,14 @@
 use super::SideFile;
 use crate::simulator::Simulator;
 
-pub(crate) const FOLDER: &str = "radar";
-
 pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
     format!("{}.png", simulator.time(index).start_us)
 }
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
     vec![
-        (
-            "radar.timestamps".into(),
-            timestamps(simulator).into_bytes(),
-        ),
-        (
-            "gt/radar_odometry.csv".into(),
-            radar_odometry_csv(simulator).into_bytes(),
-        ),
+        ("radar.timestamps", timestamps(simulator)),
+        ("gt/radar_odometry.csv", radar_odometry_csv(simulator)),
     ]
 }
 

@@ -11,8 +11,6 @@ use crate::output::HostStamps;
 use crate::simulator::Simulator;
 use crate::stream::Stream;
 
-pub(crate) const FOLDER: &str = "Navtech_Polar";
-
 /// Sensor periods that a reader can recognise, microseconds.
 const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
 /// One host stall in this many scans: a recording has seven in 466.
@@ -22,32 +20,27 @@ const STALL_S: std::ops::Range<f64> = 0.3..1.4;
 /// Time between scans while the host catches up, microseconds.
 const CATCH_UP_US: i64 = 5_000;
 
-/// Checks that readers of this format can handle the radar.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
-    match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
-        true => Ok(()),
-        false => Err(SimulatorError::Config {
-            key: "output.format",
-            value: "radiate".to_owned(),
-            expected: format!(
-                "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
-                sampling.azimuths, sampling.bins, sampling.period_us
-            ),
-        }),
+    if PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
+        return Ok(());
     }
+    let expected = format!(
+        "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
+        sampling.azimuths, sampling.bins, sampling.period_us
+    );
+    Err(SimulatorError::key("output.format", "radiate", expected))
 }
 
 /// Probability that the host loses an azimuth: as in a recording, where 46 % of the scans have lost
 /// one or more.
 const LOST: f64 = 0.0015;
 
-/// Returns the azimuths of a scan that the host loses, in order.
-pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
+pub(crate) fn lost_azimuths(simulator: &Simulator, index: usize) -> Vec<usize> {
     if index == 0 || !simulator.config().sensor.lost_azimuths {
         return Vec::new();
     }
-    let mut rng = Stream::Lost(index as u64).generator(seed);
+    let mut rng = Stream::lost(index as u64).generator(simulator.config().sensor_seed());
     let azimuths = 0..simulator.sampling().azimuths;
     azimuths.filter(|_| rng.random_bool(LOST)).collect()
 }
@@ -99,7 +92,7 @@ fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) ->
         return 0;
     }
     let block = index / STALL_EVERY;
-    let mut rng = Stream::Stall(block as u64).generator(seed);
+    let mut rng = Stream::stall(block as u64).generator(seed);
     let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
     let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
     let Some(waiting) = index.checked_sub(begins) else {
@@ -117,51 +110,6 @@ pub(crate) fn transpose(rows: &[u8], stride: usize, first_byte: usize, into: &mu
         for (bin, line) in into.chunks_exact_mut(azimuths).enumerate() {
             for (row, to) in rows.chunks_exact(stride).zip(&mut line[8 * group..]) {
                 *to = row[first_byte + bin];
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use crate::config::SimulationConfig;
-
-    #[test]
-    fn a_stalling_host_is_late_by_at_most_its_stall_and_keeps_the_order() {
-        let simulator = Simulator::new(&SimulationConfig {
-            scans: Some(400),
-            ..SimulationConfig::default()
-        })
-        .unwrap();
-        let late: Vec<i64> = (0..400)
-            .map(|i| delay_us(&simulator, HostStamps::Stalling, 3, i))
-            .collect();
-        let received: Vec<i64> = (0..400)
-            .map(|i| simulator.time(i).start_us + late[i])
-            .collect();
-        assert!(received.windows(2).all(|w| w[0] < w[1]));
-        let worst = late.iter().copied().max().unwrap();
-        assert!((600_000..1_400_000).contains(&worst), "{worst}");
-        let on_time = late.iter().filter(|late| **late == 0).count();
-        assert!((330..396).contains(&on_time), "{on_time}");
-    }
-
-    #[test]
-    fn transposing_leaves_the_metadata_out() {
-        let (azimuths, bins, first) = (21, 13, 2);
-        let rows: Vec<u8> = (0..azimuths * (bins + first))
-            .map(|i| (i * 7 % 251) as u8)
-            .collect();
-        let mut into = vec![0; azimuths * bins];
-        transpose(&rows, bins + first, first, &mut into);
-        for azimuth in 0..azimuths {
-            for bin in 0..bins {
-                assert_eq!(
-                    into[bin * azimuths + azimuth],
-                    rows[azimuth * (bins + first) + first + bin]
-                );
             }
         }
     }

@@ -3,13 +3,9 @@
 use gyre_geometry::{Pose, Twist};
 use nalgebra::Vector2;
 
-/// A motion of the sensor that is continuous in time.
 pub trait Path: Send + Sync {
     /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s`
-    /// seconds after the start.
-    ///
-    /// Defined for every time: before its start and after its end a path of finite duration stands
-    /// still.
+    /// seconds after the start; a path of finite duration stands still before and after.
     fn pose(&self, time_s: f64) -> Pose;
 
     /// Duration, seconds; infinite for an endless path.

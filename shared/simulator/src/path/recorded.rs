@@ -15,7 +15,6 @@ const FASTEST_MPS: f64 = 90.0;
 /// Maximum time between two poses, seconds.
 const LONGEST_PAUSE_S: f64 = 3600.0;
 
-/// The part of a file that is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excerpt {
     /// Start, seconds after the file's first pose.
@@ -26,16 +25,12 @@ pub struct Excerpt {
     pub rate_hz: f64,
 }
 
-/// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a
-/// path along it, in the frame of the excerpt's first pose.
-///
-/// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
-/// is noise of the poses.
+/// Returns a path along a trajectory of any format, in the frame of the excerpt's first pose. It
+/// passes within 5 cm of 95 % of a real drive's poses, whose noise is the rest.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
-    let error = |reason: String| SimulatorError::Drive {
-        path: path.to_owned(),
-        reason,
+    let error = |reason: String| {
+        SimulatorError::Refused(format!("cannot drive along {}: {reason}", path.display()))
     };
     let end_s = excerpt.from_s + excerpt.for_s;
     let within: Vec<_> = poses
@@ -65,7 +60,6 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
     Ok(SplinePath::measured(&moved))
 }
 
-/// Reads a file, or one of the program.
 fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     match gyre_shipped::text(path) {
         Some(text) => parse_trajectory(text, path),
@@ -73,7 +67,6 @@ fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     }
 }
 
-/// Rejects jumps, and pauses of hours.
 fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
     for pair in poses.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);

@@ -17,7 +17,6 @@ pub struct Sample<const D: usize> {
     pub at: f64,
     /// The coordinates there.
     pub value: [f64; D],
-    /// The weight in the fit.
     pub weight: f64,
 }
 
@@ -34,7 +33,6 @@ impl<const D: usize> UniformSpline<D> {
     /// Fits a curve with knots `step` apart to the samples, with a penalty on its third derivative
     /// (Eilers and Marx, "Flexible smoothing with B-splines and penalties", 1996): a low-pass
     /// filter with the frequency `cutoff`, periods a unit.
-    ///
     /// The samples are in ascending order; without any the curve is zero.
     pub fn fit(samples: &[Sample<D>], step: f64, cutoff: f64) -> Self {
         let (start, end) = match samples {
@@ -162,7 +160,6 @@ fn factorise(band: &mut [[f64; BAND]]) {
     }
 }
 
-/// Solves the factorised equations in place.
 fn solve<const D: usize>(factors: &[[f64; BAND]], right: &mut [[f64; D]]) {
     let reach = |row: usize| BAND.min(factors.len() - row);
     let subtract = |from: [f64; D], factor: f64, what: [f64; D]| {
@@ -196,15 +193,6 @@ mod tests {
                 weight: 1.0,
             })
             .collect()
-    }
-
-    #[test]
-    fn basis_functions_sum_to_one_and_their_slopes_to_zero() {
-        for i in 0..=10 {
-            let share = f64::from(i) / 10.0;
-            assert!((basis(share).iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            assert!(basis_slope(share).iter().sum::<f64>().abs() < 1e-13);
-        }
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use crate::interpolate::interpolate;
 
 /// Two-way side lobes: dB below the main lobe by the angle in half-power widths.
-///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths
 /// beside isolated strong echoes.
 const SIDE_LOBES: [(f64, f64); 8] = [
@@ -35,7 +34,7 @@ impl Antenna {
         let power = |widths: f64| {
             // One half at half a width.
             let main_db = -12.04 * widths * widths;
-            let db = main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db));
+            let db = main_db.max(interpolate(&SIDE_LOBES, widths));
             10f64.powf(db / 10.0)
         };
         let entries = (REACH * STEPS) as usize + 1;

@@ -6,7 +6,6 @@ use super::antenna::Antenna;
 use super::echoes::{Echo, NEGLIGIBLE_POWER};
 use super::sweep_poses::{MARGIN, SweepPoses};
 
-/// Echoes sorted by the azimuths whose beams they lie in.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BeamIndex {
     /// The azimuths whose beams each echo lies in.
@@ -17,9 +16,8 @@ pub(super) struct BeamIndex {
 }
 
 impl BeamIndex {
-    /// Sorts the echoes of a sweep.
     pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, sweep_poses: &SweepPoses) {
-        let (azimuths, step_rad) = (sweep_poses.azimuths(), sweep_poses.step_rad());
+        let (azimuths, step_rad) = (sweep_poses.azimuths, sweep_poses.step_rad);
         let span = |echo: &Echo| {
             let reach =
                 antenna.reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0)) / step_rad;

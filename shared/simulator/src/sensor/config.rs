@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::SimulatorError;
-use crate::limits::require_within;
 use crate::profile::{Profile, Receiver, Sampling};
 
 /// Encoder counts from one azimuth to the next of a radar with another number of azimuths than its
@@ -53,32 +51,6 @@ pub struct SensorConfig {
 }
 
 impl SensorConfig {
-    /// Checks that all values can be simulated.
-    pub fn validate(&self) -> Result<(), SimulatorError> {
-        let sampling = self.sampling();
-        let (bins, azimuths) = (sampling.bins as f64, sampling.azimuths as f64);
-        for (key, value, min, max) in [
-            ("sensor.bins", bins, 16.0, 20_000.0),
-            ("sensor.bin_m", sampling.range_resolution_m, 0.01, 5.0),
-            ("sensor.azimuths", azimuths, 60.0, 4000.0),
-            ("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0),
-            ("sensor.beam_deg", self.beam_deg.unwrap_or(1.0), 0.1, 20.0),
-            ("sensor.noise_db", self.noise_db, -20.0, 40.0),
-            ("sensor.range_offset_m", sampling.range_offset_m, -5.0, 5.0),
-            ("sensor.doppler_s", sampling.doppler_s, -0.5, 0.5),
-            (
-                "sensor.azimuth_eccentricity_rad",
-                self.azimuth_eccentricity_rad,
-                -0.05,
-                0.05,
-            ),
-        ] {
-            require_within(key, value, min, max)?;
-        }
-        Ok(())
-    }
-
-    /// The transmitter and receiver of the radar.
     pub fn receiver(&self) -> Receiver {
         let kind = self.profile.receiver();
         Receiver {
@@ -89,7 +61,6 @@ impl SensorConfig {
         }
     }
 
-    /// The sampling of the radar.
     pub fn sampling(&self) -> Sampling {
         let mut sampling = self.profile.sampling();
         if let Some(azimuths) = self.azimuths.filter(|count| *count != sampling.azimuths) {

@@ -11,7 +11,6 @@ use crate::world::World;
 
 /// Echoes with less power are neglected.
 pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
-/// Minimum range of scatterers, metres.
 const NEAREST_M: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
@@ -33,18 +32,15 @@ impl Echo {
     }
 }
 
-/// Everything that determines the amplitudes.
 pub(super) struct View<'a> {
     pub sweep_poses: &'a SweepPoses,
     pub line_of_sight: &'a LineOfSight,
     pub receiver: &'a Receiver,
-    /// True if echoes fluctuate with the direction.
     pub fluctuates: bool,
     pub reach_m: f64,
 }
 
 impl View<'_> {
-    /// Adds the echoes of the static world.
     pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
         let centre = self.sweep_poses.middle().position;
         for scatterer in world.around(centre, self.reach_m).flatten() {
@@ -52,7 +48,6 @@ impl View<'_> {
         }
     }
 
-    /// Adds the echoes of the moving bodies.
     pub fn moving(&self, moving: &[Moving<'_>], echoes: &mut Vec<Echo>) {
         for mover in moving {
             for scatterer in &mover.body.scatterers {
@@ -84,7 +79,6 @@ impl View<'_> {
         });
     }
 
-    /// The power that is received from a scatterer at a place.
     fn power(
         &self,
         scatterer: &Scatterer,
@@ -103,7 +97,7 @@ impl View<'_> {
             false => 1.0,
         };
         let in_sight = scatterer.cross_section_m2
-            * scatterer.aspect.gain(direction)
+            * scatterer.gain(direction)
             * fluctuation
             * self.receiver.sensitivity(range_m);
         if in_sight < NEGLIGIBLE_POWER {

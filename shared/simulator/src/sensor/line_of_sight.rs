@@ -2,10 +2,10 @@
 
 use nalgebra::{Rotation2, Vector2};
 
+use super::Scene;
 use super::sweep_poses::{AzimuthPose, MARGIN, SweepPoses};
-use crate::body::{Moving, NO_BODY, Wall};
+use crate::body::{NO_BODY, Wall};
 use crate::occlusion::crossing;
-use crate::world::World;
 
 /// Rays for each azimuth of 0.9 degrees.
 const RAYS: usize = 4;
@@ -16,7 +16,6 @@ const CLEARANCE_M: f32 = 0.1;
 /// Maximum distance of a moving body's parts from its origin, metres: more than half a car.
 const MOVER_M: f64 = 3.0;
 
-/// A wall along a ray.
 #[derive(Clone, Copy, Debug)]
 struct WallHit {
     range_m: f32,
@@ -33,24 +32,17 @@ pub(super) struct LineOfSight {
 }
 
 impl LineOfSight {
-    /// Casts the rays of a sweep.
-    pub fn cast(
-        &mut self,
-        world: &World,
-        moving: &[Moving<'_>],
-        sweep_poses: &SweepPoses,
-        reach_m: f64,
-    ) {
+    pub fn cast(&mut self, scene: &Scene<'_>, sweep_poses: &SweepPoses, reach_m: f64) {
         self.passed.clear();
         self.starts.clear();
-        for ray in 0..(sweep_poses.azimuths() + 2 * MARGIN) * RAYS {
+        for ray in 0..(sweep_poses.azimuths + 2 * MARGIN) * RAYS {
             let first = self.passed.len();
             self.starts.push(first);
             let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
             let azimuth_pose = sweep_poses.at(azimuth.floor());
-            let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad();
+            let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad;
             let line = Rotation2::new(-turned) * azimuth_pose.beam * reach_m;
-            self.cast_ray(world, moving, azimuth_pose, line, reach_m);
+            self.cast_ray(scene, azimuth_pose, line, reach_m);
             self.passed[first..].sort_unstable_by(|a, b| a.range_m.total_cmp(&b.range_m));
         }
         self.starts.push(self.passed.len());
@@ -58,8 +50,7 @@ impl LineOfSight {
 
     fn cast_ray(
         &mut self,
-        world: &World,
-        moving: &[Moving<'_>],
+        scene: &Scene<'_>,
         azimuth_pose: &AzimuthPose,
         line: Vector2<f64>,
         reach_m: f64,
@@ -72,12 +63,9 @@ impl LineOfSight {
                 body: wall.body,
             });
         };
-        world.walls_between(
-            azimuth_pose.position,
-            azimuth_pose.position + line,
-            &mut add,
-        );
-        for mover in moving {
+        let from = azimuth_pose.position;
+        scene.world.walls.between(from, from + line, &mut add);
+        for mover in scene.movers {
             let pose = mover.pose_after(azimuth_pose.time_s);
             let from = pose.inverse_transform_point(&azimuth_pose.position);
             let line = pose.inverse_transform_vector(&line);

@@ -4,7 +4,6 @@ use crate::profile::Receiver;
 
 /// Half-length of the point response, resolution cells: side lobes beyond are 55 dB down.
 const CELLS_KEPT: f64 = 4.0;
-/// Tabulated positions within a bin.
 const SUB_BINS: usize = 16;
 /// Energy of the point response in cells: mean power in every bin of independent noise with power 1
 /// in each cell.
@@ -18,7 +17,6 @@ pub struct RangeSpectrum {
     taps: usize,
     real: Vec<f32>,
     imaginary: Vec<f32>,
-    /// Power of incoherent echoes.
     incoherent: Vec<f32>,
     bins: usize,
     bins_per_cell: f64,
@@ -27,7 +25,6 @@ pub struct RangeSpectrum {
 }
 
 impl RangeSpectrum {
-    /// An empty spectrum of `bins` range bins of `bin_m` metres.
     pub fn new(bins: usize, bin_m: f64, receiver: &Receiver) -> Self {
         let bins_per_cell = receiver.cell_m / bin_m;
         let half = (bins_per_cell * CELLS_KEPT).ceil() as usize;
@@ -50,7 +47,6 @@ impl RangeSpectrum {
         }
     }
 
-    /// Removes all echoes.
     pub fn clear(&mut self) {
         self.real.fill(0.0);
         self.imaginary.fill(0.0);
@@ -81,7 +77,6 @@ impl RangeSpectrum {
         }
     }
 
-    /// Adds an incoherent echo with a power.
     pub fn add_power(&mut self, bin: f64, power: f32) {
         let Some((response, first)) = self.place(bin) else {
             return;
@@ -139,7 +134,6 @@ fn hann_response(cells: f64) -> f64 {
 }
 
 /// Converts power to counts of half a decibel, with compression above `full_scale`.
-///
 /// The CTS350-X and the RAS6 send integer powers: scans hold 0, 6, 9, 12, 14, 15, 17, ... (powers
 /// 1, 2, 3, ...) and nothing between.
 pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {

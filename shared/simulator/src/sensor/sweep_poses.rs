@@ -11,7 +11,6 @@ use crate::profile::Sampling;
 /// Additional azimuths before the first and after the last, whose beams reach into the sweep.
 pub(super) const MARGIN: usize = 16;
 
-/// The sensor at one azimuth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AzimuthPose {
     pub position: Point2<f64>,
@@ -20,7 +19,6 @@ pub(super) struct AzimuthPose {
     pub heading_rad: f64,
     /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
-    /// Time since the middle of the sweep, seconds.
     pub time_s: f64,
 }
 
@@ -28,9 +26,9 @@ pub(super) struct AzimuthPose {
 #[derive(Clone, Debug, Default)]
 pub(super) struct SweepPoses {
     all: Vec<AzimuthPose>,
-    azimuths: usize,
+    pub azimuths: usize,
     first_rad: f64,
-    step_rad: f64,
+    pub step_rad: f64,
 }
 
 impl SweepPoses {
@@ -79,18 +77,8 @@ impl SweepPoses {
         ((azimuth + MARGIN as f64 + 0.5) as usize).min(self.all.len() - 1)
     }
 
-    /// The sensor at the middle of the sweep.
     pub fn middle(&self) -> &AzimuthPose {
         self.at((self.azimuths / 2) as f64)
-    }
-
-    pub fn azimuths(&self) -> usize {
-        self.azimuths
-    }
-
-    /// Radians from one azimuth to the next.
-    pub fn step_rad(&self) -> f64 {
-        self.step_rad
     }
 
     /// Visits the azimuths, with fractions, where the beam passes an object at
@@ -116,7 +104,6 @@ impl SweepPoses {
         }
     }
 
-    /// Iterates from an initial guess of the azimuth.
     fn beam_pass(&self, guess: f64, place: &impl Fn(&AzimuthPose) -> Point2<f64>) -> f64 {
         let mut azimuth = guess;
         for _ in 0..4 {

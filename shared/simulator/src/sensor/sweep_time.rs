@@ -1,11 +1,8 @@
 //! The time of a sweep.
 
-/// The time of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SweepTime {
-    /// The first azimuth's stamp, microseconds since 1970.
     pub start_us: i64,
-    /// Time of one turn, microseconds.
     pub period_us: i64,
     pub azimuths: usize,
     /// The start of the drive, microseconds since 1970.
@@ -13,7 +10,6 @@ pub struct SweepTime {
 }
 
 impl SweepTime {
-    /// Stamp of an azimuth, microseconds since 1970.
     pub fn stamp_us(&self, azimuth: usize) -> i64 {
         self.start_us + self.period_us * azimuth as i64 / self.azimuths as i64
     }

@@ -1,18 +1,14 @@
-//! Images of a simulated drive, rendered before they are needed.
-//!
-//! One thread per processor renders the next image that no other has begun, up to [`AHEAD`] images
-//! ahead of the reader. So memory is bounded; and since an image depends on its number alone,
-//! threads and their timing change nothing.
+//! Images of a simulated drive, rendered before they are needed, each by a thread. Since an image
+//! depends on its number alone, threads and their timing change nothing.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::collections::VecDeque;
 use std::thread::{self, JoinHandle};
 
 use gyre_datasets::ImageSource as _;
 
-use crate::simulated_drive::{Renderer, SimulatedDrive};
+use crate::simulated_drive::SimulatedDrive;
 
-/// Images rendered or being rendered that have not been read yet.
+/// Images that are rendered ahead of the reader, which bounds the memory.
 const AHEAD: usize = 6;
 /// The renderers yield to the stages: on a vehicle the radar does their work.
 const NICENESS: i32 = 10;
@@ -20,8 +16,8 @@ const NICENESS: i32 = 10;
 /// The images ahead of a reader. They may be read in any order; consecutive ones are fast.
 #[derive(Default)]
 pub(crate) struct Ahead {
-    /// Started with the second image: a reader may need the first only to inspect the recording.
-    crew: Option<Crew>,
+    coming: VecDeque<(usize, JoinHandle<Vec<u8>>)>,
+    /// A reader may need the first image only to inspect the recording.
     looked: bool,
 }
 
@@ -29,164 +25,33 @@ impl Ahead {
     /// Copies image `index` to `pixels` as soon as it is rendered; false if the reader renders the
     /// image itself.
     pub fn take(&mut self, drive: &SimulatedDrive, index: usize, pixels: &mut [u8]) -> bool {
-        let looked = std::mem::replace(&mut self.looked, true);
-        if looked {
-            let crew = self.crew.get_or_insert_with(|| Crew::start(drive, index));
-            crew.take(index, pixels);
+        if !std::mem::replace(&mut self.looked, true) {
+            return false;
         }
-        looked
+        self.coming.retain(|(at, _)| *at >= index);
+        if self.coming.front().is_some_and(|(at, _)| *at > index) {
+            self.coming.clear();
+        }
+        let next = self.coming.back().map_or(index, |(last, _)| last + 1);
+        for at in next..(index + AHEAD).min(drive.scans()) {
+            self.coming.push_back((at, start(drive.clone(), at)));
+        }
+        let rendered = self.coming.pop_front().map(|(_, image)| image.join());
+        if let Some(Ok(image)) = &rendered {
+            pixels.copy_from_slice(image);
+        }
+        matches!(rendered, Some(Ok(_)))
     }
 }
 
-/// The threads that render.
-struct Crew {
-    shared: Arc<Shared>,
-    threads: Vec<JoinHandle<()>>,
-}
-
-struct Shared {
-    queue: Mutex<Queue>,
-    changed: Condvar,
-}
-
-/// The rendered scans, and the next scans to render and to read.
-#[derive(Default)]
-struct Queue {
-    /// All images.
-    images: usize,
-    /// The image that is asked for next.
-    wanted: usize,
-    /// The image that is rendered next.
-    next: usize,
-    ready: BTreeMap<usize, Vec<u8>>,
-    spare: Vec<Vec<u8>>,
-    stop: bool,
-}
-
-impl Queue {
-    /// The next image to render, where there is room for one.
-    fn claim(&mut self) -> Option<usize> {
-        let index = self.next;
-        let room = index < self.images && index < self.wanted + AHEAD;
-        self.next += usize::from(room);
-        room.then_some(index)
-    }
-
-    /// Forgets what lies before `index`; all, where that has not been begun.
-    fn turn_to(&mut self, index: usize) {
-        let begun = (self.wanted..self.next).contains(&index);
-        self.wanted = index;
-        if !begun {
-            self.next = index;
-        }
-        let (wanted, end) = (self.wanted, self.next);
-        while let Some(entry) = self
-            .ready
-            .first_entry()
-            .filter(|entry| *entry.key() < wanted)
-        {
-            self.spare.push(entry.remove());
-        }
-        while let Some(entry) = self.ready.last_entry().filter(|entry| *entry.key() >= end) {
-            self.spare.push(entry.remove());
-        }
-    }
-
-    /// Keeps an image, unless it is not wanted any more.
-    fn keep(&mut self, index: usize, pixels: Vec<u8>) {
-        let superseded = match (self.wanted..self.next).contains(&index) {
-            true => self.ready.insert(index, pixels),
-            false => Some(pixels),
-        };
-        self.spare.extend(superseded);
-    }
-}
-
-impl Shared {
-    /// The queue is consistent even after a panic: nothing that can fail is done while it is
-    /// locked.
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn wait<'a>(&self, queue: MutexGuard<'a, Queue>) -> MutexGuard<'a, Queue> {
-        self.changed
-            .wait(queue)
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn work(&self, mut renderer: Renderer) {
-        let bytes = renderer.size().bytes();
-        let mut queue = self.lock();
-        while !queue.stop {
-            let Some(index) = queue.claim() else {
-                queue = self.wait(queue);
-                continue;
-            };
-            let spare = queue.spare.pop();
-            drop(queue);
-            let mut pixels = spare.unwrap_or_else(|| vec![0; bytes]);
-            renderer.draw(index, &mut pixels);
-            queue = self.lock();
-            queue.keep(index, pixels);
-            self.changed.notify_all();
-        }
-    }
-}
-
-impl Crew {
-    fn start(drive: &SimulatedDrive, first: usize) -> Self {
-        let queue = Queue {
-            images: drive.scans(),
-            wanted: first,
-            next: first,
-            ..Queue::default()
-        };
-        let shared = Arc::new(Shared {
-            queue: Mutex::new(queue),
-            changed: Condvar::new(),
-        });
-        let threads = thread::available_parallelism().map_or(1, |n| n.get());
-        let start = |_| {
-            let (shared, renderer) = (shared.clone(), drive.renderer());
-            thread::spawn(move || {
-                // On Linux this concerns this thread alone.
-                let _ = rustix::process::nice(NICENESS);
-                shared.work(renderer);
-            })
-        };
-        Self {
-            threads: (0..threads).map(start).collect(),
-            shared,
-        }
-    }
-
-    /// Copies image `index` to `pixels` as soon as it is rendered.
-    fn take(&self, index: usize, pixels: &mut [u8]) {
-        let mut queue = self.shared.lock();
-        queue.turn_to(index);
-        self.shared.changed.notify_all();
-        let image = loop {
-            match queue.ready.remove(&index) {
-                Some(image) => break image,
-                None => queue = self.shared.wait(queue),
-            }
-        };
-        pixels.copy_from_slice(&image);
-        queue.spare.push(image);
-        queue.wanted = index + 1;
-        self.shared.changed.notify_all();
-    }
-}
-
-impl Drop for Crew {
-    fn drop(&mut self) {
-        self.shared.lock().stop = true;
-        self.shared.changed.notify_all();
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
-    }
+fn start(drive: SimulatedDrive, index: usize) -> JoinHandle<Vec<u8>> {
+    thread::spawn(move || {
+        // On Linux this concerns this thread alone.
+        let _ = rustix::process::nice(NICENESS);
+        let mut pixels = vec![0; drive.image_size().bytes()];
+        drive.renderer().draw(index, &mut pixels);
+        pixels
+    })
 }
 
 #[cfg(test)]
@@ -209,28 +74,5 @@ mod tests {
             alone.draw(index, &mut b);
             assert!(a == b, "image {index}");
         }
-    }
-
-    #[test]
-    fn no_more_is_rendered_than_there_is_room_for() {
-        let mut queue = Queue {
-            images: 100,
-            wanted: 3,
-            next: 3,
-            ..Queue::default()
-        };
-        let claimed: Vec<usize> = std::iter::from_fn(|| queue.claim()).collect();
-        assert_eq!(claimed, (3..3 + AHEAD).collect::<Vec<_>>());
-        for index in claimed {
-            queue.keep(index, vec![index as u8]);
-        }
-        queue.turn_to(5);
-        assert_eq!((queue.ready.len(), queue.spare.len()), (AHEAD - 2, 2));
-        queue.turn_to(50);
-        queue.keep(6, vec![6]);
-        assert_eq!(
-            (queue.ready.len(), queue.spare.len(), queue.claim()),
-            (0, AHEAD + 1, Some(50))
-        );
     }
 }

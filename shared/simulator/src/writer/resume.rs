@@ -22,7 +22,6 @@ const MAX_IMAGE_BYTES: u64 = 64 << 20;
 /// The file with the options to read it; see [`gyre_datasets::open`].
 pub(super) const DATASET_OPTIONS: &str = "dataset.toml";
 
-/// Content of [`MADE_BY`].
 pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorError> {
     Ok(format!(
         "# The configuration that made this dataset.\n{}",
@@ -30,20 +29,15 @@ pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorErro
     ))
 }
 
-/// Content of [`DATASET_OPTIONS`].
 pub(super) fn dataset_options(drive: &SimulatedDrive) -> Result<String, SimulatorError> {
     to_toml(&drive.dataset_options())
 }
 
 fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
-    toml::to_string(value).map_err(|error| SimulatorError::Config {
-        key: "simulation",
-        value: error.to_string(),
-        expected: "a configuration that can be written as TOML".to_owned(),
-    })
+    let expected = "a configuration that can be written as TOML";
+    toml::to_string(value).map_err(|error| SimulatorError::key("simulation", error, expected))
 }
 
-/// Returns the scans that `out` lacks.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,
@@ -60,10 +54,7 @@ pub(super) fn missing(
         .iter()
         .find(|name| !made_by_this || !ours.contains(name.as_str()))
     {
-        return Err(SimulatorError::OutputInUse {
-            folder,
-            other: other.clone(),
-        });
+        return Err(super::in_use(&folder, other));
     }
     let (kept, missing): (Vec<usize>, Vec<usize>) =
         (0..names.len()).partition(|&i| there.contains(&names[i]));
@@ -78,15 +69,12 @@ pub(super) fn missing(
 
 /// Lists the complete images and removes incomplete ones.
 fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
-    let listing = |source| SimulatorError::List {
-        folder: folder.to_owned(),
-        source,
-    };
+    let listing = StorageError::at("list", folder);
     let mut names = BTreeSet::new();
-    for entry in fs::read_dir(folder).map_err(listing)? {
-        let entry = entry.map_err(listing)?;
+    for entry in fs::read_dir(folder).map_err(&listing)? {
+        let entry = entry.map_err(&listing)?;
         match gyre_storage::is_draft(&entry.path()) {
-            true => fs::remove_file(entry.path()).map_err(SimulatorError::write(&entry.path()))?,
+            true => gyre_storage::remove(&entry.path())?,
             false => _ = names.insert(entry.file_name().to_string_lossy().into_owned()),
         }
     }
@@ -116,9 +104,10 @@ pub(super) fn made_with(out: &Path) -> Result<Option<SimulationConfig>, Simulato
 }
 
 fn other_dataset(out: &Path) -> SimulatorError {
-    SimulatorError::OtherDataset {
-        folder: out.to_owned(),
-    }
+    SimulatorError::OtherFiles(format!(
+        "{} holds a dataset of another configuration (see its simulation.toml): choose another folder",
+        out.display()
+    ))
 }
 
 /// The configuration without the keys that do not change the content of a scan.
@@ -137,15 +126,13 @@ fn require_same(drive: &SimulatedDrive, index: usize, path: &Path) -> Result<(),
     let size = drive.image_size();
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
     drive.renderer().draw(index, &mut pixels);
-    encode(size, &pixels, &mut encoded).map_err(|source| SimulatorError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
-    let found = read_bytes(path, MAX_IMAGE_BYTES).map_err(SimulatorError::write(path))?;
+    encode(path, size, &pixels, &mut encoded)?;
+    let found = read_bytes(path, MAX_IMAGE_BYTES).map_err(StorageError::at("write", path))?;
     match found == encoded {
         true => Ok(()),
-        false => Err(SimulatorError::OtherImage {
-            path: path.to_owned(),
-        }),
+        false => Err(SimulatorError::OtherFiles(format!(
+            "{} differs from the image that is rendered now: another build made it, or it was changed; choose another folder",
+            path.display()
+        ))),
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gyre_configuration::Configuration;
-use gyre_slam::localisation::{Localiser, LocaliserOptions, Map};
+use gyre_slam::localisation::{Localiser, Map};
 use gyre_terminal::Failure;
 
 use crate::maps::folder;
@@ -35,12 +35,6 @@ pub fn plan(map: Map, configuration: &Configuration) -> Result<Localiser, Failur
                 .into(),
         );
     }
-    let options = LocaliserOptions::default();
     let capacity = odometry.points.capacity;
-    Ok(Localiser::new(
-        map,
-        options,
-        &odometry.refinement,
-        capacity,
-    )?)
+    Ok(Localiser::new(map, &odometry.refinement, capacity)?)
 }

@@ -2,7 +2,7 @@
 
 use std::{fmt, iter};
 
-use super::{Configured, WRONG_SIGMAS};
+use super::Configured;
 use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
 
 /// The given length of the path over that by the scans: beyond, it is of another drive, or scans
@@ -11,17 +11,14 @@ const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Least relative difference of the path between both directions of time: the error of its length.
 const PATH_ERROR: f64 = 1e-3;
 
+/// Key, name, unit for printing, and factor to that unit.
+pub(crate) type Label = (&'static str, &'static str, &'static str, f64);
+
 /// A constant that the configuration has a key for.
 #[derive(Clone)]
 pub struct Constant {
-    /// The key of the section `[dataset]`.
-    pub key: &'static str,
-    /// The name for a person.
-    pub name: &'static str,
-    /// The unit for printing it.
-    pub unit: &'static str,
-    /// The factor to the printed unit.
-    pub scale: f64,
+    /// Key in the section `[dataset]`, name, unit for printing, and factor to that unit.
+    pub(crate) label: Label,
     pub configured: f64,
     /// The value by the drive.
     pub found: Estimate,
@@ -50,7 +47,7 @@ impl Constant {
             .iter()
             .fold(self.found, |all, next| all.combined(&next.found));
         let basis = drives().map(|it| {
-            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.scale);
+            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.label.3);
             format!("{value:.4} \u{b1} {sigma:.4}")
         });
         let mut mean = Self {
@@ -63,31 +60,21 @@ impl Constant {
             mean.is_determined() && drives().all(|it| it.is_proposed || !it.is_determined());
         mean
     }
-
-    /// Returns whether the configured value contradicts the drive.
-    pub fn is_wrong(&self) -> bool {
-        (self.configured - self.found.value).abs() > WRONG_SIGMAS * self.found.sigma
-    }
 }
 
 /// Puts the estimate of a fact beside its configured value.
 pub(super) fn constant(
-    key: &'static str,
-    name: &'static str,
-    (unit, scale): (&'static str, f64),
+    label: Label,
     configured: f64,
     fact: &FactEstimate,
     calibration: &Calibration,
 ) -> Constant {
-    let found = Estimate {
-        value: configured + fact.change.value,
-        sigma: fact.change.sigma,
-    };
+    let found = Estimate::new(configured + fact.change.value, fact.change.sigma);
     let part = |estimate: &Estimate| {
         format!(
             "{:.3} \u{b1} {:.3}",
-            (configured + estimate.value) * scale,
-            estimate.sigma * scale
+            (configured + estimate.value) * label.3,
+            estimate.sigma * label.3
         )
     };
     let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
@@ -108,10 +95,7 @@ pub(super) fn constant(
         ),
     };
     Constant {
-        key,
-        name,
-        unit,
-        scale,
+        label,
         configured,
         found,
         useful_sigma: fact.fact.useful_sigma(),
@@ -136,19 +120,15 @@ pub(super) fn resolution(
     };
     let ratio = distance_m / path_m;
     if !PLAUSIBLE_RATIO.contains(&ratio) {
-        return Err(CalibrationError::Distance { distance_m, path_m });
+        return Err(CalibrationError::Unusable(format!(
+            "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
+        )));
     }
     let value = resolution_m * ratio;
     Ok(Ok(Constant {
-        key: "range_resolution_m",
-        name: "range resolution",
-        unit: "m",
-        scale: 1.0,
+        label: ("range_resolution_m", "range resolution", "m", 1.0),
         configured: resolution_m,
-        found: Estimate {
-            value,
-            sigma: value * PATH_ERROR,
-        },
+        found: Estimate::new(value, value * PATH_ERROR),
         useful_sigma: f64::INFINITY,
         has_settled: true,
         is_proposed: true,
@@ -163,15 +143,16 @@ impl fmt::Display for Constant {
         let verdict = match (self.is_determined(), self.is_proposed) {
             (false, _) => "the scans do not tell it well enough",
             (true, false) => "not proposed: the scans would overlap less",
-            _ if self.is_wrong() => "CONTRADICTS the configured value",
+            _ if self.found.contradicts(self.configured) => "CONTRADICTS the configured value",
             _ => "agrees with the configured value",
         };
+        let (_, name, unit, scale) = self.label;
         let [value, sigma, configured] =
-            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * self.scale);
+            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * scale);
         write!(
             f,
-            "{:<21} {value:.4} \u{b1} {sigma:.4} {}, configured {configured:.4}: {verdict}\n{:<21} {}",
-            self.name, self.unit, "", self.basis
+            "{name:<21} {value:.4} \u{b1} {sigma:.4} {unit}, configured {configured:.4}: {verdict}\n{:<21} {}",
+            "", self.basis
         )
     }
 }

@@ -6,15 +6,9 @@ use crate::{Estimate, toml};
 /// An offset that the drive determines and that contradicts the configured one.
 fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
     let offset = Constant {
-        key: "range_offset_m",
-        name: "range offset",
-        unit: "m",
-        scale: 1.0,
+        label: ("range_offset_m", "range offset", "m", 1.0),
         configured: -0.1,
-        found: Estimate {
-            value: -0.5,
-            sigma: 0.02,
-        },
+        found: Estimate::new(-0.5, 0.02),
         useful_sigma: 0.2,
         has_settled: true,
         is_proposed,

@@ -54,9 +54,9 @@ impl Angles {
         median(steps).unwrap_or_default()
     }
 
-    /// Returns the span of the log, s; `None` without samples.
-    pub(crate) fn span_s(&self) -> Option<[f64; 2]> {
-        Some([*self.stamps_s.first()?, *self.stamps_s.last()?])
+    /// Returns when the log begins, s; `None` without samples.
+    pub(crate) fn begins_s(&self) -> Option<f64> {
+        self.stamps_s.first().copied()
     }
 
     /// Integrates over a time of the log's clock; `None` where samples are missing.

@@ -4,10 +4,8 @@ use gyre_radar::median;
 use nalgebra::{Matrix4, Vector4};
 
 use super::{angles::Angles, search::Peak, turns::Turn};
-use crate::Estimate;
+use crate::{BLOCKS, Estimate, jackknife};
 
-/// Blocks of the drive for the jackknife.
-const BLOCKS: usize = 12;
 /// Solutions of the linearised residuals, at most, and the change of the offset that ends them, s.
 const ROUNDS: usize = 30;
 const CONVERGED_S: f64 = 1e-6;
@@ -30,16 +28,13 @@ pub(crate) struct Fit {
     pub(crate) parameters: [Estimate; 3],
     /// The offset of each half of the drive, s.
     pub(crate) halves_s: [Option<f64>; 2],
-    /// The drift of the clock.
     pub(crate) drift: Estimate,
-    /// Number of turns.
     pub(crate) turns: usize,
 }
 
 impl Fit {
     /// Fits the turns around a peak; `None` if they do not determine the parameters, or determine a
     /// different offset than the peak's.
-    ///
     /// Speeds have no bias: without one it stays zero.
     pub(crate) fn new(
         turns: &[Turn],
@@ -65,36 +60,18 @@ impl Fit {
             delay_s: peak.delay_s,
         };
         let count = turns.len();
-        let block = |k: usize| k * BLOCKS / count;
-        let without = |left_out: usize, free: Free| {
-            let kept = (0..count)
-                .filter(|k| block(*k) != left_out)
-                .map(|k| turns[k]);
-            problem.solve(&kept.collect::<Vec<_>>(), free)
+        let without = |left_out: Option<usize>, free: Free| {
+            let kept = (0..count).filter(|k| Some(k * BLOCKS / count) != left_out);
+            let kept: Vec<Turn> = kept.map(|k| turns[k]).collect();
+            problem.solve(&kept, free)
         };
-        let jackknife = |free: Free| -> Option<[Estimate; 4]> {
-            let all = problem.solve(&turns, free)?;
-            let mut variance = Parameters::zeros();
-            for left_out in 0..BLOCKS {
-                let apart = without(left_out, free)? - all;
-                variance += apart.component_mul(&apart);
-            }
-            let share = (BLOCKS - 1) as f64 / BLOCKS as f64;
-            Some(std::array::from_fn(|k| Estimate {
-                value: all[k],
-                sigma: (share * variance[k]).sqrt(),
-            }))
-        };
-        let [scale, bias, late, _] = jackknife(without_drift)?;
-        let unknown = Estimate {
-            value: 0.0,
-            sigma: f64::INFINITY,
-        };
+        let estimates = |free: Free| jackknife(|left_out| without(left_out, free));
+        let [scale, bias, late, _] = estimates(without_drift)?;
         let halves = [&turns[..count / 2], &turns[count / 2..]];
         Some(Self {
             parameters: [scale, bias, late],
             halves_s: halves.map(|half| Some(problem.solve(half, without_drift)?[2])),
-            drift: jackknife(with_drift).map_or(unknown, |all| all[3]),
+            drift: estimates(with_drift).map_or(Estimate::UNKNOWN, |all| all[3]),
             turns: count,
         })
     }

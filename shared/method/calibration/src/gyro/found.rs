@@ -4,22 +4,18 @@ use std::path::Path;
 
 use gyre_samples::{GyroConfig, UpAxis};
 
-use super::GyroError;
+use super::ClockError;
 use crate::Estimate;
 
 /// A scale that is less certain adds nothing to the default.
 const USEFUL_SCALE_SIGMA: f64 = 0.01;
 /// A drift that differs from none by so many standard deviations is one.
 const DRIFT_SIGMAS: f64 = 3.0;
-/// A configured value that is off by so many standard deviations is wrong.
-const WRONG_SIGMAS: f64 = 3.0;
 
 /// The clock and the axes of a gyro, by the turns of the radar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GyroCalibration {
-    /// The axis that points up.
     pub up: UpAxis,
-    /// The delay of the gyro's stamps, s.
     pub delay_s: Estimate,
     /// The delay in each half of the drive, if the half determines it, s.
     pub halves_s: [Option<f64>; 2],
@@ -37,14 +33,14 @@ pub struct GyroCalibration {
 
 impl GyroCalibration {
     /// Returns the mean over drives of one gyro, each weighted by its uncertainty.
-    pub fn mean(&self, others: &[Self]) -> Result<Self, GyroError> {
+    pub fn mean(&self, others: &[Self]) -> Result<Self, ClockError> {
         let mut mean = self.clone();
         for other in others {
             if other.up != mean.up {
-                return Err(GyroError::Axes {
-                    one: mean.up.name(),
-                    other: other.up.name(),
-                });
+                let [one, other] = [&mean, other].map(|it| it.up.name());
+                return Err(ClockError(format!(
+                    "one drive says that {one} points up, another that {other} does: these are not logs of one gyro as it is mounted"
+                )));
             }
             mean.delay_s = mean.delay_s.combined(&other.delay_s);
             mean.drift = mean.drift.combined(&other.drift);
@@ -70,10 +66,7 @@ impl GyroCalibration {
     /// Returns the section `[gyro]`, with the log if it does not lie beside the scans.
     pub fn toml(&self, file: Option<&Path>) -> String {
         let (late, scale, bias) = (self.delay_s, self.scale, self.bias_radps);
-        let mut text = match file.map(|file| toml::Value::from(file.display().to_string())) {
-            Some(file) => format!("\n[gyro]\nkind = \"log\"\nfile = {file}\n"),
-            None => "\n[gyro]\nkind = \"auto\"\n".to_owned(),
-        };
+        let mut text = format!("\n[gyro]\n{}", log_keys(file));
         text += &format!(
             "up = \"{}\" # correlation {:.3} of {} turns with those of the radar\n",
             self.up.name(),
@@ -101,15 +94,8 @@ impl GyroCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside the configured values if a gyro is used.
     pub fn table(&self, configured: &GyroConfig) -> String {
-        let verdict = |value: f64, found: &Estimate| match configured.is_used() {
-            false => String::new(),
-            true if (value - found.value).abs() > WRONG_SIGMAS * found.sigma => {
-                format!(", configured {value:.4}: CONTRADICTS the configured value")
-            }
-            true => format!(", configured {value:.4}: agrees with the configured value"),
-        };
+        let used = |value: f64| configured.is_used().then_some(value);
         let up = configured.up.unwrap_or(self.up);
         let axis = match configured.is_used() && up != self.up {
             true => format!(
@@ -132,7 +118,7 @@ impl GyroCalibration {
             false => "",
         };
         let tells = match self.tells_scale() {
-            true => verdict(configured.scale, scale),
+            true => scale.verdict(used(configured.scale)),
             false => ", which is not told well enough".to_owned(),
         };
         [
@@ -142,7 +128,7 @@ impl GyroCalibration {
             ),
             format!(
                 "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} {halves}drift {:.0} \u{b1} {:.0} ppm{drifts}",
-                "gyro, late by", late.value, late.sigma, verdict(configured.delay_s, late), "",
+                "gyro, late by", late.value, late.sigma, late.verdict(used(configured.delay_s)), "",
                 drift.value * 1e6, drift.sigma * 1e6
             ),
             format!("{:<21} {:.4} \u{b1} {:.4}{tells}", "gyro, scale", scale.value, scale.sigma),
@@ -154,5 +140,13 @@ impl GyroCalibration {
             ),
         ]
         .join("\n")
+    }
+}
+
+/// Returns the keys of the log of a sensor, which lies beside the scans if no file is named.
+pub(crate) fn log_keys(file: Option<&Path>) -> String {
+    match file.map(|file| toml::Value::from(file.display().to_string())) {
+        Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
+        None => "kind = \"auto\"\n".to_owned(),
     }
 }

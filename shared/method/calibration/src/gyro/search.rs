@@ -33,21 +33,17 @@ pub(crate) struct Peak {
     pub(crate) axis: usize,
     /// Of the radar's turns and the angles about the axis.
     pub(crate) correlation: f64,
-    /// The turns that it is of.
     turns: usize,
 }
 
 impl Peak {
-    /// Returns the axis that points up.
     pub(crate) fn up(&self) -> UpAxis {
-        match (self.axis, self.correlation < 0.0) {
-            (0, false) => UpAxis::X,
-            (0, true) => UpAxis::MinusX,
-            (1, false) => UpAxis::Y,
-            (1, true) => UpAxis::MinusY,
-            (_, false) => UpAxis::Z,
-            (_, true) => UpAxis::MinusZ,
-        }
+        const AXES: [[UpAxis; 2]; 3] = [
+            [UpAxis::X, UpAxis::MinusX],
+            [UpAxis::Y, UpAxis::MinusY],
+            [UpAxis::Z, UpAxis::MinusZ],
+        ];
+        AXES[self.axis][usize::from(self.correlation < 0.0)]
     }
 
     /// Returns whether it is about another axis, or farther than a peak is wide.

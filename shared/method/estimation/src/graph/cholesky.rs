@@ -1,9 +1,5 @@
-//! Sparse Cholesky factorisation of a symmetric matrix of 3 x 3 blocks.
-//!
-//! The factor is computed row by row (Davis, Direct Methods for Sparse Linear Systems, Sec. 4.7),
-//! in an order of approximate minimum degree. The graph of a drive is nearly a chain: of 20,000
-//! keyframes with 500 loops a column has two blocks below the diagonal on average, so that larger
-//! dense parts would gain nothing.
+//! Sparse Cholesky factorisation of a symmetric matrix of 3 x 3 blocks, row by row (Davis, Direct
+//! Methods for Sparse Linear Systems, Sec. 4.7), in an order of approximate minimum degree.
 
 use std::collections::TryReserveError;
 
@@ -22,7 +18,6 @@ pub(super) struct Cholesky {
     rows: Lists<usize>,
     /// The blocks below the diagonal, by columns as in `rows`.
     below: Vec<Matrix3<f64>>,
-    /// The blocks on the diagonal, which are lower triangles.
     diagonal: Vec<Matrix3<f64>>,
     /// A row of the matrix, transposed; zero between the steps.
     row: Vec<Matrix3<f64>>,
@@ -37,7 +32,6 @@ struct Entry {
     is_transposed: bool,
 }
 
-/// Lists, one after the other.
 struct Lists<T> {
     starts: Vec<usize>,
     items: Vec<T>,
@@ -117,7 +111,6 @@ impl Cholesky {
         pivot
     }
 
-    /// Solves the factorised equations in place.
     pub fn solve(&self, side: &mut DVector<f64>) {
         let block = |of: usize| side.fixed_rows::<3>(3 * of).into_owned();
         let mut solved: Vec<_> = self.order.iter().map(|&of| block(of)).collect();
@@ -224,7 +217,6 @@ fn fill(left: &Lists<Entry>) -> Lists<usize> {
     Lists { starts, items }
 }
 
-/// Returns the rows of each column from the columns of each row.
 fn transpose(columns: &Lists<usize>) -> Lists<usize> {
     let count = columns.starts.len() - 1;
     let starts = starts(count, columns.items.iter().copied());

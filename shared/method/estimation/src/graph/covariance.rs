@@ -10,11 +10,9 @@ use crate::constraint::keyframe_exists;
 use crate::relative::Relative;
 
 impl PoseGraph {
-    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
-    ///
-    /// The covariance follows from the present constraints, linearised at the present poses: exact
-    /// after [`PoseGraph::solve`], and dead reckoning for keyframes added since. The first call
-    /// after a change factorises the equations; each call solves them for three right-hand sides.
+    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses:
+    /// exact after [`PoseGraph::solve`], and dead reckoning for keyframes added since. The first
+    /// call after a change factorises the equations.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(keyframe, self.state.poses.len())?;
         let covariance = self.project(&[(keyframe, Matrix3::identity())])?;
@@ -25,8 +23,7 @@ impl PoseGraph {
     }
 
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial
-    /// guess of their registration, as
-    /// [`TrajectoryFilter::predict`](crate::TrajectoryFilter::predict).
+    /// guess of their registration (Checchin et al., Eq. 4).
     pub fn predict(&mut self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(from.max(to), self.state.poses.len())?;
         let relative = Relative::predict(&self.state.poses[from], &self.state.poses[to]);

@@ -32,7 +32,6 @@ impl Dogleg {
         }
     }
 
-    /// Returns the length of the Gauss-Newton step.
     pub fn full_length(&self) -> f64 {
         self.gauss_newton.norm()
     }
@@ -56,7 +55,6 @@ impl Dogleg {
         &self.cauchy + share * along
     }
 
-    /// Returns the predicted decrease of the cost by a step.
     pub fn predicted(&self, system: &System, step: &DVector<f64>) -> f64 {
         2.0 * self.gradient.dot(step) - system.quadratic_form(step)
     }

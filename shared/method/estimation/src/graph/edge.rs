@@ -5,10 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::relative::Relative;
 
-/// The two poses of an edge.
 pub(super) type Ends = [usize; 2];
 
-/// A constraint with the inverse of its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
     pub ends: Ends,
@@ -34,7 +32,6 @@ impl Edge {
         innovation.dot(&(self.information * innovation))
     }
 
-    /// Linearises the cost at `poses`.
     pub fn linearise(&self, poses: &[Pose]) -> Linear {
         let [from, to] = self.ends;
         let relative = Relative::predict(&poses[from], &poses[to]);
@@ -55,12 +52,9 @@ impl Edge {
 
 /// The contribution of an edge to the normal equations.
 pub(super) struct Linear {
-    /// The diagonal blocks of both poses.
     pub blocks: [Matrix3<f64>; 2],
     /// The block of the rows of the first pose and the columns of the second.
     pub between: Matrix3<f64>,
-    /// The right-hand sides of both poses.
     pub sides: [Vector3<f64>; 2],
-    /// The chi-square of the edge.
     pub chi_square: f64,
 }

@@ -22,7 +22,6 @@ const COARSE: f64 = 0.1;
 /// A measured position of a point that a keyframe carries, as of an antenna.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
-    /// The keyframe, counted from 0.
     pub keyframe: usize,
     /// The point in the frame of the keyframe, m.
     pub lever_m: Vector2<f64>,
@@ -35,7 +34,6 @@ pub struct Position {
     pub share: f64,
 }
 
-/// A position with its weight in the last solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPosition {
     pub position: Position,
@@ -45,10 +43,8 @@ pub struct WeightedPosition {
     pub weight: f64,
 }
 
-/// A position in a graph.
 pub(super) struct Measured {
     it: Position,
-    /// The kernel's weight.
     pub(super) weight: f64,
     is_refused: bool,
 }
@@ -78,14 +74,12 @@ impl Measured {
         }
     }
 
-    /// Returns the squared normalised difference of the measured position from that by the poses.
     pub(super) fn chi_square(&self, poses: &[Pose], frame: &Pose) -> f64 {
         let in_graph = poses[self.it.keyframe] * nalgebra::Point2::from(self.it.lever_m);
         let residual = self.it.position_m - (frame * in_graph).coords;
         residual.norm_squared() / self.it.variance_m2
     }
 
-    /// Linearises the cost at `poses`: of the keyframe, then of the frame.
     pub(super) fn linearise(&self, poses: &[Pose], frame: &Pose) -> Linear {
         let pose = &poses[self.it.keyframe];
         let along = pose.rotation * self.it.lever_m;
@@ -130,7 +124,9 @@ impl PoseGraph {
             && (f64::MIN_POSITIVE..f64::INFINITY).contains(&position.variance_m2)
             && (f64::MIN_POSITIVE..=1.0).contains(&position.share);
         if !is_usable {
-            return Err(EstimationError::Position { keyframe });
+            return Err(EstimationError::Refused(format!(
+                "the position measured at keyframe {keyframe} is not finite, or its variance or share is not above zero"
+            )));
         }
         self.positions.push(Measured {
             it: position,
@@ -141,7 +137,6 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Removes all positions, and the pose of the frame in theirs.
     pub fn clear_positions(&mut self) {
         self.positions.clear();
         self.state.frame = None;
@@ -154,7 +149,6 @@ impl PoseGraph {
         self.state.frame
     }
 
-    /// Returns that pose with its covariance.
     pub fn uncertain_frame(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let Some(motion) = self.state.frame else {
             return Ok(None);
@@ -222,7 +216,6 @@ impl PoseGraph {
         }
     }
 
-    /// The chi-squares of the positions; none without a frame.
     fn chi_squares(&self) -> impl Iterator<Item = f64> + '_ {
         let State { poses, frame } = &self.state;
         let frames = frame.iter();
@@ -242,9 +235,6 @@ struct Pair {
 
 /// Returns the pose of the poses' frame in the positions' frame that fits best, by weighted least
 /// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
-///
-/// # Panics
-/// A position is of an unknown keyframe.
 pub fn align<'a>(
     poses: &[Pose],
     positions: impl IntoIterator<Item = &'a Position>,

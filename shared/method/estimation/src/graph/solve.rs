@@ -32,12 +32,10 @@ pub(super) enum Weights {
 }
 
 impl PoseGraph {
-    /// Moves all poses to where they fit the constraints best, from where they are.
-    ///
-    /// New loops start with the weight of their test against the odometry, so that a long drift
-    /// does not speak against the loop that corrects it; then the kernel decides. With many loops
-    /// the result can depend on the order of arrival and on the times of intermediate solutions:
-    /// [`PoseGraph::solve_anew`] depends on neither. On an error the poses are unchanged.
+    /// Moves all poses to where they fit the constraints best, from where they are. New loops start
+    /// with the weight of their test against the odometry; then the kernel decides. The result can
+    /// depend on the order of arrival; [`PoseGraph::solve_anew`] does not. On an error the poses are
+    /// unchanged.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.state.clone();
         self.place_frame();
@@ -86,7 +84,6 @@ impl PoseGraph {
         self.solve()
     }
 
-    /// Makes the system of the present constraints.
     pub(super) fn prepare(&mut self) -> Result<&mut System, EstimationError> {
         let system = match self.system.take() {
             Some(system) => system,

@@ -39,17 +39,14 @@ impl System {
         })
     }
 
-    /// Returns a right-hand side of zeros.
     pub fn right_hand_side(&self) -> DVector<f64> {
         DVector::zeros(3 * self.diagonal.len())
     }
 
-    /// Returns the first row of a pose; `None` for pose 0.
     pub fn row(pose: usize) -> Option<usize> {
         Some(3 * pose.checked_sub(1)?)
     }
 
-    /// Sets the matrix to zero.
     pub fn clear(&mut self) {
         self.below.fill(Matrix3::zeros());
         self.diagonal.fill(Matrix3::zeros());
@@ -78,7 +75,6 @@ impl System {
         }
     }
 
-    /// Factorises the matrix. Returns whether it is positive definite.
     pub fn factorise(&mut self) -> bool {
         self.factor.factorise(&self.diagonal, &self.below)
     }
@@ -93,7 +89,6 @@ impl System {
         diagonal.sum::<f64>() + 2.0 * below.sum::<f64>()
     }
 
-    /// Solves the factorised equations in place.
     pub fn solve(&self, side: &mut DVector<f64>) {
         self.factor.solve(side);
     }

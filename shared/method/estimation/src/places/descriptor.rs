@@ -2,7 +2,7 @@
 
 use gyre_radar::fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
-use ndarray::{Array2, ArrayView2, ArrayView3};
+use ndarray::Array2;
 
 use super::{CELL_M, PLANNED, RASTER_CELLS};
 
@@ -28,7 +28,6 @@ pub struct Descriptor {
 }
 
 /// Computes descriptors.
-///
 /// Planned once; nothing is allocated afterwards.
 pub struct Describer {
     search: RotationSearch,
@@ -48,7 +47,6 @@ impl Default for Descriptor {
 }
 
 impl Descriptor {
-    /// Size of the sieve of a descriptor, bytes.
     pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
     /// Size of a descriptor in a file, bytes.
     pub const BYTES: usize = Self::SIEVE_BYTES + SPECTRUM_BYTES;
@@ -67,16 +65,6 @@ impl Descriptor {
             sieve: sieve.to_vec(),
             spectrum: bytemuck::cast_slice(spectrum).to_vec(),
         })
-    }
-
-    /// Returns the spectrum: radius x (real part, imaginary part) x harmonic.
-    pub fn spectrum(&self) -> ArrayView3<'_, i8> {
-        ArrayView3::from_shape((RADII, 2, HARMONICS), &self.spectrum).expect(PLANNED)
-    }
-
-    /// Returns the sieve, radius x harmonic: amplitudes, which do not depend on the heading.
-    pub fn sieve(&self) -> ArrayView2<'_, u8> {
-        ArrayView2::from_shape((RADII, SIEVE_HARMONICS), &self.sieve).expect(PLANNED)
     }
 }
 

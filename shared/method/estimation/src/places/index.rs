@@ -17,7 +17,6 @@ const ANGLES: usize = 4 * HARMONICS;
 /// Angles of a place that are ranked, at most.
 const MAX_ANGLES: usize = 8;
 
-/// A place that looks similar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// The place, counted from 0 in the order of insertion.
@@ -35,23 +34,18 @@ pub struct Candidate {
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
 )]
 pub struct OrderError {
-    /// Path up to the place, m.
     pub path_m: f64,
-    /// Path up to the last place, m.
     pub last_m: f64,
 }
 
 /// The data of a place beside its descriptor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PathPoint {
-    /// Number that the caller gave it.
     pub id: u64,
-    /// Path up to the place, m.
     pub path_m: f64,
 }
 
 /// The descriptors of all places, in the order of the path.
-///
 /// A query allocates nothing.
 pub struct PlaceIndex {
     pub(super) places: Vec<PathPoint>,
@@ -61,7 +55,6 @@ pub struct PlaceIndex {
     query: Query,
 }
 
-/// The working memory of a query.
 struct Query {
     /// Distance in the sieve, and place.
     distances: Vec<(u32, u32)>,
@@ -122,12 +115,10 @@ impl PlaceIndex {
         self.places.len()
     }
 
-    /// Returns whether there is no place.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// Returns the id and the path (m) of a place.
     pub fn place(&self, place: usize) -> Option<(u64, f64)> {
         self.places.get(place).map(|place| (place.id, place.path_m))
     }
@@ -140,7 +131,6 @@ impl PlaceIndex {
         })
     }
 
-    /// Returns the number of places up to `path_m` metres along the path.
     pub fn places_until(&self, path_m: f64) -> usize {
         self.places.partition_point(|place| place.path_m <= path_m)
     }
@@ -253,7 +243,6 @@ impl Query {
         debug_assert!(done.is_ok(), "lengths are those of the plan");
     }
 
-    /// The correlation at a sample of the angle.
     fn at(&self, k: isize) -> f64 {
         f64::from(self.correlation[k.rem_euclid(ANGLES as isize) as usize])
     }
@@ -298,7 +287,6 @@ fn keep_apart(found: &mut Vec<Candidate>, apart: impl Fn(&Candidate, &Candidate)
     found.truncate(kept);
 }
 
-/// Sum of absolute differences.
 #[simd]
 fn distance(a: &[u8], b: &[u8]) -> u32 {
     a.iter()

@@ -2,19 +2,11 @@
 
 use std::f64::consts::PI;
 
-use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle};
-use gyre_scan_matching::{
-    ConfigError, KeyframeAligner, MaskedCorrelation, MotionMatch, RefinementConfig, RotationMatch,
-    Submap, TranslationConfig, TranslationSearch,
-};
-use ndarray::Array2;
+use gyre_geometry::{UncertainMotion, pose, wrap_angle};
+use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 
-use super::{CELL_M, Candidate, PLANNED, RASTER_CELLS};
+use super::{Candidate, Registrar};
 
-/// Cells within this range of both sensors are correlated: farther away few points are extracted.
-const MASK_M: f64 = 80.0;
-/// Largest translation between two places that are verified, along each axis, m.
-const REACH_M: f64 = 25.0;
 /// Smallest correlation of a loop that is accepted.
 const MIN_CORRELATION: f64 = 0.65;
 /// Smallest difference of the correlations of an accepted loop and of any other motion between the
@@ -35,6 +27,9 @@ pub enum VerificationOutcome {
     Ambiguous,
     /// The points of the two keyframes do not determine the motion.
     Undetermined,
+    /// The motion contradicts the odometry between the two keyframes, which the verifier does not
+    /// know.
+    ContradictsOdometry,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,35 +53,12 @@ pub struct Verification {
 }
 
 /// Registers the submap of a query with the submaps of candidates.
-///
-/// Planned once; nothing is allocated afterwards.
-pub struct LoopVerifier {
-    translation: TranslationSearch,
-    aligner: KeyframeAligner,
-    correlation: MaskedCorrelation,
-    later: Array2<f32>,
-    earlier: Array2<f32>,
-}
+pub struct LoopVerifier(Registrar);
 
 impl LoopVerifier {
-    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is the
-    /// refinement of the odometry: its cells and reach, and the scales of its covariance.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds.
+    /// As [`Registrar::new`].
     pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
-        let translation = TranslationConfig {
-            reach_m: REACH_M,
-            ..TranslationConfig::default()
-        };
-        let raster = || Array2::zeros((RASTER_CELLS, RASTER_CELLS));
-        Ok(Self {
-            translation: TranslationSearch::new(RASTER_CELLS, CELL_M, &translation)?,
-            aligner: KeyframeAligner::new(refinement, capacity)?,
-            correlation: MaskedCorrelation::new(RASTER_CELLS, CELL_M, MASK_M)?,
-            later: raster(),
-            earlier: raster(),
-        })
+        Ok(Self(Registrar::new(refinement, capacity)?))
     }
 
     /// Registers the submap of the query, `later`, with the submap of the candidate, `earlier`.
@@ -96,21 +68,24 @@ impl LoopVerifier {
         earlier: &Submap,
         candidate: &Candidate,
     ) -> Verification {
-        draw(later, &mut self.later);
-        draw(earlier, &mut self.earlier);
+        let registrar = &mut self.0;
+        registrar.set_later(later);
+        registrar.set_earlier(earlier);
         let [straight, turned] =
-            [0.0, PI].map(|turn| self.search(wrap_angle(candidate.yaw_rad + turn)));
+            [0.0, PI].map(|turn| registrar.search(wrap_angle(candidate.yaw_rad + turn), None));
         let half_turn = turned.score > straight.score;
-        let (best, other) = if half_turn {
-            (turned, straight)
-        } else {
-            (straight, turned)
+        let (best, other) = match half_turn {
+            true => (turned, straight),
+            false => (straight, turned),
         };
         let second = best.runner_up.map_or(0.0, |second| second.score);
         let searched = pose(best.x_m, best.y_m, best.yaw_rad);
         let mut found = Verification {
             outcome: VerificationOutcome::LowCorrelation,
-            motion: certain(searched),
+            motion: UncertainMotion {
+                motion: searched,
+                ..UncertainMotion::identity()
+            },
             correlation: best.score,
             searched: best.score,
             runner_up: second.max(other.score),
@@ -119,56 +94,24 @@ impl LoopVerifier {
         if best.score < MIN_CORRELATION - COARSE_LOSS {
             return found;
         }
-        match self.aligner.align(later, earlier, &searched) {
+        match registrar.aligner.align(later, earlier, &searched) {
             Some(motion) => {
                 found.motion = motion;
-                found.correlation = self.correlation_at(&motion.motion);
-                found.outcome = self.judge(&found);
+                found.correlation = registrar.correlation(&motion.motion, None);
+                found.outcome = judge(&found);
             }
             None => found.outcome = VerificationOutcome::Undetermined,
         }
         found
     }
-
-    /// The translation if the angle is `angle_rad`.
-    fn search(&mut self, angle_rad: f64) -> MotionMatch {
-        let rotation = RotationMatch {
-            angle_rad,
-            variance_rad2: 0.0,
-            score: 1.0,
-            runner_up: None,
-        };
-        self.translation
-            .search(self.later.view(), self.earlier.view(), &rotation)
-            .expect(PLANNED)
-    }
-
-    fn correlation_at(&mut self, motion: &Pose) -> f64 {
-        self.correlation
-            .at(self.later.view(), self.earlier.view(), motion)
-            .expect(PLANNED)
-    }
-
-    fn judge(&self, found: &Verification) -> VerificationOutcome {
-        if found.correlation < MIN_CORRELATION {
-            VerificationOutcome::LowCorrelation
-        } else if found.searched - found.runner_up < MIN_MARGIN {
-            VerificationOutcome::Ambiguous
-        } else {
-            VerificationOutcome::Accepted
-        }
-    }
 }
 
-/// Draws the root of a submap's weights: a few strong scatterers would outweigh all others.
-fn draw(submap: &Submap, raster: &mut Array2<f32>) {
-    submap.draw(CELL_M, raster.view_mut()).expect(PLANNED);
-    raster.mapv_inplace(f32::sqrt);
-}
-
-fn certain(motion: Pose) -> UncertainMotion {
-    UncertainMotion {
-        motion,
-        ..UncertainMotion::identity()
+fn judge(found: &Verification) -> VerificationOutcome {
+    if found.correlation < MIN_CORRELATION {
+        VerificationOutcome::LowCorrelation
+    } else if found.searched - found.runner_up < MIN_MARGIN {
+        VerificationOutcome::Ambiguous
+    } else {
+        VerificationOutcome::Accepted
     }
 }

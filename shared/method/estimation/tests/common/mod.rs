@@ -76,7 +76,7 @@ impl Drive {
 
     /// Returns the filter after all odometry.
     pub fn filter(&self) -> TrajectoryFilter {
-        let mut filter = TrajectoryFilter::new(self.truth[0], Default::default());
+        let mut filter = TrajectoryFilter::new(self.truth[0], TrajectoryFilter::MAX_KEYFRAMES);
         for motion in &self.odometry {
             filter.apply(motion).unwrap();
         }

@@ -92,6 +92,6 @@ fn damaged_files_are_refused_in_a_sentence() {
         unwritable
             .unwrap_err()
             .to_string()
-            .starts_with("cannot write the places to")
+            .starts_with("cannot write")
     );
 }

@@ -10,7 +10,6 @@ use tiff::{
 
 use crate::{MapError, Origin, TILE_CELLS, TileSource, georeference::Georeference, strips};
 
-/// Keys of GeoTIFF 1.1 and their values.
 const MODEL_TYPE: u16 = 1024;
 const PROJECTED: u16 = 1;
 const USER_DEFINED: u16 = 32_767;

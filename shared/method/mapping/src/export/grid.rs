@@ -1,6 +1,6 @@
 //! A map as an occupancy grid, with the values of ROS.
 
-use crate::{Cell, MapError, Occupancy, TILE_CELLS, TileExtent, TileImage, TileSource};
+use crate::{MapError, TILE_CELLS, TileExtent, TileImage, TileSource};
 use nalgebra::Vector2;
 
 /// The most cells of a grid. What sends it is slow with larger messages.
@@ -13,13 +13,9 @@ const UNKNOWN: u8 = u8::MAX;
 /// An occupancy grid in the frame of the map's tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// The side of a cell, m.
     pub cell_m: f64,
-    /// Cells along x.
     pub columns: usize,
-    /// Cells along y.
     pub rows: usize,
-    /// The lowest x and y, m.
     pub corner_m: Vector2<f64>,
     /// The cells by rows, from the corner on: 0 to 100 % occupied, 255 unknown.
     pub values: Vec<u8>,
@@ -42,7 +38,7 @@ pub fn grid(source: &mut impl TileSource) -> Result<Grid, MapError> {
         for (row, cells) in (0..).map(|at| row + at / block).zip(image.rows().rev()) {
             let line = &mut data[row * width..][..width];
             for (column, cell) in (0..).map(|at| column + at / block).zip(cells) {
-                line[column] = unite(line[column], value(*cell));
+                line[column] = unite(line[column], cell.occupancy([UNKNOWN, FREE, OCCUPIED]));
             }
         }
     }
@@ -66,14 +62,6 @@ fn block(extent: TileExtent) -> usize {
     block
 }
 
-fn value(cell: Cell) -> u8 {
-    match Occupancy::of(cell) {
-        Occupancy::Unknown => UNKNOWN,
-        Occupancy::Free => FREE,
-        Occupancy::Occupied => OCCUPIED,
-    }
-}
-
 /// One of two cells in a block: occupied before free before unknown.
 fn unite(one: u8, other: u8) -> u8 {
     match (one, other) {
@@ -85,7 +73,7 @@ fn unite(one: u8, other: u8) -> u8 {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use crate::TileIndex;
+    use crate::{Cell, TileIndex};
 
     use super::*;
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_storage::Draft;
 
-use crate::{Cell, MapError, Occupancy, TileSource, strips};
+use crate::{MapError, TileSource, strips};
 
 /// The values of `map_server`'s form: with the thresholds below a cell is occupied, free or
 /// unknown.
@@ -12,7 +12,6 @@ const OCCUPIED: u8 = 0;
 const FREE: u8 = 254;
 const UNKNOWN: u8 = 205;
 
-/// Writes `map.pgm` and `map.yaml` into `folder`.
 pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
     let extent = strips::extent(source, "PGM")?;
     let [columns, rows] = extent.cells();
@@ -20,8 +19,10 @@ pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapE
     let mut picture = Draft::create(&folder.join("map.pgm"))?;
     picture.append(format!("P5\n{columns} {rows}\n255\n"))?;
     strips::for_each(source, &extent, |cells| {
-        let pixels: Vec<u8> = cells.iter().map(|cell| pixel(*cell)).collect();
-        Ok(picture.append(pixels)?)
+        let pixels = cells
+            .iter()
+            .map(|it| it.occupancy([UNKNOWN, FREE, OCCUPIED]));
+        Ok(picture.append(pixels.collect::<Vec<u8>>())?)
     })?;
     let mut yaml = Draft::create(&folder.join("map.yaml"))?;
     // The origin is the lower left corner of the picture. 205 is 0.196 of the way to occupied, and
@@ -33,12 +34,4 @@ pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapE
     picture.commit()?;
     yaml.commit()?;
     Ok(gyre_storage::sync_folder(folder)?)
-}
-
-fn pixel(cell: Cell) -> u8 {
-    match Occupancy::of(cell) {
-        Occupancy::Unknown => UNKNOWN,
-        Occupancy::Free => FREE,
-        Occupancy::Occupied => OCCUPIED,
-    }
 }

@@ -22,12 +22,7 @@ pub fn write_web_tiles(folder: &Path, source: &mut impl TileSource) -> Result<()
     let [columns, rows] = extent.cells().map(|cells| cells / TILE_CELLS);
     let zoom = columns.max(rows).next_power_of_two().ilog2();
     if zoom > MAX_ZOOM {
-        let [columns, rows] = extent.cells();
-        return Err(MapError::TooLarge {
-            columns,
-            rows,
-            form: "web tiles",
-        });
+        return Err(MapError::TooLarge(extent.cells(), "web tiles"));
     }
     let mut pyramid = Pyramid {
         folder,

@@ -10,15 +10,12 @@ use super::ground::Ground;
 use crate::{Cell, MapError, pixels};
 use nalgebra::Point2;
 
-/// Red, green and blue.
 pub type Colour = [u8; 3];
 
-/// The style of a line.
 #[derive(Clone, Copy)]
 pub struct Pen {
     pub colour: Colour,
     pub width: f32,
-    /// 0 to 1.
     pub opacity: f32,
 }
 
@@ -44,17 +41,14 @@ const LONGEST_BAR: f64 = 160.0;
 /// Pixels of a unit: 1 up to this size of a picture, and in proportion beyond.
 const UNIT_SIDE: f32 = 1300.0;
 
-/// A picture that is being drawn.
 pub struct Canvas {
     pixmap: Pixmap,
     /// Pixels of a unit: drawn elements have the same share of every picture.
     unit: f32,
-    view: View,
-    /// Row of the middle of the footer.
+    pub view: View,
     footer: f32,
 }
 
-/// From the map frame to the picture.
 #[derive(Clone, Copy)]
 pub struct View {
     corner_m: nalgebra::Vector2<f64>,
@@ -63,7 +57,6 @@ pub struct View {
 }
 
 impl View {
-    /// Returns the column and row of a place in the map frame.
     pub fn pixel(&self, place: &Point2<f64>) -> (f32, f32) {
         let from = (place.coords - self.corner_m) / self.pixel_m;
         (from.x as f32 + self.left, -from.y as f32)
@@ -71,7 +64,6 @@ impl View {
 }
 
 impl Canvas {
-    /// Draws the ground, with room for a footer.
     pub fn over(ground: &Ground) -> Result<Self, MapError> {
         let height = ground.height();
         let unit = (ground.width.max(height) as f32 / UNIT_SIDE).max(1.0);
@@ -114,11 +106,6 @@ impl Canvas {
         self.pixmap.width() as usize
     }
 
-    pub fn view(&self) -> View {
-        self.view
-    }
-
-    /// Returns the pixels, three bytes each.
     pub fn rgb(&self) -> Vec<u8> {
         let pixels = self.pixmap.pixels().iter();
         pixels

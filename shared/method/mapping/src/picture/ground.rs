@@ -3,7 +3,6 @@
 use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource, pixels};
 use nalgebra::Vector2;
 
-/// Longest side of a picture, px.
 const MAX_SIDE: usize = 4096;
 /// Least opacity of a seen cell: one look from nearby.
 const SEEN: u8 = 32;
@@ -14,7 +13,6 @@ pub struct Ground {
     pub cells: Vec<Cell>,
     /// Place of the upper left corner in the map frame, m.
     pub corner_m: Vector2<f64>,
-    /// Side of a pixel, m.
     pub pixel_m: f64,
 }
 
@@ -24,11 +22,7 @@ impl Ground {
         // A power of two, so that a tile has a whole number of blocks.
         let block = columns.max(rows).div_ceil(MAX_SIDE).next_power_of_two();
         if block > TILE_CELLS {
-            return Err(MapError::TooLarge {
-                columns,
-                rows,
-                form: "a picture",
-            });
+            return Err(MapError::TooLarge([columns, rows], "a picture"));
         }
         let (width, side) = (columns / block, TILE_CELLS / block);
         let mut cells = vec![Cell::default(); width * (rows / block)];
@@ -63,7 +57,6 @@ impl Ground {
         self.cells.len() / self.width
     }
 
-    /// Cuts off columns and rows around the seen part.
     fn cropped(self) -> Self {
         let is_seen = |cell: &Cell| cell.looked >= SEEN;
         let rows = || self.cells.chunks_exact(self.width);

@@ -51,32 +51,6 @@ fn a_folder_is_read_back_as_it_was_written() {
 }
 
 #[test]
-fn the_same_keyframes_give_the_same_bytes() {
-    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
-    let files = folders.each_ref().map(|folder| {
-        let mut map = written(folder.path());
-        let overlay = Overlay::default();
-        fs::write(
-            folder.path().join("map.png"),
-            map_png(&mut map, &overlay).unwrap(),
-        )
-        .unwrap();
-        write_pgm(folder.path(), &mut map).unwrap();
-        write_geotiff(&folder.path().join("map.tif"), &mut map, Some(ORIGIN)).unwrap();
-        let names = [
-            "map.toml",
-            "map.png",
-            "map.pgm",
-            "map.yaml",
-            "map.tif",
-            "tiles/0_0.png",
-        ];
-        names.map(|name| fs::read(folder.path().join(name)).unwrap())
-    });
-    assert!(files[0] == files[1]);
-}
-
-#[test]
 fn a_new_map_replaces_the_old_one_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     written(folder.path());

@@ -123,8 +123,3 @@ fn a_drive_round_the_world_is_refused_with_what_to_do() {
         );
     }
 }
-
-#[test]
-fn a_map_without_keyframes_has_no_picture() {
-    assert!(map_png(&mut evidence(), &Overlay::default()).is_err());
-}

@@ -1,7 +1,7 @@
 //! Keyframes with simulated points of a scene.
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex};
+use gyre_mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex, TileSource};
 use gyre_slam::Keyframe;
 use nalgebra::Point2;
 
@@ -61,7 +61,7 @@ pub fn images(evidence: &mut Evidence) -> Vec<(TileIndex, TileImage)> {
     let tiles = evidence.tiles();
     let image = |tile| {
         let mut image = TileImage::default();
-        assert!(evidence.image(tile, &mut image).unwrap());
+        evidence.read(tile, &mut image).unwrap();
         (tile, image)
     };
     tiles.into_iter().map(image).collect()
@@ -76,7 +76,7 @@ pub fn cell(evidence: &mut Evidence, x_m: f64, y_m: f64) -> Cell {
         y: (y / side).floor() as i32,
     };
     let mut image = TileImage::default();
-    evidence.image(tile, &mut image).unwrap();
+    evidence.read(tile, &mut image).unwrap();
     let [column, row] = [x, y].map(|cell| cell.rem_euclid(side) as usize);
     image.cells[(TILE_CELLS - 1 - row) * TILE_CELLS + column]
 }

@@ -3,43 +3,55 @@
 use std::f64::consts::PI;
 
 use gyre_estimation::places::{Candidate, Describer, Descriptor};
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
-use nalgebra::{Matrix3, Point2, Vector3};
+use nalgebra::{Matrix3, Point2};
 
-use crate::localisation::{LocaliserOptions, Map, registration::Registration};
+use crate::localisation::{Map, registration::Registration};
 
 /// Two poses are the same within this angle, rad.
 const SAME_RAD: f64 = 5.0 * PI / 180.0;
+/// Two poses nearer than this, m, and than [`SAME_RAD`] are the same.
+const SAME_M: f64 = 2.0;
 /// The most similar poses of a search are aligned.
 const ALIGNED: usize = 3;
+/// Places and headings that are searched for a first fix: first these, and all if none of them is
+/// accepted.
+const FIRST_CANDIDATES: usize = 8;
+const CANDIDATES: usize = 150;
+/// Headings for comparing a place.
+const ANGLES: usize = 3;
+/// Two candidates are of different places if they are farther apart, m.
+const APART_M: f64 = 10.0;
+/// Smallest correlation of a first fix with the map, of a single scan with a submap of many, and
+/// its smallest difference from the correlation of any other pose that was tried.
+const MIN_CORRELATION: f64 = 0.4;
+const MIN_MARGIN: f64 = 0.125;
+/// Smallest correlation of a tracked scan with the map.
+const TRACKED_CORRELATION: f64 = 0.35;
+/// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 99.9 % pass.
+const GATE: f64 = 16.27;
+/// Distance from the nearest keyframe of the map beyond which there is no fix, m.
+const REACH_M: f64 = 15.0;
+const LOST_AFTER_S: f64 = 3.0;
 
-/// A scan, with its motion by odometry.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
-    /// The points as measured.
     pub points: &'a [SparsePoint],
-    /// The velocity of the sensor.
     pub twist: Twist,
     /// The motion from the scan before, with its covariance along that one's axes.
     pub motion: UncertainMotion,
 }
 
-/// The state of the localisation of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     Lost,
-    /// A first fix, without prior.
     Found,
-    /// A fix near the prediction.
     Tracked,
-    /// A prediction by odometry from the last fix.
     Predicted,
 }
 
-/// A measured place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
     /// The pose in the map, with its covariance along the map's axes.
@@ -52,7 +64,6 @@ pub struct Fix {
     pub keyframe: usize,
 }
 
-/// The place of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
     pub status: Status,
@@ -60,7 +71,6 @@ pub struct Localisation {
     pub fix: Option<Fix>,
 }
 
-/// A pose that a search has found.
 #[derive(Clone, Copy)]
 struct Hypothesis {
     pose: Pose,
@@ -74,10 +84,8 @@ struct Track {
     fixed_ns: i64,
 }
 
-/// Localises scans in a map.
 pub struct Localiser {
     map: Map,
-    options: LocaliserOptions,
     describer: Describer,
     descriptor: Descriptor,
     registration: Registration,
@@ -85,7 +93,6 @@ pub struct Localiser {
     hypotheses: Vec<Hypothesis>,
     scan: Submap,
     place: Submap,
-    /// The keyframe whose submap `place` is.
     drawn: Option<usize>,
     track: Option<Track>,
 }
@@ -95,22 +102,20 @@ impl Localiser {
     /// odometry's.
     pub fn new(
         map: Map,
-        options: LocaliserOptions,
         refinement: &RefinementConfig,
         capacity: usize,
     ) -> Result<Self, ConfigError> {
         Ok(Self {
-            registration: Registration::new(&options, refinement, capacity)?,
+            registration: Registration::new(refinement, capacity)?,
             describer: Describer::new(),
             descriptor: Descriptor::default(),
-            candidates: Vec::with_capacity(options.candidates),
-            hypotheses: Vec::with_capacity(4 * options.candidates),
+            candidates: Vec::with_capacity(CANDIDATES),
+            hypotheses: Vec::with_capacity(4 * CANDIDATES),
             scan: Submap::with_capacity(capacity),
             place: map.new_submap(),
             drawn: None,
             track: None,
             map,
-            options,
         })
     }
 
@@ -118,7 +123,6 @@ impl Localiser {
         &self.map
     }
 
-    /// Forgets the last known place.
     pub fn reset(&mut self) {
         self.track = None;
     }
@@ -143,39 +147,30 @@ impl Localiser {
     /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of
     /// the map look like it.
     pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
-        let fix = self.most_similar(points, twist);
-        fix.filter(|fix| self.is_accepted(fix))
-    }
-
-    /// Finds the pose with the highest similarity of a scan to the map, however low.
-    pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         self.scan.start(points, twist);
         self.registration.set_scan(&self.scan);
         self.describer.describe(&self.scan, &mut self.descriptor);
         self.choose_candidates();
         self.hypotheses.clear();
-        let few = self.options.first_candidates.min(self.candidates.len());
+        let few = FIRST_CANDIDATES.min(self.candidates.len());
         (0..few).for_each(|k| self.search(k));
         let fix = self.best().filter(|fix| self.is_accepted(fix));
         fix.or_else(|| {
             (few..self.candidates.len()).for_each(|k| self.search(k));
-            self.best()
+            self.best().filter(|fix| self.is_accepted(fix))
         })
     }
 
     fn is_accepted(&self, fix: &Fix) -> bool {
         let place = Point2::from(fix.pose.motion.translation.vector);
-        fix.correlation >= self.options.min_correlation
-            && fix.margin >= self.options.min_margin
-            && self.map.nearest(place).1 <= self.options.reach_m
+        fix.correlation >= MIN_CORRELATION
+            && fix.margin >= MIN_MARGIN
+            && self.map.nearest(place).1 <= REACH_M
     }
 
     /// Chooses the places and headings that look most similar, each once.
     fn choose_candidates(&mut self) {
-        let similar = self
-            .map
-            .similar(&self.descriptor, self.options.angles)
-            .to_vec();
+        let similar = self.map.similar(&self.descriptor, ANGLES).to_vec();
         self.candidates.clear();
         for candidate in similar {
             let is_new = |other: &Candidate| {
@@ -184,12 +179,12 @@ impl Localiser {
                 let turned = |(pose, yaw_rad): (Pose, f64)| pose.rotation.angle() + yaw_rad;
                 // Up to half a turn.
                 let apart_rad = 0.5 * wrap_angle(2.0 * (turned(one) - turned(other)));
-                apart_m >= self.options.apart_m || apart_rad.abs() > SAME_RAD
+                apart_m >= APART_M || apart_rad.abs() > SAME_RAD
             };
             if self.candidates.iter().all(is_new) {
                 self.candidates.push(candidate);
             }
-            if self.candidates.len() == self.options.candidates {
+            if self.candidates.len() == CANDIDATES {
                 break;
             }
         }
@@ -224,16 +219,10 @@ impl Localiser {
         let mut best: Option<Fix> = None;
         for k in 0..self.hypotheses.len().min(ALIGNED) {
             let Hypothesis { pose, keyframe, .. } = self.hypotheses[k];
-            if let Some((pose, correlation)) = self.align(keyframe, &pose) {
-                let fix = Fix {
-                    pose,
-                    correlation,
-                    margin: 0.0,
-                    keyframe,
-                };
-                if best.is_none_or(|best| correlation > best.correlation) {
-                    best = Some(fix);
-                }
+            if let Some(fix) = self.align(keyframe, &pose)
+                && best.is_none_or(|best| fix.correlation > best.correlation)
+            {
+                best = Some(fix);
             }
         }
         let best = best.filter(|best| best.pose.has_covariance())?;
@@ -250,12 +239,11 @@ impl Localiser {
 
     fn is_same(&self, one: &Pose, other: &Pose) -> bool {
         let apart = one.inv_mul(other);
-        apart.translation.vector.norm() <= self.options.same_m
-            && apart.rotation.angle().abs() <= SAME_RAD
+        apart.translation.vector.norm() <= SAME_M && apart.rotation.angle().abs() <= SAME_RAD
     }
 
-    /// Aligns the scan with a keyframe from a pose on the map.
-    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<(UncertainMotion, f64)> {
+    /// Aligns the scan with the submap of a keyframe; the fix has no margin.
+    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<Fix> {
         self.draw(keyframe);
         self.registration.set_place(&self.place);
         let initial = self.map.pose(keyframe).inv_mul(from);
@@ -264,7 +252,12 @@ impl Localiser {
             motion: self.map.pose(keyframe),
             covariance: Matrix3::zeros(),
         };
-        Some((of_keyframe.then(&motion), correlation))
+        Some(Fix {
+            pose: of_keyframe.then(&motion),
+            correlation,
+            margin: 0.0,
+            keyframe,
+        })
     }
 
     /// Tracks the next scan from the last known place.
@@ -274,7 +267,7 @@ impl Localiser {
         self.registration.set_scan(&self.scan);
         let place = Point2::from(predicted.motion.translation.vector);
         let (keyframe, distance_m) = self.map.nearest(place);
-        let is_inside = distance_m <= self.options.reach_m;
+        let is_inside = distance_m <= REACH_M;
         if let Some(fix) = self.register(keyframe, &predicted).filter(|_| is_inside) {
             self.track = Some(Track {
                 pose: fix.pose,
@@ -286,7 +279,7 @@ impl Localiser {
             };
         }
         let without_s = (observation.stamp_ns - track.fixed_ns) as f64 * 1e-9;
-        if without_s >= self.options.lost_after_s {
+        if without_s >= LOST_AFTER_S {
             return self.start(observation);
         }
         self.track = Some(Track {
@@ -308,15 +301,13 @@ impl Localiser {
     /// Registers the scan with a keyframe, and updates the prediction with the result; `None`
     /// unless both agree.
     fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
-        let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
-        if correlation < self.options.tracked_correlation {
+        let measured = self.align(keyframe, &predicted.motion)?;
+        if measured.correlation < TRACKED_CORRELATION {
             return None;
         }
         Some(Fix {
-            pose: fused(predicted, &measured, self.options.gate)?,
-            correlation,
-            margin: 0.0,
-            keyframe,
+            pose: fused(predicted, &measured.pose)?,
+            ..measured
         })
     }
 
@@ -330,30 +321,21 @@ impl Localiser {
 
 /// Updates a prediction with a measurement (Joseph form); `None` if their difference exceeds the
 /// gate.
-fn fused(
-    predicted: &UncertainMotion,
-    measured: &UncertainMotion,
-    gate: f64,
-) -> Option<UncertainMotion> {
+fn fused(predicted: &UncertainMotion, measured: &UncertainMotion) -> Option<UncertainMotion> {
     let innovation = measured.error(&predicted.motion);
     let inverse = (predicted.covariance + measured.covariance).try_inverse()?;
     let chi_square = (innovation.transpose() * inverse * innovation).x;
     // Not a number does not.
-    let agrees = chi_square <= gate;
+    let agrees = chi_square <= GATE;
     if !agrees {
         return None;
     }
     let gain = predicted.covariance * inverse;
     let rest = Matrix3::identity() - gain;
+    let ([x, y, yaw], by) = (xy_yaw(&predicted.motion), gain * innovation);
     Some(UncertainMotion {
-        motion: moved(&predicted.motion, &(gain * innovation)),
+        motion: pose(x + by.x, y + by.y, yaw + by.z),
         covariance: rest * predicted.covariance * rest.transpose()
             + gain * measured.covariance * gain.transpose(),
     })
-}
-
-/// A pose moved by (x, y, yaw) along the map's axes.
-fn moved(from: &Pose, by: &Vector3<f64>) -> Pose {
-    let [x, y, yaw] = gyre_geometry::xy_yaw(from);
-    pose(x + by.x, y + by.y, yaw + by.z)
 }

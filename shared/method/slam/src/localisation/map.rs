@@ -13,12 +13,10 @@ use gyre_storage::LogError;
 use nalgebra::Point2;
 use thiserror::Error;
 
-/// The keyframes of a map, in its folder.
 const KEYFRAMES: &str = Keyframe::FILE;
 /// The file of descriptors of submaps, in its folder.
 const PLACES: &str = "places.index";
 
-/// Keyframes that make no map, or a map that cannot be read or written.
 #[derive(Debug, Error)]
 pub enum MapError {
     #[error("a map needs keyframes: there is none")]
@@ -29,16 +27,8 @@ pub enum MapError {
     Keyframes(#[from] LogError),
     #[error(transparent)]
     Places(#[from] PlaceFileError),
-    #[error(
-        "{KEYFRAMES} has {keyframes} keyframes{end}, and {PLACES} {places}: draw the map again with gyre map",
-        end = if *.is_complete { "" } else { " and no end" }
-    )]
-    Unlike {
-        keyframes: usize,
-        /// The file of keyframes was written to its end.
-        is_complete: bool,
-        places: usize,
-    },
+    #[error("{0}")]
+    Unlike(String),
 }
 
 /// Keyframes with their poses in the map's frame, and what their submaps look like.
@@ -84,11 +74,12 @@ impl Map {
         let index = PlaceIndex::load(&folder.join(PLACES))?;
         let (is_complete, keyframes) = (reader.has_ended(), keyframes?);
         if !is_complete || index.len() != keyframes.len() {
-            return Err(MapError::Unlike {
-                keyframes: keyframes.len(),
-                is_complete,
-                places: index.len(),
-            });
+            let end = if is_complete { "" } else { " and no end" };
+            return Err(MapError::Unlike(format!(
+                "{KEYFRAMES} has {} keyframes{end}, and {PLACES} {}: draw the map again with gyre map",
+                keyframes.len(),
+                index.len()
+            )));
         }
         Self::with_index(keyframes, index)
     }
@@ -104,7 +95,6 @@ impl Map {
         })
     }
 
-    /// Returns the keyframes, in the order of the path.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
@@ -113,7 +103,6 @@ impl Map {
         self.keyframes[keyframe].pose.motion
     }
 
-    /// Returns the keyframe nearest to a place, and its distance, m.
     pub fn nearest(&self, place: Point2<f64>) -> (usize, f64) {
         let distance_m =
             |keyframe: &Keyframe| (keyframe.pose.motion.translation.vector - place.coords).norm();
@@ -128,7 +117,6 @@ impl Map {
         self.index.rank_all(descriptor, angles)
     }
 
-    /// Makes the submap around a keyframe.
     pub(crate) fn draw(&self, middle: usize, submap: &mut Submap) {
         let keyframe = &self.keyframes[middle];
         submap.start(&keyframe.points, &keyframe.twist);
@@ -140,12 +128,10 @@ impl Map {
         }
     }
 
-    /// Plans a submap with room for any keyframe's submap.
     pub(crate) fn new_submap(&self) -> Submap {
         Submap::with_capacity(self.largest() * (2 * MAX_NEIGHBOURS + 1))
     }
 
-    /// Returns the largest number of points of a keyframe.
     pub(crate) fn largest(&self) -> usize {
         let points = self.keyframes.iter().map(|keyframe| keyframe.points.len());
         points.max().unwrap_or(0)

@@ -26,23 +26,18 @@ const STARTS: usize = 100;
 /// Stretches to either side of a fix within which odometry hardly leaves it: 20 m.
 const NEAR_STRETCHES: u64 = 4;
 
-/// A keyframe of a drive that was found in the map.
 #[derive(Clone, Copy, Debug)]
 pub struct FoundKeyframe {
-    /// The number of the keyframe in its drive.
     pub keyframe: usize,
     pub fix: Fix,
 }
 
-/// The search for a drive in a map.
 #[derive(Clone, Debug, Default)]
 pub struct DriveSearch {
     found: Vec<FoundKeyframe>,
-    /// The stretch of the path that each keyframe lies on.
     stretches: Vec<u64>,
 }
 
-/// A drive with its place in a map.
 #[derive(Clone, Debug)]
 pub struct PlacedDrive {
     /// The poses of all keyframes in the map frame.
@@ -50,7 +45,6 @@ pub struct PlacedDrive {
     /// The keyframes whose fixes agree with the others.
     pub agreeing: Vec<FoundKeyframe>,
     stretches: Vec<u64>,
-    /// The stretches with a fix that agrees.
     fixed: BTreeSet<u64>,
 }
 
@@ -82,7 +76,6 @@ impl DriveSearch {
         }
     }
 
-    /// Returns the keyframes that were found.
     pub fn found(&self) -> &[FoundKeyframe] {
         &self.found
     }

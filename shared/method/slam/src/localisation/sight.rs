@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use gyre_scan_matching::Submap;
 use ndarray::{Array2, ArrayView2};
 
-/// Sectors of a turn.
 const SECTORS: usize = 72;
 /// A span of empty sectors is hidden if it is at least this wide, sectors: 60 degrees. Shorter ones
 /// occur on open ground.
@@ -14,7 +13,6 @@ const HIDDEN: usize = 12;
 /// The cells of a raster that a sensor could see. A vehicle's roof, a wall or a broken sensor hides
 /// a part of the turn, so the map's contents there are no evidence against a place.
 pub(crate) struct Sight {
-    /// The sector of each cell.
     sectors: Array2<u8>,
     /// 1 in the cells that could be seen, 0 elsewhere.
     seen: Array2<f32>,
@@ -22,7 +20,6 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// Plans rasters of `n` x `n` cells.
     pub fn new(n: usize) -> Self {
         let middle = 0.5 * (n as f64 - 1.0);
         let sector_of = |(row, column)| sector(middle - row as f64, middle - column as f64) as u8;
@@ -33,7 +30,6 @@ impl Sight {
         }
     }
 
-    /// Finds the visible region of a scan's sensor.
     pub fn look(&mut self, scan: &Submap) {
         let mut saw = [false; SECTORS];
         for [x_m, y_m, _] in scan.points() {
@@ -52,7 +48,6 @@ impl Sight {
     }
 }
 
-/// The sector of a direction.
 fn sector(x: f64, y: f64) -> usize {
     let turn = y.atan2(x).rem_euclid(TAU) / TAU;
     ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
