@@ -107,12 +107,6 @@ fn with_the_gyro_of_a_real_drive() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: a whole drive"]
-fn on_all_real_scans() {
-    on_a_real_drive(466);
-}
-
-#[test]
 fn with_every_angle_tried() {
     let run = Run::of_recording()
         .set("search.kind=exhaustive")

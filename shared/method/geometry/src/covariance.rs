@@ -159,25 +159,6 @@ mod tests {
     }
 
     #[test]
-    fn a_left_turn_then_forward_ends_on_the_left() {
-        let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), Matrix3::zeros());
-        let end = turn.then(&uncertain(pose(3.0, 0.0, FRAC_PI_2), Matrix3::zeros()));
-        let [x, y, yaw] = xy_yaw(&end.motion);
-        assert!((x - 2.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12 && (yaw - PI).abs() < 1e-12);
-    }
-
-    #[test]
-    fn heading_uncertainty_grows_to_lateral_uncertainty_with_distance() {
-        let heading = uncertain(Pose::identity(), diagonal(0.0, 0.0, 1e-4));
-        let end = heading.then(&uncertain(pose(100.0, 0.0, 0.0), Matrix3::zeros()));
-        assert!(
-            (end.covariance[(1, 1)].sqrt() - 1.0).abs() < 1e-9,
-            "1 m after 100 m at 0.01 rad"
-        );
-        assert!(end.covariance[(0, 0)] < 1e-12 && (end.covariance[(1, 2)] - 0.01).abs() < 1e-9);
-    }
-
-    #[test]
     fn composed_covariances_rotate_with_the_first_motion() {
         let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), diagonal(0.0, 0.0, 1e-4));
         let both = turn.then(&uncertain(pose(10.0, 0.0, 0.0), diagonal(4.0, 1.0, 0.0)));

@@ -105,7 +105,6 @@ mod tests {
     use super::*;
     use crate::pose;
     use proptest::prelude::*;
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     fn difference(a: &Pose, b: &Pose) -> f64 {
         let between = a.inverse() * b;
@@ -140,14 +139,5 @@ mod tests {
             let turn = rate * t_s;
             prop_assert!((excess - vx * t_s * turn * turn / 24.0).abs() < 1e-3 * vx * t_s * turn * turn + 1e-9);
         }
-    }
-
-    #[test]
-    fn a_quarter_circle_is_driven_on_its_arc() {
-        let radius = 10.0;
-        let twist = Twist::from_motion(&pose(radius, radius, FRAC_PI_2), 2.0);
-        assert!((twist.vx_mps - radius * FRAC_PI_4).abs() < 1e-12);
-        assert!(twist.vy_mps.abs() < 1e-12);
-        assert!((twist.yaw_rate_radps - FRAC_PI_4).abs() < 1e-12);
     }
 }

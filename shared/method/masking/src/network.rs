@@ -1,6 +1,5 @@
 //! A learned mask: a network in ONNX Runtime, in rten, or of 8-bit integers without either.
 
-mod fold;
 mod integers;
 mod onnx_runtime;
 mod rten;

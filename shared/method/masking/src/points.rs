@@ -148,28 +148,6 @@ mod tests {
         assert_eq!(points[0].weight, 0.4);
     }
 
-    #[test]
-    fn a_point_is_motion_compensated_like_its_raster() {
-        let twist = Some(Twist {
-            vx_mps: 10.0,
-            vy_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        });
-        let moving = RasterFrame { twist, ..FRAME };
-        assert_eq!(factor(moving, (1, 2), [0.0, 0.0, 0.2, 0.0]), 0.5);
-        assert_eq!(factor(moving, (3, 2), [0.0, 0.0, -0.2, 0.0]), 0.5);
-        let quarter = std::f64::consts::FRAC_PI_2 / 0.1;
-        let turning = RasterFrame {
-            twist: Some(Twist {
-                vx_mps: 0.0,
-                vy_mps: 0.0,
-                yaw_rate_radps: quarter,
-            }),
-            ..FRAME
-        };
-        assert_eq!(factor(turning, (2, 0), [4.0, 0.0, 0.1, 0.0]), 0.5);
-    }
-
     const AZIMUTHS: usize = 400;
     const BINS: usize = 500;
 
@@ -262,21 +240,5 @@ mod tests {
                 assert!(share < 0.8, "{share} for {other:?}");
             }
         }
-    }
-
-    #[test]
-    fn the_doppler_shift_is_compensated_if_the_raster_is() {
-        let twist = Some(Twist {
-            vx_mps: 20.0,
-            vy_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        });
-        let [kept, compensated] = [false, true].map(|doppler_compensated| RasterFrame {
-            twist,
-            doppler_compensated,
-            ..FRAME
-        });
-        assert_eq!(factor(kept, (1, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
-        assert_eq!(factor(compensated, (0, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
     }
 }

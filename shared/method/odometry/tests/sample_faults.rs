@@ -298,15 +298,3 @@ fn no_fault_of_samples_changes_a_motion_silently() {
     faults(28, 16, Length::Long);
     faults(42, 16, Length::Short);
 }
-
-#[test]
-#[ignore = ".ci/nightly: 300 faults, each with the refinement of 40 scans"]
-fn no_fault_of_many_changes_a_motion_silently() {
-    faults(308, 40, Length::Long);
-}
-
-#[test]
-#[ignore = ".ci/nightly: 308 faults, each with the refinement of 40 scans"]
-fn no_short_fault_of_many_changes_a_motion_silently() {
-    faults(308, 40, Length::Short);
-}

@@ -110,18 +110,4 @@ mod tests {
             prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
         }
     }
-
-    #[test]
-    fn nothing_is_made_up_where_samples_are_missing() {
-        let sample = |ms: i64| Sample::speed(ms * MS, 5.0);
-        let without = |lost: std::ops::Range<i64>| {
-            let kept = (0..=500).step_by(20).filter(|ms| !lost.contains(ms));
-            let all: Vec<Sample> = kept.map(sample).collect();
-            let (before, after) = all.split_at(all.partition_point(|it| it.stamp_ns <= 250 * MS));
-            wheels([before, after]).distance()
-        };
-        assert!(without(0..0).is_some() && without(150..300).is_some());
-        assert_eq!(without(0..500), None);
-        assert_eq!(without(100..400), None);
-    }
 }

@@ -337,22 +337,4 @@ mod tests {
             toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err()
         );
     }
-
-    #[test]
-    fn defaults_and_both_papers_are_valid() {
-        for config in [
-            RotationConfig::default(),
-            RotationConfig::weston(),
-            RotationConfig::checchin(),
-        ] {
-            config.validate().unwrap();
-        }
-        for config in [
-            TranslationConfig::default(),
-            TranslationConfig::weston(),
-            TranslationConfig::checchin(),
-        ] {
-            config.validate().unwrap();
-        }
-    }
 }

@@ -132,11 +132,6 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// Returns the number of angles tried for each pair, without the final one at the peak.
-    pub fn candidates(&self) -> usize {
-        self.angles.count
-    }
-
     /// Finds the motion between two rasters.
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as

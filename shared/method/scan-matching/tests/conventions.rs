@@ -95,21 +95,3 @@ fn the_scene_behind_the_lever_moves_with_the_angle() {
     assert!(slope[1] < -10.0, "{slope:?}");
     assert!(middle.covariance.symmetric_eigenvalues().min() > 0.0);
 }
-
-#[test]
-fn two_matches_are_both_reported() {
-    // A scatterer and its double 6 m to the left: matching the one with the other is the runner-up.
-    let earlier = draw(
-        [([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(),
-        N,
-        CELL_M,
-        1.0,
-    );
-    let found = search(N, CELL_M, &Default::default(), &earlier, &earlier).1;
-    let second = found.runner_up.unwrap();
-    assert!(
-        (second.y_m.abs() - 6.0).abs() < 0.6 && second.score < found.score,
-        "{found:?}"
-    );
-    assert!((found.score - 1.0).abs() < 0.05, "{found:?}");
-}

@@ -10,7 +10,7 @@ use ort::{
     value::{Outlet, TensorRef, ValueType},
 };
 
-use super::{NetworkError, fill, fold};
+use super::{NetworkError, fill};
 use crate::networks::{one_line, runtime};
 use crate::{Backend, MaskingConfig, Provider, model::Model};
 
@@ -24,9 +24,8 @@ impl OnnxRuntime {
     /// Opens the library at `path` and loads a model.
     pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
         let environment = runtime::open(path)?;
-        let folded = fold::folded(&model.bytes);
         let session = builder(&environment, config)?
-            .commit_from_memory(folded.as_ref().unwrap_or(&model.bytes))
+            .commit_from_memory(&model.bytes)
             .map_err(|error| rejected(model, error.message()))?;
         Ok(Self { session })
     }

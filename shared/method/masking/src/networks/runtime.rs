@@ -306,41 +306,6 @@ mod tests {
     }
 
     #[test]
-    fn the_data_folder_is_absolute() {
-        let text = |path: &str| Some(OsString::from(path));
-        let cases = [
-            (text("/data"), text("/home/me"), Some("/data/gyre")),
-            (None, text("/home/me"), Some("/home/me/.local/share/gyre")),
-            (
-                text(""),
-                text("/home/me"),
-                Some("/home/me/.local/share/gyre"),
-            ),
-            (text("data"), text("."), None),
-        ];
-        for (data_home, home, expected) in cases {
-            assert_eq!(data_folder(data_home, home), expected.map(PathBuf::from));
-        }
-    }
-
-    #[test]
-    fn a_named_path_without_a_library_is_an_error() {
-        let (project, _) = folder_with("onnxruntime/capi/libonnxruntime.so");
-        let installed_in = [project.path().to_owned()];
-        let error = find_in(Some(Path::new("/no/such")), None, &installed_in)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("masking.runtime is /no/such"), "{error}");
-        let error = find_in(None, Some("/no/such".into()), &installed_in)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("ORT_DYLIB_PATH is /no/such") && error.contains(INSTALL),
-            "{error}"
-        );
-    }
-
-    #[test]
     fn the_newest_of_several_libraries_is_taken() {
         let (folder, newest) = folder_with("libonnxruntime.so.1.31.1");
         for other in [

@@ -147,17 +147,6 @@ proptest! {
 }
 
 #[test]
-fn a_standing_radar_stands() {
-    let scan = measured(
-        &ras6(Sense::Clockwise),
-        &scene(250, 3, (0.2, Vector2::new(8.0, 0.0))),
-        Vector2::zeros(),
-    );
-    let found = estimate(&scan).unwrap();
-    assert!(Vector2::from(found.velocity_mps).norm() < 0.05, "{found:?}");
-}
-
-#[test]
 fn the_scan_before_leaves_no_trace() {
     let scans = [12.0, -5.0, 20.0].map(|ahead| {
         let sensor = ras6(Sense::Clockwise);

@@ -259,24 +259,4 @@ mod tests {
             assert!((0.8..1.25).contains(&ratio), "axis {axis}: {ratio}");
         }
     }
-
-    /// Poses that are each the mean of the last ten, with noise of their own: the remaining noise
-    /// after a long time.
-    #[test]
-    fn a_mean_that_keeps_up_with_itself_drifts_by_two_over_k_plus_one_of_the_noise() {
-        const KEYFRAMES: usize = 10;
-        let mut poses = vec![0.0; KEYFRAMES];
-        // The noise of one pose alone. The walk is linear: this is what each one contributes in the
-        // end.
-        poses.push(1.0);
-        for _ in 0..1000 {
-            let last = &poses[poses.len() - KEYFRAMES..];
-            poses.push(last.iter().sum::<f64>() / KEYFRAMES as f64);
-        }
-        let left = poses.last().copied().unwrap_or_default();
-        assert!(
-            (left - 2.0 / (KEYFRAMES as f64 + 1.0)).abs() < 1e-9,
-            "{left}"
-        );
-    }
 }

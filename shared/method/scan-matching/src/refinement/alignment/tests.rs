@@ -151,35 +151,3 @@ fn an_empty_map_or_scan_leaves_the_initial_pose() {
         initial
     );
 }
-
-/// Points scattered about two walls along the way, and about the houses between them, by the square
-/// root of two: irregular, and different for each `seed`.
-fn street(seed: usize) -> Vec<[f64; 2]> {
-    let scattered = |k: usize| ((k + 97 * seed) as f64 * std::f64::consts::SQRT_2).fract() - 0.5;
-    let wall = |k: usize, y: f64| [0.12 * k as f64 - 12.0, y + 0.4 * scattered(3 * k)];
-    let house = |k: usize| [24.0 * scattered(5 * k), 16.0 * scattered(7 * k + 1)];
-    let walls = (0..200).flat_map(|k| [wall(k, 5.0), wall(k + 1, -7.0)]);
-    walls.chain((0..150).map(house)).collect()
-}
-
-#[test]
-fn six_iterations_converge() {
-    let (mut squares_m2, mut squares_rad2) = (0.0, 0.0);
-    const STREETS: usize = 30;
-    for seed in 0..STREETS {
-        let (seen, world) = (street(seed), street(seed));
-        let level = map(&world);
-        let (view, points) = (level.view(), deskewed(&seen));
-        let initial = Pose::new(Vector2::new(0.15, 0.1), 0.01);
-        let after = |iterations: usize| align(&view, &points, &initial, iterations).pose;
-        let left = after(6).inv_mul(&after(100));
-        squares_m2 += left.translation.vector.norm_squared();
-        squares_rad2 += left.rotation.angle().powi(2);
-    }
-    let [left_m, left_rad] = [squares_m2, squares_rad2].map(|sum| (sum / STREETS as f64).sqrt());
-    println!("left after six iterations: {left_m} m, {left_rad} rad");
-    assert!(
-        left_m < 5e-3 && left_rad < 4e-4,
-        "{left_m} m, {left_rad} rad"
-    );
-}
