@@ -32,7 +32,6 @@ impl Default for OdometryMotion {
 }
 
 impl OdometryMotion {
-    /// A motion whose error is independent of all others.
     pub fn independent(alone: UncertainMotion) -> Self {
         Self {
             motion: alone.motion,
@@ -42,7 +41,6 @@ impl OdometryMotion {
         }
     }
 
-    /// Returns the motion and its covariance, without the shares.
     pub fn alone(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,
@@ -50,7 +48,6 @@ impl OdometryMotion {
         }
     }
 
-    /// Rebuilds the motion as [`UncertainMotion::normalized`] does.
     #[must_use]
     pub fn normalized(&self) -> Self {
         let alone = self.alone().normalized();
@@ -61,7 +58,6 @@ impl OdometryMotion {
         }
     }
 
-    /// Returns the motion with the covariance of its drift.
     pub fn drift(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,
@@ -100,7 +96,6 @@ pub struct ComposedMotion {
 }
 
 impl ComposedMotion {
-    /// Starts at an exact pose.
     pub fn new() -> Self {
         Self::resume(UncertainMotion::identity(), Matrix3::zeros())
     }
@@ -118,7 +113,6 @@ impl ComposedMotion {
         composed
     }
 
-    /// Continues from a composed motion and the accumulated part of its covariance.
     pub fn resume(composed: UncertainMotion, accumulated: Matrix3<f64>) -> Self {
         Self {
             motion: composed.motion,
@@ -152,7 +146,6 @@ impl ComposedMotion {
         }
     }
 
-    /// Returns the motion with its covariance.
     pub fn motion(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,
@@ -166,7 +159,6 @@ impl ComposedMotion {
         self.accumulated
     }
 
-    /// Rebuilds it as [`UncertainMotion::normalized`] does.
     #[must_use]
     pub fn normalized(&self) -> Self {
         let accumulated = UncertainMotion {

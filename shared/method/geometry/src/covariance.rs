@@ -11,13 +11,11 @@ use crate::{Pose, pose, xy_yaw};
 /// The upper triangle by rows: xx, xy, x yaw, yy, y yaw, yaw yaw.
 pub type Packed = [f64; 6];
 
-/// Returns the upper triangle of a covariance.
 pub fn pack(covariance: &Matrix3<f64>) -> Packed {
     let at = |row, column| covariance[(row, column)];
     [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
 }
 
-/// Returns the symmetric matrix of an upper triangle.
 pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
 }
@@ -64,7 +62,6 @@ pub struct UncertainMotion {
 }
 
 impl UncertainMotion {
-    /// Returns no motion, with a covariance of zero.
     pub fn identity() -> Self {
         Self {
             motion: Pose::identity(),

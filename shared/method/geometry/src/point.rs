@@ -37,14 +37,12 @@ impl SparsePoint {
     }
 }
 
-/// A point from its fields in their order.
 impl From<[f32; 5]> for SparsePoint {
     fn from(fields: [f32; 5]) -> Self {
         bytemuck::cast(fields)
     }
 }
 
-/// The fields of a point in their order.
 impl From<SparsePoint> for [f32; 5] {
     fn from(point: SparsePoint) -> Self {
         bytemuck::cast(point)

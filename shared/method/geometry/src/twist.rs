@@ -62,12 +62,10 @@ impl Twist {
         Pose::new(Rotation2::new(0.5 * yaw) * self.linear_mps() * t_s, yaw)
     }
 
-    /// Returns the forward and leftward velocity, m/s.
     pub fn linear_mps(&self) -> Vector2<f64> {
         Vector2::new(self.vx_mps, self.vy_mps)
     }
 
-    /// Returns the speed, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.vx_mps.hypot(self.vy_mps)
     }

@@ -65,7 +65,6 @@ pub enum MaskKind {
     Learned,
 }
 
-/// A setting out of its bounds.
 #[derive(Debug, Error, PartialEq)]
 pub enum MaskingConfigError {
     #[error("threads is {0}, but must be 1 to 64")]
@@ -76,7 +75,6 @@ pub enum MaskingConfigError {
         "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
     )]
     NotOfRten(&'static str),
-    /// A lag of 0: the motion of a scan is not known yet when it is masked.
     #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
     Lag,
 }
@@ -101,7 +99,6 @@ impl Default for MaskingConfig {
 }
 
 impl MaskingConfig {
-    /// Checks the bounds of all settings, without reading any file.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
             () if !(1..=64).contains(&self.threads) => {
@@ -129,7 +126,6 @@ impl MaskingConfig {
         }
     }
 
-    /// Returns the lag of the motions that masking waits for; 0 if it waits for none.
     pub fn feedback_lag(&self) -> usize {
         if self.compensate { self.lag } else { 0 }
     }

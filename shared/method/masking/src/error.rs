@@ -5,7 +5,6 @@ use thiserror::Error;
 
 use crate::{MaskingConfigError, network::NetworkError};
 
-/// An invalid configuration of a masker.
 #[derive(Debug, Error)]
 pub enum MaskerError {
     #[error("masking.{0}")]
@@ -18,7 +17,6 @@ pub enum MaskerError {
     Network(#[from] NetworkError),
 }
 
-/// An error in masking a scan.
 #[derive(Debug, Error)]
 pub enum MaskError {
     #[error(transparent)]
@@ -29,7 +27,6 @@ pub enum MaskError {
     Network(#[from] NetworkError),
     #[error("{0}")]
     Function(String),
-    /// The mask takes two scans, but the previous one or the output for it is missing.
     #[error(
         "the mask takes two scans, but the previous scan {0} or the output for its raster is missing"
     )]

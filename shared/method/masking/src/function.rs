@@ -84,7 +84,6 @@ impl AppliedFunction {
         }
     }
 
-    /// Masks a scan: see [`Masker::mask`](crate::Masker::mask).
     pub fn mask(
         &mut self,
         rasters: &mut CompensatedRaster,
@@ -118,7 +117,6 @@ impl AppliedFunction {
         Ok(twist)
     }
 
-    /// Returns the last masked scan with the powers that are left.
     pub fn left<'a>(&'a self, scan: &PolarScan<'a>) -> PolarScan<'a> {
         if self.powers.is_empty() {
             return *scan;
@@ -130,13 +128,11 @@ impl AppliedFunction {
         left
     }
 
-    /// Returns the factors of the last masked scan's raster.
     pub fn factors(&self) -> Option<ArrayView2<'_, f32>> {
         self.raster.as_ref().map(|factors| factors.view())
     }
 }
 
-/// Checks the shape and the range of factors.
 fn check(factors: &Array2<f32>, expected: (usize, usize)) -> Result<(), MaskError> {
     let failed = |reason: String| Err(MaskError::Function(reason));
     if factors.dim() != expected {

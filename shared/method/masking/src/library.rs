@@ -30,7 +30,6 @@ impl Library {
         }
     }
 
-    /// Returns the path of ONNX Runtime; `None` for rten.
     pub fn onnx_runtime(&self) -> Option<&Path> {
         match self {
             Self::OnnxRuntime(path) => Some(path),

@@ -27,27 +27,21 @@ pub struct Card {
     pub masking: MaskingFacts,
 }
 
-/// The section `[model]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct NetworkFacts {
     /// The model's file, in the folder of the card.
     pub file: PathBuf,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Number of scans that it takes: 1, or 2 (this one and the previous one).
     pub inputs: usize,
-    /// Version of the ONNX operators.
     pub opset: u32,
 }
 
 /// The section `[raster]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct RasterFacts {
-    /// Cells per side.
     pub n: usize,
-    /// Size of a cell, m.
     pub cell_m: f32,
-    /// Sampling of range bins to cells.
     pub sampling: Option<Sampling>,
     /// Ranges below this are left out, m.
     pub min_range_m: Option<f32>,
@@ -75,7 +69,6 @@ pub struct Model {
     pub bytes: Vec<u8>,
 }
 
-/// An error in reading a model.
 #[derive(Debug, Error)]
 pub enum ModelError {
     #[error(
@@ -84,7 +77,6 @@ pub enum ModelError {
     NotNamed,
     #[error("cannot read the model's {what} {path}: {source}")]
     Unreadable {
-        /// `card` or `file`.
         what: &'static str,
         path: PathBuf,
         source: io::Error,
@@ -118,22 +110,16 @@ pub enum ModelError {
     )]
     OtherModel {
         path: PathBuf,
-        /// The value of the configuration.
         expected: String,
-        /// The value of the card.
         actual: String,
     },
-    /// The rasters have another size than those that the model was trained on.
     #[error(
         "raster.{key} is {actual}, but the model {path} is for {expected}: set raster.{key} = {expected}, or choose another masking.model"
     )]
     Raster {
-        /// The key of the section `[raster]`.
         key: &'static str,
         path: PathBuf,
-        /// The value of the card.
         expected: f64,
-        /// The value of the configuration.
         actual: f64,
     },
 }

@@ -24,7 +24,6 @@ use rten::Rten;
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
 
-/// An error in loading or running a network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
     #[error(transparent)]
@@ -35,21 +34,14 @@ pub enum NetworkError {
         "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
     )]
     NotBuiltIn(Provider),
-    /// The execution provider does not work on this machine or with this ONNX Runtime.
     #[error(
         "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
     )]
-    Provider {
-        provider: Provider,
-        /// ONNX Runtime's error.
-        reason: String,
-    },
+    Provider { provider: Provider, reason: String },
     #[error("{} cannot load {path}: {reason}", .by.name())]
     Load {
         by: Backend,
-        /// The model's file.
         path: PathBuf,
-        /// The backend's error.
         reason: String,
     },
     #[error(
@@ -67,7 +59,6 @@ pub enum NetworkError {
     },
     #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
     Interface {
-        /// The model's file.
         path: PathBuf,
         has: String,
         expected: String,
@@ -137,7 +128,6 @@ impl Network {
         Ok(self.masks.view())
     }
 
-    /// Returns the masks of the last [`Network::run`], scans x n x n.
     pub fn masks(&self) -> ArrayView3<'_, f32> {
         self.masks.view()
     }
@@ -185,7 +175,6 @@ fn clamp(values: &[f32], clamped: &mut [f32]) -> u32 {
     broken
 }
 
-/// Checks that the inputs or outputs of a network are exactly the expected tensor.
 fn check(
     verb: &str,
     name: &str,

@@ -36,7 +36,6 @@ pub struct OdometryConfig {
 }
 
 impl OdometryConfig {
-    /// Returns whether samples of other sensors come with the scans.
     pub fn has_samples(&self) -> bool {
         self.gyro.is_used() || self.wheels.is_used()
     }

@@ -23,9 +23,8 @@ pub trait Mask: Send + Sync {
         rasters: &mut Rasters<'_>,
     ) -> Result<Option<Twist>, OdometryError>;
 
-    /// Writes the scan's points to the start of `out` and returns their number. `twist` is what
-    /// [`Mask::mask`] returned.
-    /// On an error the scan is left out.
+    /// Writes the scan's points to the start of `out` and returns their number. `twist` is the
+    /// velocity that [`Mask::mask`] returned.
     fn points(
         &mut self,
         scan: &PolarScan<'_>,

@@ -194,7 +194,6 @@ impl Odometry {
         self.pair.earlier_for_pair()
     }
 
-    /// Returns the points of the last registered scan.
     pub fn points(&self) -> &[SparsePoint] {
         self.pair.earlier_points()
     }
@@ -211,13 +210,11 @@ impl Odometry {
         self.lost
     }
 
-    /// Returns the velocity for the motion compensation of the last registered scan.
     pub fn twist(&self) -> Option<Twist> {
         self.pair.earlier_twist()
     }
 }
 
-/// Returns the refined motion, else the searched one, and its origin.
 fn estimate(searched: Option<&JointMatch>, refined: Option<&Refined>) -> (OdometryMotion, Outcome) {
     match (searched, refined) {
         (_, Some(refined)) => (refined.motion, refined.outcome.into()),

@@ -39,7 +39,6 @@ impl Pair {
         self.seq
     }
 
-    /// Returns the raster of the later scan.
     pub fn later(&self) -> ArrayView2<'_, f32> {
         self.later.raster.view()
     }
@@ -57,12 +56,10 @@ impl Pair {
         self.earlier_for_pair.is_some()
     }
 
-    /// Returns the points of the later scan.
     pub fn later_points(&self) -> &[SparsePoint] {
         self.later.points()
     }
 
-    /// Returns the points of the earlier scan.
     pub fn earlier_points(&self) -> &[SparsePoint] {
         self.earlier.points()
     }
@@ -77,7 +74,6 @@ impl Pair {
         }
     }
 
-    /// Returns the time between the two scans, ns.
     pub fn interval_ns(&self) -> i64 {
         let [earlier, later] = self.stamps_ns();
         later.saturating_sub(earlier)
@@ -89,7 +85,6 @@ impl Pair {
         self.earlier.azimuth_variance_rad2 + self.later.azimuth_variance_rad2
     }
 
-    /// Returns the turn from the earlier scan to the later one, as the gyro has measured it.
     pub fn turn(&self) -> Option<GyroTurn> {
         self.turn
     }
@@ -99,7 +94,6 @@ impl Pair {
         self.turn = turn;
     }
 
-    /// Returns the distance from the earlier scan to the later one, as the wheels have measured it.
     pub fn distance(&self) -> Option<WheelDistance> {
         self.distance
     }

@@ -7,7 +7,6 @@ use gyre_scan_matching::{ExhaustiveSearch, Refined, RefinementKind, Refiner};
 use crate::{DecoupledSearch, Mask, OdometryConfig, Pair, Search, SearchKind, SetupError};
 
 pub trait Refine: Send + Sync {
-    /// Refines the motion between two scans that the search found.
     fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined;
 
     /// Forgets all scans: the next one starts a new chain of motions.

@@ -17,9 +17,7 @@ pub struct Registered {
     pub motion: OdometryMotion,
     /// The pose in the frame of the first scan, with its covariance.
     pub pose: UncertainMotion,
-    /// The origin of the motion.
     pub outcome: Outcome,
-    /// Time between the two scans, ns.
     pub interval_ns: i64,
     /// The result of the search; `None` where the chain starts.
     pub searched: Option<JointMatch>,
@@ -65,12 +63,10 @@ pub enum SetupError {
     Search(#[from] ConfigError),
 }
 
-/// An error in registering a scan.
 #[derive(Debug, Error)]
 pub enum OdometryError {
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// The scan is inconsistent, or its times do not form one sweep.
     #[error(transparent)]
     Scan(#[from] ScanError),
     #[error(transparent)]

@@ -30,7 +30,6 @@ const MAX_AGREEING_S: f64 = 0.15;
 /// Minimum correlation of speeds or yaw rates for a reliable offset.
 const MIN_CORRELATION: f64 = 0.6;
 
-/// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
     /// Delay, s: the motion of the reference at `t` equals the motion of the other trajectory at `t
@@ -51,7 +50,6 @@ impl ClockOffset {
         turns.map_or(self.speed_correlation, |t| t.max(self.speed_correlation)) >= MIN_CORRELATION
     }
 
-    /// Returns whether the clocks agree.
     pub fn agrees(&self) -> bool {
         self.is_reliable() && self.delay_s.abs() <= MAX_AGREEING_S
     }
@@ -64,7 +62,6 @@ impl fmt::Display for ClockOffset {
     }
 }
 
-/// A motion of the reference.
 struct Motion {
     from_ns: i64,
     to_ns: i64,
@@ -188,7 +185,6 @@ fn fit(motions: &[Motion], other: &Trajectory, late_ns: i64, turns: bool) -> Opt
     })
 }
 
-/// Pearson correlation, from running sums.
 #[derive(Default)]
 struct Correlation {
     n: f64,

@@ -7,9 +7,6 @@
 //!
 //! A rotation of the radar about itself shifts no range. If the radar is ahead of the centre of the
 //! rotation, the velocity is the radar's, which moves to the side there.
-//!
-//! Steps: `rows` sums bins to cells, `shifts` correlates each row with its neighbours, `fit` finds
-//! the velocity on which most bearings agree.
 
 mod fit;
 mod rows;

@@ -5,9 +5,6 @@
 //! azimuths within the antenna's beam: a scatterer appears in several azimuths, and the strongest
 //! gives its bearing. There is no suppression along range, so that a wall at a grazing angle is
 //! kept as a whole.
-//!
-//! Steps: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths,
-//! and [`PointExtractor`] converts the strongest of them to points.
 
 mod peaks;
 mod range_cells;
@@ -57,7 +54,6 @@ impl Default for PointsConfig {
     }
 }
 
-/// A setting that is out of bounds.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("points.{key} is {value}, but must be {bounds}")]
 pub struct PointsError {
@@ -67,7 +63,6 @@ pub struct PointsError {
 }
 
 impl PointsConfig {
-    /// Checks the bounds of all settings.
     pub fn validate(&self) -> Result<(), PointsError> {
         let setting = |fits: bool, key, value: f32, bounds| match fits {
             true => Ok(()),
@@ -167,7 +162,6 @@ fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 
     weakest as i16 + 1
 }
 
-/// The common properties of the points of one azimuth.
 struct View {
     /// Unit vector of the azimuth, x forward and y left.
     direction: [f32; 2],

@@ -4,14 +4,6 @@
 //! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor is at the
 //! centre of the middle cell (between the middle cells where `n` is even). Its frame is the
 //! sensor's at the scan's stamp, x forward and y left. A value is the power above a floor.
-//!
-//! Steps:
-//! 1. `bearing_table`: maps a bearing to the fractional azimuth measured there, and to the time of
-//!    the measurement;
-//! 2. `polar_image`: the powers above the floor, averaged along range over the depth of a cell,
-//!    with the Doppler shift compensated;
-//! 3. `kernels::locate`: the position of each cell in the polar image, seen from where the
-//!    [`Twist`] places the sensor, and bilinear interpolation there.
 
 mod bearing_table;
 mod cells;
@@ -93,7 +85,6 @@ impl Default for RasterConfig {
 }
 
 impl RasterConfig {
-    /// Checks the bounds of all settings.
     pub fn validate(&self) -> Result<(), RasterError> {
         let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
         if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
@@ -156,7 +147,6 @@ pub struct Rasteriser {
 }
 
 impl Rasteriser {
-    /// Allocates memory and computes the positions of the cells.
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {

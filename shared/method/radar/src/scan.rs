@@ -43,9 +43,7 @@ pub mod flag {
 /// place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepGeometry {
-    /// Number of azimuths (rows).
     pub azimuths: usize,
-    /// Number of range bins per azimuth (columns).
     pub bins: usize,
     /// Bytes between the first bins of consecutive azimuths.
     pub stride: usize,
@@ -61,7 +59,6 @@ pub struct SweepGeometry {
     /// positive, and with a falling chirp negative. Where the chirp of an azimuth is known, it
     /// determines the sign.
     pub doppler_s: f32,
-    /// The direction of increasing azimuths.
     pub sense: Sense,
     /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the
     /// reader documents otherwise.
@@ -71,9 +68,7 @@ pub struct SweepGeometry {
 /// A borrowed scan: `azimuths x bins` powers, with the angle and time of each azimuth.
 #[derive(Clone, Copy, Debug)]
 pub struct PolarScan<'a> {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
-    /// All bytes of the scan.
     pub bytes: &'a [u8],
     /// Measured angle of each azimuth from straight ahead, rad in `[0, 2 pi)`, increasing in the
     /// direction of `geometry.sense`.
@@ -156,7 +151,6 @@ pub struct ScanSlot<'a> {
 /// The size of the largest scan of a dataset, for allocation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanLimits {
-    /// Bytes of the image.
     pub bytes: usize,
     /// Number of azimuths, at most [`MAX_AZIMUTHS`].
     pub azimuths: usize,
@@ -200,7 +194,6 @@ impl OwnedScan {
         }
     }
 
-    /// Returns the memory to fill.
     pub fn slot(&mut self) -> ScanSlot<'_> {
         ScanSlot {
             bytes: &mut self.bytes,

@@ -20,7 +20,6 @@ impl Trajectory {
         self.poses.len()
     }
 
-    /// Returns whether there is no pose.
     pub fn is_empty(&self) -> bool {
         self.poses.is_empty()
     }
@@ -40,13 +39,11 @@ impl Trajectory {
             .any(|w| w[0].rotation != w[1].rotation)
     }
 
-    /// First and last time, ns.
     pub fn span_ns(&self) -> Option<(i64, i64)> {
         let stamps = self.stamp_ns.as_ref()?;
         Some((*stamps.first()?, *stamps.last()?))
     }
 
-    /// Returns the trajectory with all its times earlier by `ns`.
     pub fn earlier_by(mut self, ns: i64) -> Self {
         for stamp in self.stamp_ns.iter_mut().flatten() {
             *stamp = stamp.saturating_sub(ns);

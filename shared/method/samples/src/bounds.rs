@@ -9,11 +9,9 @@ pub struct SampleConfigError {
     pub section: &'static str,
     pub key: &'static str,
     pub value: f64,
-    /// The values that it may have.
     pub expected: &'static str,
 }
 
-/// Checks the values of the section of this name.
 pub(crate) struct Bounds(pub &'static str);
 
 impl Bounds {
@@ -45,7 +43,6 @@ impl Bounds {
         self.within("max_wait_ms", value, [0.0, 1000.0], expected)
     }
 
-    /// Checks a scale and its standard deviation.
     pub fn scale(&self, [scale, sigma]: [f64; 2]) -> Result<(), SampleConfigError> {
         self.within("scale", scale, [0.5, 2.0], "a factor, 0.5 to 2")?;
         self.within("scale_sigma", sigma, [0.0, 1.0], "a share, 0 to 1")

@@ -116,7 +116,6 @@ impl UpAxis {
         }
     }
 
-    /// Returns the name in configurations.
     pub fn name(self) -> &'static str {
         match self {
             Self::X => "x",
@@ -152,7 +151,6 @@ impl Default for GyroConfig {
 }
 
 impl GyroConfig {
-    /// Returns whether a gyro is used.
     pub fn is_used(&self) -> bool {
         self.kind != GyroKind::None
     }

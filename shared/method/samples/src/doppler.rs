@@ -75,7 +75,6 @@ impl DopplerConfig {
     /// m/s.
     pub const NOISE_MPS: f64 = 0.02;
 
-    /// Returns whether the velocity is measured and used.
     pub fn is_used(&self) -> bool {
         self.kind != DopplerKind::None
     }

@@ -13,12 +13,10 @@ const ECCENTRICITY_2: f64 = FLATTENING * (2.0 - FLATTENING);
 /// is of the earth's radius.
 const STEPS: usize = 12;
 
-/// A place on the earth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geographic {
     /// Latitude (WGS 84), degrees.
     pub latitude_deg: f64,
-    /// Longitude, degrees.
     pub longitude_deg: f64,
 }
 
@@ -40,7 +38,6 @@ impl LocalPlane {
         }
     }
 
-    /// Returns where the plane touches the earth.
     pub fn origin(&self) -> Geographic {
         self.origin
     }

@@ -75,12 +75,10 @@ impl Default for GnssConfig {
 }
 
 impl GnssConfig {
-    /// Returns whether fixes are used.
     pub fn is_used(&self) -> bool {
         self.kind != GnssKind::None
     }
 
-    /// Returns whether fixes arrive during the run.
     pub fn is_live(&self) -> bool {
         matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
     }
@@ -127,7 +125,6 @@ pub struct RawFix {
 }
 
 impl RawFix {
-    /// Returns the place, of a fix in degrees.
     pub fn geographic(&self) -> Geographic {
         Geographic {
             latitude_deg: self.at[0],
@@ -148,9 +145,7 @@ impl RawFix {
 /// The fixes in a bag of ROS 2, in degrees.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BagFixes {
-    /// The topic of their messages.
     pub topic: String,
-    /// The fixes in the order of the bag.
     pub fixes: Vec<RawFix>,
     /// Messages without a fix.
     pub without_fix: usize,

@@ -10,7 +10,6 @@ pub struct Sample {
     pub stamp_ns: i64,
     /// The quantity: a number of [`SampleKind`].
     pub kind: u32,
-    /// Zero.
     pub reserved: u32,
     /// The values that [`SampleKind`] names; unused ones are zero.
     pub values: [f64; 6],
@@ -37,7 +36,6 @@ pub enum SampleKind {
 }
 
 impl SampleKind {
-    /// Returns the name of its section in configurations.
     pub const fn section(self) -> &'static str {
         match self {
             Self::Gyro => "gyro",
@@ -83,7 +81,6 @@ impl Sample {
         (self.stamp_ns, self.kind)
     }
 
-    /// Returns whether it is of this kind.
     pub fn is(&self, kind: SampleKind) -> bool {
         self.kind == kind as u32
     }

@@ -88,12 +88,10 @@ impl Default for WheelsConfig {
 }
 
 impl WheelsConfig {
-    /// Returns whether the wheels are used.
     pub fn is_used(&self) -> bool {
         self.kind != WheelsKind::None
     }
 
-    /// Returns whether the wheels are live: their samples arrive while the radar is received.
     pub fn is_live(&self) -> bool {
         matches!(self.kind, WheelsKind::Udp | WheelsKind::Ros2)
     }

@@ -5,12 +5,9 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-/// An invalid value of a search.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
-    /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or
-    /// `raster`.
     pub section: &'static str,
     pub key: &'static str,
     pub actual: String,
@@ -243,7 +240,6 @@ impl TranslationConfig {
 }
 
 impl Peak {
-    /// The temperature of a soft-argmax; 1 otherwise.
     fn temperature(&self) -> f64 {
         match *self {
             Peak::SoftArgmax { temperature } => temperature,
@@ -256,12 +252,10 @@ pub(crate) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
-/// A section of a configuration, whose keys are checked.
 #[derive(Clone, Copy)]
 pub(crate) struct Section(pub &'static str);
 
 impl Section {
-    /// Rejects `actual` unless it `fits`.
     pub fn require(
         self,
         fits: bool,
@@ -280,7 +274,6 @@ impl Section {
         }
     }
 
-    /// Rejects a value that is not within bounds, which `expected` names.
     pub fn within<T: PartialOrd + ToString>(
         self,
         key: &'static str,
@@ -291,7 +284,6 @@ impl Section {
         self.require(bounds.contains(&value), key, &value, expected)
     }
 
-    /// Rejects a number that is not positive.
     pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
         self.require(positive(value), key, &value, "a positive number")
     }

@@ -55,7 +55,6 @@ impl KeptCorrelation {
         1.0 / (self.size * self.size) as f64
     }
 
-    /// Computes and keeps the spectrum of the image f.
     pub fn keep(&mut self, f: &[f32]) {
         let n = self.n;
         self.rows.forward(&mut self.kept, n, |r, out| {

@@ -70,13 +70,10 @@ pub struct ExhaustiveSearch {
     later: Vec<f32>,
     earlier: Vec<f32>,
     later_energy: OverlapEnergy,
-    /// Two angles at a time.
     turned: [Turned; 2],
-    /// The best of each angle.
     candidates: Vec<Candidate>,
 }
 
-/// The earlier raster at one angle, and the scores of its shifts.
 struct Turned {
     raster: Vec<f32>,
     energy: OverlapEnergy,
@@ -91,7 +88,6 @@ struct Candidate {
     place: Vector2<f64>,
 }
 
-/// The peak in all three unknowns.
 struct JointPeak {
     prior_rad: f64,
     /// The nearest angle of the grid.
@@ -136,7 +132,6 @@ impl ExhaustiveSearch {
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -170,7 +165,6 @@ impl ExhaustiveSearch {
             .map_or(self.no_match(prior_rad), |found| self.joint_match(&found)))
     }
 
-    /// The best match at every angle of the grid.
     fn score_angles(&mut self, prior_rad: f64, energy: f64) {
         for first in (0..self.angles.count).step_by(2) {
             let count = (self.angles.count - first).min(2);
@@ -217,7 +211,6 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Interpolates the peak over the angles, then finds the peak over the shifts there.
     fn joint_peak(&mut self, prior_rad: f64, energy: f64) -> Option<JointPeak> {
         let best = self.best()?;
         let over_angles = self.angle_peak(best);
@@ -238,7 +231,6 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// The angle with the highest score.
     fn best(&self) -> Option<usize> {
         let best = (0..self.angles.count)
             .reduce(|best, k| if self.at(k) > self.at(best) { k } else { best })?;
@@ -320,8 +312,7 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad, from the best
-    /// shifts at the neighbouring angles.
+    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad.
     fn ridge_slope(&self, found: &JointPeak) -> Vector2<f64> {
         let beside = [-1, 1].map(|by| self.angles.beside(found.best, by));
         if !self.angles.is_inner(found.best) || beside.iter().any(|&k| self.at(k) <= 0.0) {

@@ -96,7 +96,6 @@ impl Columns {
         }
     }
 
-    /// Sets rows `first..` of every column to zero.
     pub fn clear_from(&mut self, first: usize) {
         for column in self.data.chunks_exact_mut(self.stride) {
             column[first..].fill(Complex32::default());
@@ -104,7 +103,6 @@ impl Columns {
     }
 }
 
-/// One-dimensional complex transform with its scratch.
 pub(crate) struct Transform {
     fft: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
@@ -122,7 +120,6 @@ impl Transform {
         }
     }
 
-    /// Transforms a line into a second line.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
         self.fft
             .process_immutable_with_scratch(line, out, &mut self.scratch);
@@ -133,7 +130,6 @@ impl Transform {
         self.fft.process_with_scratch(lines, &mut self.scratch);
     }
 
-    /// Transforms the first `count` columns.
     fn columns(&mut self, plane: &mut Columns, count: usize) {
         for c in 0..count {
             self.lines(plane.column_mut(c));
@@ -293,7 +289,6 @@ impl PairSpectrum {
         }
     }
 
-    /// Cells a side.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -320,7 +315,6 @@ impl PairSpectrum {
         }
     }
 
-    /// The cross-spectrum, as [`cross`](Self::cross) left it.
     pub fn cross_spectrum_mut(&mut self) -> &mut [Complex32] {
         self.plane.first_mut(self.size / 2 + 1)
     }

@@ -50,7 +50,6 @@ impl MaskedCorrelation {
     /// Returns the sum of f(x) g(R x + t) over the root of the product of the sums of the squares,
     /// where (R, t) is the `motion` from the earlier raster g to the later one f, and both x and R
     /// x + t are within range; 0 without energy there.
-    /// Rasters must be n x n in standard layout.
     pub fn at(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -62,7 +61,6 @@ impl MaskedCorrelation {
 
     /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see:
     /// `seen` is 1 there, and 0 elsewhere.
-    /// Rasters must be n x n in standard layout.
     pub fn at_seen(
         &mut self,
         later: ArrayView2<'_, f32>,

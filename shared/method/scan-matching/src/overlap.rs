@@ -41,7 +41,6 @@ impl OverlapEnergy {
         }
     }
 
-    /// Energy of the whole raster.
     pub fn total(&self) -> f64 {
         self.total
     }

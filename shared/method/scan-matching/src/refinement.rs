@@ -3,25 +3,6 @@
 //! The map is the mean of the last keyframes, each drawn once from its own points at its own pose,
 //! blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map
 //! and then on the fine one, and is deskewed with the very motion that is sought.
-//!
-//! Reading order:
-//! - [`Refiner::refine`]: the method;
-//! - `registration`: the best match of a scan with the map, from several initial guesses;
-//! - `points`: a scan's points, deskewed;
-//! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
-//! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
-//! - `tracker`: the last poses, predictions from them, and the poses that a vehicle can have
-//!   reached;
-//! - `aiding`: the motion by gyro, wheels and Doppler, against the radar's;
-//! - `heading`: with a gyro, the heading and the gyro's bias;
-//! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
-//! - `along_walls`: the displacement where only other sensors determine the distance; `structure`:
-//!   where that is so;
-//! - `uncertainty`: covariances, and the shares of them that accumulate;
-//! - `standstill`: the pose of a standing vehicle is held;
-//! - [`Submap`]: the points of a keyframe and of those around it;
-//! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in
-//!   time.
 
 mod aiding;
 mod alignment;
@@ -95,7 +76,6 @@ pub struct Refined {
     pub overlap: f64,
     /// Weight of the points as a share of its running mean; 1 without a mean yet.
     pub support: f64,
-    /// The reliability of the motion.
     pub outcome: Outcome,
     /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
@@ -109,7 +89,6 @@ pub struct Refined {
     pub doppler: Option<WheelScale>,
 }
 
-/// An estimated pose, with the covariance of the motion to it.
 struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
@@ -291,12 +270,10 @@ impl Refiner {
         &self.state
     }
 
-    /// Returns the keyframes of the map, oldest first.
     pub fn keyframes(&self) -> impl Iterator<Item = &Keyframe> {
         self.map.keyframes()
     }
 
-    /// Returns the number of cells of both images of a keyframe.
     pub fn keyframe_cells(&self) -> usize {
         self.map.keyframe_cells()
     }
@@ -384,7 +361,6 @@ impl Refiner {
         })
     }
 
-    /// Returns the predicted pose and the covariance of its motion.
     fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction();
@@ -464,7 +440,6 @@ impl Refiner {
         }
     }
 
-    /// Updates the tracker state and the map with the accepted or predicted pose.
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
         let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);

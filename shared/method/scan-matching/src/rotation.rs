@@ -27,15 +27,12 @@ const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 /// on real scans with known motions.
 const VARIANCE_SCALE: f64 = 0.12;
 
-/// The second-best angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationRunnerUp {
-    /// Angle, radians.
     pub angle_rad: f64,
     pub score: f64,
 }
 
-/// The rotation between two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationMatch {
     /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the
@@ -119,7 +116,6 @@ impl RotationSearch {
     ///
     /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// `raster` must be n x n in standard layout, and `out` from this search.
     pub fn spectrum(
         &mut self,
         raster: ArrayView2<'_, f32>,

@@ -51,7 +51,6 @@ impl Scores {
         }
     }
 
-    /// The transform's row (and column) of each shift, from the most negative one on.
     pub fn wrapped(&self) -> Arc<[usize]> {
         self.wrapped.clone()
     }
@@ -107,7 +106,6 @@ impl Scores {
         f64::from(self.values[((down + around) * side + right + around) as usize])
     }
 
-    /// All shifts within reach with their scores.
     fn scored(&self) -> impl Iterator<Item = (Shift, f64)> + Clone {
         let reach = self.reach;
         (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| ((i, j), self.at(i, j))))
@@ -123,7 +121,6 @@ impl Scores {
         (best.1 > 0.0).then_some(best.0)
     }
 
-    /// The peak next to the highest score.
     pub fn peak(&self, kind: Peak, best: Shift) -> PlanePeak {
         plane_peak(kind, |i, j| self.at(best.0 + i, best.1 + j))
     }
@@ -157,12 +154,10 @@ impl Scores {
     }
 }
 
-/// Checks the side of rasters of `n` x `n` cells.
 pub(crate) fn check_side(n: usize) -> Result<(), ConfigError> {
     Section("raster").within("n", n, 16..=8192, "16 to 8192 cells a side")
 }
 
-/// Checks the size of rasters of `n` x `n` cells of `cell_m` metres.
 pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), ConfigError> {
     check_side(n)?;
     Section("raster").require(positive(cell_m), "cell_m", &cell_m, "metres, above 0")

@@ -16,7 +16,6 @@ use crate::scores::{Scores, Shift, reach_cells};
 use crate::warp::Rotation;
 use crate::{ShapeError, cells, kernels, whiten};
 
-/// The second-best shift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionRunnerUp {
     /// Forward, m, in the earlier scan's frame.
@@ -29,11 +28,8 @@ pub struct MotionRunnerUp {
 /// The motion between two scans: the pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionMatch {
-    /// Forward, m.
     pub x_m: f64,
-    /// Left, m.
     pub y_m: f64,
-    /// Counter-clockwise, radians.
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw), m^2, m rad and rad^2: from the shapes of the peaks, and the
     /// shift's dependence on the angle.
@@ -45,7 +41,6 @@ pub struct MotionMatch {
 }
 
 impl MotionMatch {
-    /// Returns the motion as the pose of the later scan's frame in the earlier scan's frame.
     pub fn pose(&self) -> Pose {
         pose(self.x_m, self.y_m, self.yaw_rad)
     }
@@ -97,7 +92,6 @@ impl TranslationSearch {
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -110,7 +104,6 @@ impl TranslationSearch {
     /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`,
     /// in the directions of the later raster, is 1 where it could, and 0 elsewhere. The earlier
     /// raster counts only there, as seen from its own sensor.
-    /// Rasters must be n x n in standard layout.
     pub fn search_seen(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -138,7 +131,6 @@ impl TranslationSearch {
         Ok(self.at_angle(earlier, seen, angle_rad, variance_rad2))
     }
 
-    /// The motion if the angle is `angle_rad`.
     fn at_angle(
         &mut self,
         earlier: &[f32],

@@ -14,7 +14,6 @@ use super::{NetworkError, fill};
 use crate::networks::{one_line, runtime};
 use crate::{Backend, MaskingConfig, Provider, model::Model};
 
-/// A session of ONNX Runtime.
 #[derive(Debug)]
 pub(super) struct OnnxRuntime {
     session: Session,
@@ -30,17 +29,14 @@ impl OnnxRuntime {
         Ok(Self { session })
     }
 
-    /// Returns the name, type and shape of each input.
     pub fn inputs(&self) -> Vec<String> {
         self.session.inputs().iter().map(describe).collect()
     }
 
-    /// Returns the name, type and shape of each output.
     pub fn outputs(&self) -> Vec<String> {
         self.session.outputs().iter().map(describe).collect()
     }
 
-    /// Computes the masks of rasters, both scans x n x n.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
@@ -54,7 +50,6 @@ impl OnnxRuntime {
     }
 }
 
-/// Returns a session builder with the configured threads and provider.
 fn builder(
     environment: &Environment,
     config: &MaskingConfig,
@@ -98,7 +93,6 @@ fn describe(tensor: &Outlet) -> String {
     }
 }
 
-/// Converts the error of a model that ONNX Runtime does not load.
 fn rejected(model: &Model, message: &str) -> NetworkError {
     let path = model.file.clone();
     match message.split_once("ai.onnx is till opset ") {

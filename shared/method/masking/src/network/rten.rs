@@ -26,7 +26,6 @@ pub(super) struct Rten {
     thread: Arc<ThreadPool>,
 }
 
-/// Reads the file of a model.
 pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
         let reason = format!("it is not a model in ONNX, or is damaged: {error}");
@@ -83,7 +82,6 @@ impl Rten {
         }
     }
 
-    /// Computes the masks of rasters, both scans x n x n.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
@@ -114,7 +112,6 @@ pub(super) fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Res
     }
 }
 
-/// Returns the version of ONNX's own operators.
 fn newest_operators(file: &ModelProto) -> i64 {
     let own = file
         .opset_import
@@ -161,7 +158,6 @@ pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
     inputs.map(describe).collect()
 }
 
-/// Returns the name, type and shape of each output.
 pub(super) fn outputs(file: &ModelProto) -> Vec<String> {
     let outputs = file.graph.iter().flat_map(|graph| &graph.output);
     outputs.map(describe).collect()

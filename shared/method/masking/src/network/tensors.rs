@@ -6,7 +6,6 @@ use rten_onnx::onnx::{
     AttributeProto, DataType, GraphProto, NodeProto, TensorProto, ValueInfoProto,
 };
 
-/// The constants of a network, by name.
 pub struct Constants<'a>(HashMap<&'a str, &'a TensorProto>);
 
 /// Quantised weights with their scales, one for each output. All their zeros are 0.
@@ -23,7 +22,6 @@ impl<'a> Constants<'a> {
         Self(graph.initializer.iter().filter_map(named).collect())
     }
 
-    /// Returns a constant of one value.
     pub fn number(&self, name: &str) -> Option<f32> {
         match self.values(name)?[..] {
             [number] => Some(number as f32),
@@ -31,14 +29,12 @@ impl<'a> Constants<'a> {
         }
     }
 
-    /// Returns a constant of sizes or indices.
     pub fn sizes(&self, name: &str) -> Option<Vec<usize>> {
         let values = self.values(name)?.into_iter();
         let size = |value: f64| (value >= 0.0).then_some(value as usize);
         values.map(size).collect()
     }
 
-    /// Returns the weights that `DequantizeLinear` makes.
     pub fn weights(&self, node: &NodeProto) -> Option<Weights> {
         let [weights, scales, zeros] = &node.input[..] else {
             return None;
@@ -105,7 +101,6 @@ pub fn shape_of(input: &ValueInfoProto) -> Option<Vec<usize>> {
     sizes.map(|size| size.dim_value?.try_into().ok()).collect()
 }
 
-/// The attributes of an operator.
 pub struct Attributes<'a>(pub &'a [AttributeProto]);
 
 impl<'a> Attributes<'a> {

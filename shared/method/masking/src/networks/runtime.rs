@@ -32,7 +32,6 @@ const LIBRARY: &str = "libonnxruntime.so";
 /// The folder of the packages among which Gyre's own Python package is, in a process that uses it.
 static PACKAGES: OnceLock<PathBuf> = OnceLock::new();
 
-/// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     #[error(
@@ -51,19 +50,9 @@ pub enum RuntimeError {
         "ONNX Runtime at {path} is version {version}, but at least 1.{} is needed: `{INSTALL}` installs one",
         ort::MINOR_VERSION
     )]
-    TooOld {
-        /// The path of the library.
-        path: PathBuf,
-        /// The version of the library.
-        version: String,
-    },
-    /// The file is not ONNX Runtime, is damaged, or is for another platform.
+    TooOld { path: PathBuf, version: String },
     #[error("{path} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one")]
-    Unusable {
-        /// The path of the library.
-        path: PathBuf,
-        reason: String,
-    },
+    Unusable { path: PathBuf, reason: String },
 }
 
 /// Returns the path of the library: named by `configured` (`masking.runtime`) or by the

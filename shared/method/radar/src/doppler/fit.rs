@@ -48,7 +48,6 @@ struct Seen {
 }
 
 impl Fit {
-    /// Returns the velocity that explains the shifts of most of these rows.
     pub fn velocity(&mut self, rows: &[RowShifts]) -> Result<DopplerVelocity, NoDoppler> {
         let bearings = rows.len();
         let too_few = |bearings| NoDoppler::TooFewBearings {
@@ -82,7 +81,6 @@ impl Fit {
         })
     }
 
-    /// Looks up the approach at each row near a velocity.
     fn look(&mut self, rows: &[RowShifts], velocity: &Vector2<f64>, window: f64) {
         self.seen.clear();
         self.seen.reserve(rows.len());

@@ -29,7 +29,6 @@ pub(super) struct Rows {
     powers: Vec<f32>,
 }
 
-/// The assignment of bins to cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     bins_per_cell: usize,
@@ -96,7 +95,6 @@ impl Rows {
         &self.layout
     }
 
-    /// Returns the cells of a row.
     pub fn row(&self, azimuth: usize) -> &[f32] {
         &self.padded(azimuth)[REACH..REACH + self.layout.cells]
     }

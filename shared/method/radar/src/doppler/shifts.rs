@@ -27,7 +27,6 @@ pub(super) struct Shifts {
     beside: Vec<f32>,
 }
 
-/// The correlation of a row with its neighbours.
 #[derive(Clone, Debug)]
 pub(super) struct RowShifts {
     pub azimuth: usize,
@@ -43,12 +42,10 @@ pub(super) struct RowShifts {
     top: f32,
 }
 
-/// A maximum of the correlation of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peak {
     /// Shift, cells.
     pub lag: f64,
-    /// Height, at most 1.
     pub height: f64,
 }
 
@@ -84,7 +81,6 @@ impl Shifts {
         }
     }
 
-    /// Returns those rows, in the order of their azimuths.
     pub fn rows(&self) -> &[RowShifts] {
         &self.rows
     }

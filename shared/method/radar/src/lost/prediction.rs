@@ -91,7 +91,6 @@ impl Moved {
     }
 }
 
-/// The predicted powers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
     layout: Layout,

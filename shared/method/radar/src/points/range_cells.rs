@@ -19,7 +19,6 @@ pub(super) struct RangeCells {
     active: Vec<bool>,
 }
 
-/// The assignment of bins to cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Layout {
     bins_per_cell: usize,
@@ -53,7 +52,6 @@ impl Layout {
 }
 
 impl RangeCells {
-    /// Computes the cells of a checked scan.
     pub fn update(&mut self, scan: &PolarScan<'_>, floor: u8, config: &PointsConfig) {
         self.layout = Layout::new(scan, config);
         let (
@@ -83,7 +81,6 @@ impl RangeCells {
         }
     }
 
-    /// Cells per azimuth.
     pub fn cells(&self) -> usize {
         self.layout.cells
     }

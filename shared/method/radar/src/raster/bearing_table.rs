@@ -36,7 +36,6 @@ impl BearingTable {
         }
     }
 
-    /// Computes the table of a checked scan with at least one azimuth.
     pub fn update(&mut self, scan: &PolarScan<'_>) {
         let azimuths = &scan.azimuth_rad[..scan.geometry.azimuths];
         let first = azimuths.first().copied().unwrap_or(0.0);

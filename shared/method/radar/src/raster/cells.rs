@@ -29,7 +29,6 @@ pub(super) struct Cells {
     pub max_range_m: f32,
 }
 
-/// One row of the raster.
 pub(super) struct CellRow<'a> {
     /// x of the row, m.
     pub x_m: f32,
@@ -63,7 +62,6 @@ impl Cells {
         }
     }
 
-    /// Blocks per row.
     pub fn blocks(&self) -> usize {
         self.z_m.len()
     }
@@ -78,7 +76,6 @@ impl Cells {
         }
     }
 
-    /// x of a row or y of a column, m.
     fn offset_m(&self, index: usize) -> f64 {
         (0.5 * (self.n as f64 - 1.0) - index as f64) * f64::from(self.cell_m)
     }

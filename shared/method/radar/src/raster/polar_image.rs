@@ -22,14 +22,12 @@ pub(super) struct PolarImage {
     measured: Vec<u16>,
 }
 
-/// The dimensions, which follow from the geometry of the scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Layout {
     azimuths: usize,
     bins: usize,
     range_resolution_m: f32,
     window: Window,
-    /// Pieces per azimuth.
     pieces: usize,
 }
 

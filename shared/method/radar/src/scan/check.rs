@@ -13,7 +13,6 @@ pub enum ScanError {
     #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
     Length {
         what: &'static str,
-        /// Elements required by the geometry.
         expected: usize,
         actual: usize,
     },
@@ -36,11 +35,8 @@ pub enum ScanError {
         "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
     StampSpan {
-        /// The row, from 0.
         row: usize,
-        /// The stamp minus the stamp of the first row, s.
         after_s: f64,
-        /// The longest sweep, s.
         max_s: f64,
     },
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
@@ -49,11 +45,7 @@ pub enum ScanError {
         apart_s: f64,
     },
     #[error("azimuth {index} of the scan is at {value} rad")]
-    Azimuth {
-        /// The row.
-        index: usize,
-        value: f32,
-    },
+    Azimuth { index: usize, value: f32 },
 }
 
 impl PolarScan<'_> {

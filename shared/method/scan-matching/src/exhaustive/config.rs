@@ -61,7 +61,6 @@ impl ExhaustiveConfig {
         section.require(fits, "peak", &"soft_argmax", "gaussian or parabola")
     }
 
-    /// Returns the number of angles tried.
     pub fn candidates(&self) -> usize {
         self.angles().count
     }
@@ -113,12 +112,10 @@ impl AngleGrid {
         }) as usize
     }
 
-    /// Returns whether the k-th angle has a neighbour on both sides.
     pub fn is_inner(&self, k: usize) -> bool {
         self.circle || (k > 0 && k + 1 < self.count)
     }
 
-    /// Returns whether two angles are the same or neighbours.
     pub fn are_close(&self, a: usize, b: usize) -> bool {
         (-1..=1).any(|by| self.beside(a, by) == b)
     }

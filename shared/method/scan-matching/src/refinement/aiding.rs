@@ -151,7 +151,6 @@ impl Refiner {
             && (self.state.unmatched == 0 || self.agrees_with_search(scan, best, along))
     }
 
-    /// Compares the heading of a match with the gyro's.
     fn gate(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
@@ -221,7 +220,6 @@ impl Refiner {
         }
     }
 
-    /// Takes the predicted motion of a scan that matches nothing.
     pub(super) fn propagate_distances(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
         let by = scan.step.distance.map(|it| it.by);
         let displacement = self.displacement.map(|it| it.ahead);

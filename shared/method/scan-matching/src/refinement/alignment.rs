@@ -24,7 +24,6 @@ const FIRST_SHARE: f64 = 0.3;
 /// The next share is within these factors of the last one.
 const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
 
-/// The result of an alignment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alignment {
     /// Pose of the points' frame in the map.

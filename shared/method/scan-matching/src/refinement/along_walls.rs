@@ -22,15 +22,10 @@ use super::{
     uncertainty::{self, Uncertainty},
 };
 
-/// A plausible match of a scan.
 pub(super) struct Match {
-    /// Pose in the map, with the covariance of the motion to it.
     pub registered: UncertainMotion,
-    /// The direction along the axes of the map that leaves the place undetermined.
     pub undetermined: Option<UnitVector2<f64>>,
-    /// Displacement by the search beyond a predicted place, m.
     pub ahead_m: Vector2<f64>,
-    /// Walls without structure have ended: the map is left.
     pub leaves_map: bool,
 }
 

@@ -69,9 +69,7 @@ pub enum Verdict {
 /// The bias of the gyro, as it is known after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GyroBias {
-    /// The bias, rad/s.
     pub rate_radps: f64,
-    /// Standard deviation, rad/s.
     pub sigma_radps: f64,
     /// True turn over the measured one.
     pub scale: f64,
@@ -125,7 +123,6 @@ pub(super) fn grown(step: f64, sum: f64) -> f64 {
 }
 
 impl Heading {
-    /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
         let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
         let variances = Vector4::new(0.0, bias, YAW_BIAS_SIGMA_RAD.powi(2), scale);
@@ -138,7 +135,6 @@ impl Heading {
         }
     }
 
-    /// Returns the estimate of the bias.
     pub(super) fn bias(&self) -> GyroBias {
         GyroBias {
             rate_radps: self.bias_radps,
@@ -148,7 +144,6 @@ impl Heading {
         }
     }
 
-    /// Predicts the heading of the next scan.
     pub(super) fn predict(&mut self, turn: &GyroTurn, config: &GyroConfig) -> PredictedTurn {
         let time_s = turn.interval_s;
         let turn_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;

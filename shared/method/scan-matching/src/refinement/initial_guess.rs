@@ -29,7 +29,6 @@ pub(super) fn initial_guesses(predicted: [Pose; 2], searched: Pose) -> [(Initial
     ]
 }
 
-/// The prediction with each yaw offset.
 pub(super) fn yaw_offsets(predicted: Pose) -> [(InitialGuess, Pose); 4] {
     YAW_OFFSETS_RAD.map(|offset| (InitialGuess::YawOffset, predicted * Pose::rotation(offset)))
 }

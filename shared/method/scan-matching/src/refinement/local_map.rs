@@ -39,13 +39,11 @@ impl Keyframe {
         [&self.fine, &self.coarse].map(|image| (image.corner, image.view()))
     }
 
-    /// Returns the same images to be filled in.
     pub fn images_mut(&mut self) -> [(&mut [i64; 2], ArrayViewMut2<'_, u8>); 2] {
         [&mut self.fine, &mut self.coarse].map(Image::parts_mut)
     }
 }
 
-/// The last keyframes and their sums.
 #[derive(Debug)]
 pub(super) struct LocalMap {
     fine: MapLevel,

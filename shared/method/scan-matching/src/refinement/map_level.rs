@@ -32,7 +32,6 @@ pub(super) struct Image {
     pub corner: [i64; 2],
     /// Cells a side.
     n: usize,
-    /// Row after row. Rows are of equal x, which grows with the row; y grows within a row.
     pub cells: Vec<u8>,
 }
 
@@ -41,7 +40,6 @@ impl Image {
         ArrayView2::from_shape((self.n, self.n), &self.cells).expect(SQUARE)
     }
 
-    /// The corner and the cells, to be filled in.
     pub fn parts_mut(&mut self) -> (&mut [i64; 2], ArrayViewMut2<'_, u8>) {
         let cells = ArrayViewMut2::from_shape((self.n, self.n), &mut self.cells);
         (&mut self.corner, cells.expect(SQUARE))
@@ -50,10 +48,8 @@ impl Image {
 
 const SQUARE: &str = "an image has n x n cells";
 
-/// An image as it lies in the map.
 pub(super) struct ImageView<'a> {
     image: &'a Image,
-    /// Metres a cell.
     cell_m: f64,
 }
 
@@ -84,15 +80,11 @@ impl<'a> ImageView<'a> {
     }
 }
 
-/// The sum of the keyframes' images.
 #[derive(Debug)]
 pub(super) struct MapLevel {
-    /// Metres a cell.
     pub cell_m: f64,
-    /// Cells a side.
     pub n: usize,
     corner: [i64; 2],
-    /// Sum of the images.
     sum: Vec<u16>,
     images: usize,
     /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few
@@ -109,7 +101,6 @@ pub(super) struct MapView<'a> {
     pub n: usize,
     /// The sum in a cell that is fully occupied in all keyframes.
     pub full: f32,
-    /// Cells a metre.
     pub per_m: f32,
     /// Map coordinates (x, y) of cell (0, 0), m.
     pub origin: [f64; 2],
@@ -172,7 +163,6 @@ impl MapLevel {
         }
     }
 
-    /// Takes an image that is no longer in the map out of the sum.
     pub fn subtract(&mut self, image: &Image) {
         self.images -= 1;
         self.combine(image, [[0, 0], [self.n, self.n]], subtract);

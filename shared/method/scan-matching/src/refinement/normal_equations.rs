@@ -41,7 +41,6 @@ impl NormalEquations {
     }
 }
 
-/// The cost and the normal equations at a pose.
 pub(super) fn linearise(
     map: &MapView<'_>,
     points: &DeskewedPoints,

@@ -26,16 +26,13 @@ const SAME_BASIN_RAD: f64 = 0.035;
 /// A later guess is preferred to an earlier one if its coarse overlap is better by this factor.
 const CLEARLY_BETTER: f64 = 1.02;
 
-/// A scan to be registered.
 pub(super) struct Scan<'a> {
     pub id: u64,
     pub points: &'a [SparsePoint],
-    /// Pose in the map by the motion that the search found.
     pub searched: Pose,
     pub step: Step,
 }
 
-/// The registration of one scan.
 pub(super) struct Registration<'a> {
     pub scan: &'a Scan<'a>,
     pub map: &'a LocalMap,
@@ -59,7 +56,6 @@ pub(super) struct Candidate {
     pub is_plausible: bool,
 }
 
-/// An alignment on the coarse map.
 struct CoarseMatch {
     guess: InitialGuess,
     coarse: Alignment,
@@ -91,7 +87,6 @@ impl Registration<'_> {
         if offset.is_plausible { offset } else { best }
     }
 
-    /// Returns the best match of the predictions and the searched motion.
     pub fn match_prediction_or_search(&mut self) -> Candidate {
         let predicted = self.state.predict(&self.scan.step);
         self.align(&initial_guesses(predicted, self.scan.searched))
@@ -175,7 +170,6 @@ impl Registration<'_> {
         self.assess(guess, alignment)
     }
 
-    /// Deskews the scan with the motion that leads to `pose`.
     pub fn deskew(&mut self, pose: &Pose) {
         let twist = self.state.twist_to(pose, &self.scan.step);
         self.points.deskew(self.scan.points, &twist);

@@ -22,7 +22,6 @@ pub struct Submap {
 }
 
 impl Submap {
-    /// Plans a submap of at most `points` points in all.
     pub fn with_capacity(points: usize) -> Self {
         let points = || DeskewedPoints::with_capacity(points);
         Self {
@@ -45,12 +44,10 @@ impl Submap {
         self.all.extend(&self.added, pose);
     }
 
-    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.all.weight.len()
     }
 
-    /// Returns whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -24,9 +24,7 @@ pub struct TrackerState {
     /// The last two refined scans, newest first. The second one is used if the first turns out to
     /// be wrong.
     pub anchors: [Option<Anchor>; 2],
-    /// Running mean of the overlap of matched scans.
     pub mean_overlap: f64,
-    /// Running mean of the weight of the points of matched scans.
     pub mean_weight: f64,
     /// Number of scans in a row that were weak or predicted.
     pub doubtful: u32,
@@ -62,7 +60,6 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Returns whether wheels, Doppler or the gyro measure a motion.
     pub fn moves(&self) -> bool {
         self.distance.is_some_and(|it| it.is_certain())
             || self.turn.is_some_and(|it| it.is_certain())
@@ -72,9 +69,7 @@ impl Step {
 /// A refined scan for predicting the next poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
-    /// Pose in the first scan's frame.
     pub pose: Pose,
-    /// Running mean of the velocity.
     pub twist: Twist,
     /// Time from its stamp to the last scan's, s.
     pub age_s: f64,
@@ -101,8 +96,7 @@ impl Default for TrackerState {
 }
 
 impl Anchor {
-    /// The pose after the interval at constant velocity; with the heading of the gyro, if there is
-    /// one.
+    /// The pose after the interval at constant velocity, with the heading of the gyro if known.
     fn predict(&self, interval_s: f64, heading: Option<UnitComplex<f64>>) -> Pose {
         let time_s = self.age_s + interval_s;
         let Some(heading) = heading else {
@@ -115,7 +109,6 @@ impl Anchor {
         self.pose * twist.chord_pose_at(time_s)
     }
 
-    /// The mean velocity from here to `pose`.
     fn twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         Twist::from_chord(&self.pose.inv_mul(pose), self.age_s + interval_s)
     }
@@ -163,13 +156,11 @@ impl TrackerState {
         [self.pose * distance.motion([yaw_rad, 0.0]).motion, second]
     }
 
-    /// The turn to the pose that is predicted first, rad.
     pub(super) fn predicted_turn_rad(&self, step: &Step) -> f64 {
         let [predicted, _] = self.predict(step);
         self.pose.rotation.rotation_to(&predicted.rotation).angle()
     }
 
-    /// The heading of a scan by the gyro.
     fn heading_at(&self, step: &Step) -> Option<UnitComplex<f64>> {
         let turn = step.turn?;
         Some(self.pose.rotation * UnitComplex::new(turn.yaw_rad))
@@ -194,7 +185,6 @@ impl TrackerState {
         }
     }
 
-    /// Returns whether a vehicle can have come to `pose` from either anchor.
     pub(super) fn can_reach(
         &self,
         pose: &Pose,
@@ -223,7 +213,6 @@ impl TrackerState {
         }
     }
 
-    /// Updates the state with the pose of the next scan.
     pub(super) fn update(
         &mut self,
         pose: Pose,

@@ -37,7 +37,6 @@ pub(super) struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// The uncertainty before the scan is registered with the map.
     pub fn before(
         scan: &Scan<'_>,
         map: &LocalMap,
@@ -65,7 +64,6 @@ impl Uncertainty {
         }
     }
 
-    /// Returns the covariance of the motion to the predicted pose.
     pub fn of_prediction(&self) -> Matrix3<f64> {
         self.of_prediction
     }

@@ -124,7 +124,6 @@ struct Innovation {
 }
 
 impl WheelState {
-    /// Creates the state before the first scan.
     pub(super) fn new(config: &WheelsConfig) -> Self {
         Self {
             scale: 1.0,
@@ -139,7 +138,6 @@ impl WheelState {
         }
     }
 
-    /// Returns the estimate of the scale.
     pub(super) fn estimate(&self) -> WheelScale {
         WheelScale {
             scale: self.scale,

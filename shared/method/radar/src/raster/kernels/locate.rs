@@ -42,7 +42,6 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Initial value.
     pub const NONE: Self = Self {
         sample: [0; BLOCK],
         along_range: [0.0; BLOCK],
