@@ -19,8 +19,8 @@ mod sample;
 mod wheels;
 mod wheels_config;
 
-pub use bounds::SampleConfigError;
-pub use config::{GyroConfig, GyroKind, UpAxis};
+pub use bounds::{Bounds, SettingError, check};
+pub use config::{GyroConfig, GyroKind, GyroKind as WheelsKind, UpAxis};
 pub use doppler::{DopplerConfig, DopplerDisplacement, DopplerKind, DopplerVelocity};
 pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{BagFixes, GnssConfig, GnssFix, GnssKind, RawFix};
@@ -29,4 +29,4 @@ pub use integral::interval_of;
 pub use live::{LiveSamples, LiveSensor};
 pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
 pub use wheels::{WheelDistance, Wheels};
-pub use wheels_config::{WheelsConfig, WheelsKind};
+pub use wheels_config::WheelsConfig;

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
+use crate::{SampleKind, WheelsConfig, integral::Integrator};
 
 /// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
@@ -22,43 +22,17 @@ pub struct WheelDistance {
 }
 
 /// Integrates the speed of the wheels between scans.
-///
-/// The result for a scan depends only on the samples that came with it and with the scan before, so
-/// a process that is restarted at the scan before returns the same result.
-#[derive(Clone, Debug)]
-pub struct Wheels {
-    config: WheelsConfig,
-    speed: Integrator,
-}
+pub type Wheels = Integrator<WheelsConfig>;
 
 impl Wheels {
-    /// Creates an integrator without samples.
     pub fn new(config: &WheelsConfig) -> Self {
-        Self {
-            speed: Integrator::new(SampleKind::Wheels, 0, config.max_gap_s),
-            config: config.clone(),
-        }
-    }
-
-    /// Takes the samples that come with the next scan, in the order of their stamps, and the times
-    /// of its stamp and of its first and last azimuth.
-    pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
-        self.speed.push(samples, stamp_ns, span_ns);
-    }
-
-    /// Takes the samples of a dropped scan: they count as samples of the next scan.
-    pub fn drop_scan(&mut self, samples: &[Sample]) {
-        self.speed.drop_scan(samples);
-    }
-
-    pub fn clear(&mut self) {
-        self.speed.clear();
+        Self::of(config.clone(), SampleKind::Wheels, 0, config.max_gap_s)
     }
 
     /// Returns the distance from the stamp of the scan before to the stamp of the scan; `None`
     /// where samples are missing.
     pub fn distance(&self) -> Option<WheelDistance> {
-        let integral = self.speed.integral()?;
+        let integral = self.integral?;
         let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
         // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
@@ -77,6 +51,7 @@ impl Wheels {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Sample;
     use proptest::prelude::*;
 
     const MS: i64 = 1_000_000;
