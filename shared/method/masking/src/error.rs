@@ -1,6 +1,6 @@
 //! The errors of a masker.
 
-use gyre_radar::{PointsError, ScanError, raster::RasterError};
+use gyre_radar::{ScanError, SettingError, raster::RasterError};
 use thiserror::Error;
 
 use crate::{MaskingConfigError, network::NetworkError};
@@ -12,7 +12,7 @@ pub enum MaskerError {
     #[error(transparent)]
     Raster(#[from] RasterError),
     #[error(transparent)]
-    Points(#[from] PointsError),
+    Points(#[from] SettingError),
     #[error(transparent)]
     Network(#[from] NetworkError),
 }

@@ -81,8 +81,8 @@ impl Odometry {
         let (stamp_ns, span_ns) = (scan.geometry.stamp_ns, scan.span_ns());
         self.gyro.push(samples, stamp_ns, span_ns);
         self.wheels.push(samples, stamp_ns, span_ns);
-        self.pair.expect_turn(self.gyro.turn());
-        self.pair.expect_distance(self.wheels.distance());
+        self.pair.turn = self.gyro.turn();
+        self.pair.distance = self.wheels.distance();
         let [_, rate] = self.gyro.sweep_rates_radps();
         let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {
@@ -112,9 +112,9 @@ impl Odometry {
         let doppler = self.doppler.as_mut();
         self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
         let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
-        self.pair.set_velocity(velocity.copied());
+        self.pair.later.velocity = velocity.copied();
         let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
-        self.pair.expect_azimuth_errors(variance_rad2);
+        self.pair.later.azimuth_variance_rad2 = variance_rad2;
         Ok(())
     }
 
@@ -162,7 +162,7 @@ impl Odometry {
 
     /// Starts a new chain with the next scan; the pose stays.
     pub fn restart(&mut self) {
-        self.pair.restart();
+        self.pair.seq = 0;
         self.twists.clear();
         self.gyro.clear();
         self.wheels.clear();
@@ -180,18 +180,18 @@ impl Odometry {
 
     /// Returns the raster of [`Odometry::mask`] before the search: n x n, row 0 far ahead.
     pub fn masked_mut(&mut self) -> ArrayViewMut2<'_, f32> {
-        self.pair.later_mut()
+        self.pair.later.raster.view_mut()
     }
 
     /// Returns the masked raster of the last registered scan, n x n, row 0 far ahead.
     pub fn raster(&self) -> ArrayView2<'_, f32> {
-        self.pair.earlier_alone()
+        self.pair.earlier.raster.view()
     }
 
     /// Returns the raster of the scan before the last one, masked for this pair, if the mask takes
     /// two scans.
     pub fn previous_raster(&self) -> Option<ArrayView2<'_, f32>> {
-        self.pair.earlier_for_pair()
+        self.pair.earlier_for_pair.as_ref().map(|it| it.view())
     }
 
     pub fn points(&self) -> &[SparsePoint] {
@@ -211,7 +211,7 @@ impl Odometry {
     }
 
     pub fn twist(&self) -> Option<Twist> {
-        self.pair.earlier_twist()
+        self.pair.earlier.twist
     }
 }
 

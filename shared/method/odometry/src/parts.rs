@@ -114,11 +114,9 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupErro
         RefinementKind::None => Ok(None),
         RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
         RefinementKind::LocalMap => {
-            let refiner = Refiner::new(&config.refinement, capacity)?
-                .with_gyro(&config.gyro)
-                .with_wheels(&config.wheels)
-                .with_doppler(&config.doppler);
-            Ok(Some(Box::new(refiner)))
+            let refiner = Refiner::new(&config.refinement, capacity)?;
+            let (gyro, wheels, doppler) = (&config.gyro, &config.wheels, &config.doppler);
+            Ok(Some(Box::new(refiner.with_sensors(gyro, wheels, doppler))))
         }
     }
 }
@@ -127,10 +125,7 @@ impl Refine for Refiner {
     fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined {
         let (later, earlier) = (pair.later_points(), pair.earlier_points());
         let interval_s = pair.interval_ns() as f64 * 1e-9;
-        self.expect_azimuth_errors(pair.azimuth_variance_rad2());
-        self.expect_turn(pair.turn());
-        self.expect_distance(pair.distance());
-        self.expect_velocities(pair.velocities());
+        self.aiding = pair.aiding();
         Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
     }
 

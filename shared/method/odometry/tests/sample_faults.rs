@@ -112,7 +112,7 @@ impl Drive {
     fn refine(&self, samples: &ScanSamples) -> Ran {
         let config = &self.config;
         let refiner = Refiner::new(&config.refinement, config.points.capacity).unwrap();
-        let mut refiner = refiner.with_gyro(&config.gyro).with_wheels(&config.wheels);
+        let mut refiner = refiner.with_sensors(&config.gyro, &config.wheels, &config.doppler);
         let (mut gyro, mut wheels) = (Gyro::new(&config.gyro), Wheels::new(&config.wheels));
         let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
         let mut motions = Vec::new();
@@ -123,8 +123,8 @@ impl Drive {
             let Some(before) = k.checked_sub(1).map(|k| &self.scans[k]) else {
                 continue;
             };
-            refiner.expect_turn(gyro.turn());
-            refiner.expect_distance(wheels.distance());
+            refiner.aiding.turn = gyro.turn();
+            refiner.aiding.distance = wheels.distance();
             let interval_s = (scan.stamp_ns - before.stamp_ns) as f64 * 1e-9;
             let (later, earlier) = (&scan.points, &before.points);
             let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);

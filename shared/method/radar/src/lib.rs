@@ -14,9 +14,10 @@ pub mod trajectory;
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use doppler::{DopplerEstimator, NoDoppler, check_chirps};
+pub use gyre_samples::SettingError;
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;
-pub use points::{PointExtractor, PointsConfig, PointsError};
+pub use points::{PointExtractor, PointsConfig};
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 pub use scan::{
     MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,

@@ -18,9 +18,11 @@ use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 use bearing_table::BearingTable;
 use cells::Cells;
 use gyre_geometry::Twist;
+use gyre_samples::{SettingError, check, check_bounds};
 use kernels::locate::{self, Lookup, Taps};
 use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use sweep_motion::SweepMotion;
@@ -30,9 +32,7 @@ pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
 /// The rule that computes the value of a cell from the range bins.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where
@@ -56,7 +56,7 @@ impl fmt::Display for Sampling {
 }
 
 /// Size and sampling of the rasters: the section `[raster]` of a configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RasterConfig {
     /// Cells per side. With an odd number the sensor is at the centre of a cell.
@@ -85,19 +85,13 @@ impl Default for RasterConfig {
 }
 
 impl RasterConfig {
-    pub fn validate(&self) -> Result<(), RasterError> {
-        let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
-        if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
-            return setting("n", self.n as f64, "1 to 4096");
-        }
-        if !(1e-3..=100.0).contains(&self.cell_m) {
-            return setting("cell_m", self.cell_m.into(), "0.001 to 100");
-        }
-        if !(self.min_range_m >= 0.0 && self.min_range_m.is_finite()) {
-            return setting("min_range_m", self.min_range_m.into(), "0 or more");
-        }
-        if !(0.1..=10.0).contains(&self.averaged_cells) {
-            return setting("averaged_cells", self.averaged_cells.into(), "0.1 to 10");
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let cells = ([1.0, MAX_CELLS_PER_SIDE as f64], "1 to 4096");
+        check("raster", "n", self.n as f64, cells)?;
+        check_bounds! { self, "raster":
+            cell_m in ([1e-3, 100.0], "0.001 to 100"),
+            min_range_m in ([0.0, f64::MAX], "0 or more"),
+            averaged_cells in ([0.1, 10.0], "0.1 to 10"),
         }
         Ok(())
     }
@@ -106,12 +100,8 @@ impl RasterConfig {
 /// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
-    #[error("raster.{key} is {value}, but must be {bounds}")]
-    Setting {
-        key: &'static str,
-        value: f64,
-        bounds: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// The array for the raster is not `n x n`, or not contiguous and row-major.
     #[error("the raster needs a contiguous array of {n} x {n} cells, but got {} x {}", actual[0], actual[1])]
     Shape {

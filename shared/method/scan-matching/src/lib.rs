@@ -40,7 +40,7 @@ pub use fft::fast_size;
 pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
-    Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
+    Aiding, Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
     RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState, Verdict,
     WheelScale, WheelState,
 };

@@ -99,6 +99,20 @@ struct Accepted {
     leaves_map: bool,
 }
 
+/// Measurements about the motion between the next two scans, beside their points.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Aiding {
+    /// Variance of the turn by the mean azimuths of both scans, rad². Where azimuths were lost, all
+    /// points of a sector err alike, and the mean azimuth by its share of the turn; the motion
+    /// takes back the error of the earlier scan.
+    pub azimuth_variance_rad2: f32,
+    /// The turn by the gyro and the distance by the wheels; `None` where samples are missing.
+    pub turn: Option<GyroTurn>,
+    pub distance: Option<WheelDistance>,
+    /// The velocities by Doppler of the earlier scan and of the later one, if a scan determines it.
+    pub velocities: [Option<DopplerVelocity>; 2],
+}
+
 /// Refines motions scan by scan against a map of the last keyframes.
 ///
 /// Nothing is allocated after construction.
@@ -115,10 +129,7 @@ pub struct Refiner {
     points: DeskewedPoints,
     /// The points of an alternative match.
     other_points: DeskewedPoints,
-    azimuth_variance_rad2: f64,
-    turn: Option<GyroTurn>,
-    distance: Option<WheelDistance>,
-    velocities: [Option<DopplerVelocity>; 2],
+    pub aiding: Aiding,
     displacement: Option<DopplerDisplacement>,
 }
 
@@ -136,59 +147,22 @@ impl Refiner {
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             other_points: DeskewedPoints::with_capacity(capacity),
-            azimuth_variance_rad2: 0.0,
-            turn: None,
-            distance: None,
-            velocities: [None; 2],
+            aiding: Aiding::default(),
             displacement: None,
         })
     }
 
-    /// Uses the turns of a gyro of this kind: [`Refiner::expect_turn`].
+    /// Uses aiding sensors of these kinds: the measurements are in [`Refiner::aiding`].
     #[must_use]
-    pub fn with_gyro(mut self, gyro: &GyroConfig) -> Self {
-        self.gyro = gyro.clone();
+    pub fn with_sensors(
+        mut self,
+        gyro: &GyroConfig,
+        wheels: &WheelsConfig,
+        doppler: &DopplerConfig,
+    ) -> Self {
+        (self.gyro, self.wheels) = (gyro.clone(), wheels.clone());
+        (self.doppler, self.doppler_as_wheels) = (doppler.clone(), doppler.as_wheels());
         self
-    }
-
-    /// Uses the distances of wheels of this kind: [`Refiner::expect_distance`].
-    #[must_use]
-    pub fn with_wheels(mut self, wheels: &WheelsConfig) -> Self {
-        self.wheels = wheels.clone();
-        self
-    }
-
-    /// Uses the velocities by Doppler, if `doppler` enables them: [`Refiner::expect_velocities`].
-    #[must_use]
-    pub fn with_doppler(mut self, doppler: &DopplerConfig) -> Self {
-        self.doppler = doppler.clone();
-        self.doppler_as_wheels = doppler.as_wheels();
-        self
-    }
-
-    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
-    /// does not determine it.
-    pub fn expect_velocities(&mut self, velocities: [Option<DopplerVelocity>; 2]) {
-        self.velocities = velocities;
-    }
-
-    /// Sets the distance from the earlier scan to the later one that the wheels have measured;
-    /// `None` where they have not.
-    pub fn expect_distance(&mut self, distance: Option<WheelDistance>) {
-        self.distance = distance;
-    }
-
-    /// Sets the turn from the earlier scan to the later one that the gyro has measured; `None`
-    /// where it has not.
-    pub fn expect_turn(&mut self, turn: Option<GyroTurn>) {
-        self.turn = turn;
-    }
-
-    /// Sets the variance of the turn between the next two scans by the mean azimuths of both, rad²;
-    /// 0 at first. Where azimuths were lost, all points of a sector err alike, and the mean azimuth
-    /// by its share of the turn; the motion takes back the error of the earlier scan.
-    pub fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
-        self.azimuth_variance_rad2 = f64::from(variance_rad2);
     }
 
     /// Refines the motion from the `earlier` scan to the `later` one, which has number `scan`.
@@ -222,8 +196,8 @@ impl Refiner {
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
         let outcome = accepted.outcome;
-        let gyro = self.turn.and(self.state.heading);
-        let wheels = self.distance.and(self.state.wheels);
+        let gyro = self.aiding.turn.and(self.state.heading);
+        let wheels = self.aiding.distance.and(self.state.wheels);
         let doppler = self.displacement.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, &accepted);
@@ -357,7 +331,7 @@ impl Refiner {
         Some(UncertainMotion {
             motion: alignment.pose,
             covariance: covariance
-                + uncertainty::by_azimuths(alignment, self.azimuth_variance_rad2),
+                + uncertainty::by_azimuths(alignment, self.aiding.azimuth_variance_rad2.into()),
         })
     }
 

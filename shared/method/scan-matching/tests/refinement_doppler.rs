@@ -1,10 +1,8 @@
 //! The velocity by Doppler, as a witness of the way.
 
-use std::ops::Range;
-
 use crate::common::{Numbers, scenes::*};
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
-use gyre_samples::{DopplerConfig, DopplerKind, DopplerVelocity};
+use gyre_geometry::{SparsePoint, pose};
+use gyre_samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
@@ -35,10 +33,11 @@ fn into_a_tunnel(drive: &Drive) -> Vec<Vec<SparsePoint>> {
 }
 
 fn witnessed() -> Refiner {
-    refiner().with_doppler(&DopplerConfig {
+    let doppler = DopplerConfig {
         kind: DopplerKind::Auto,
         ..DopplerConfig::default()
-    })
+    };
+    refiner().with_sensors(&GyroConfig::default(), &WheelsConfig::default(), &doppler)
 }
 
 /// Refines the motions to these scans. Each scan measures the true velocity times a factor, with
@@ -60,7 +59,7 @@ fn refine_with(
     };
     let mut numbers = Numbers(7);
     let mut refine = |k: usize| {
-        refiner.expect_velocities([velocity(k - 1), velocity(k)]);
+        refiner.aiding.velocities = [velocity(k - 1), velocity(k)];
         let searched = match k < INSIDE {
             true => searched(drive, k - 1),
             false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
@@ -68,19 +67,6 @@ fn refine_with(
         refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
     };
     (1..scans.len()).map(&mut refine).collect()
-}
-
-/// The displacement over scans by the motions against the true one, and its standard deviation
-/// ahead.
-fn off(drive: &Drive, refined: &[Refined], over: Range<usize>) -> (Pose, f64) {
-    let mut composed = ComposedMotion::of(&refined[over.start].motion);
-    for refined in &refined[over.start + 1..over.end] {
-        composed = composed.then(&refined.motion);
-    }
-    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
-    let motion = composed.motion();
-    let sigma_m = motion.covariance[(0, 0)].sqrt();
-    (truth.inv_mul(&motion.motion), sigma_m)
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! A tunnel, whose walls look the same everywhere: displacement along it is unobservable.
 
 use crate::common::{Numbers, scenes::*};
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
-use gyre_samples::{WheelDistance, WheelsConfig};
+use gyre_geometry::{Pose, SparsePoint, pose};
+use gyre_samples::WheelDistance;
 use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
 
 const LITTLE_NOISE: Sensor = Sensor {
@@ -63,24 +63,14 @@ fn refine_searched(
             side_variance_m2: 1e-4,
             interval_s: SWEEP_S,
         };
-        refiner.expect_distance(wheels(k).map(distance));
+        refiner.aiding.distance = wheels(k).map(distance);
         refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
     };
     (1..scans.len()).map(&mut refine).collect()
 }
 
-/// The displacement inside by the motions against the true one, and its standard deviation ahead.
 fn inside(drive: &Drive, refined: &[Refined]) -> (Pose, f64) {
-    let mut composed = ComposedMotion::of(&refined[INSIDE].motion);
-    for refined in &refined[INSIDE + 1..] {
-        composed = composed.then(&refined.motion);
-    }
-    let truth = drive.pose(INSIDE).inv_mul(&drive.pose(SCANS - 1));
-    let motion = composed.motion();
-    (
-        truth.inv_mul(&motion.motion),
-        motion.covariance[(0, 0)].sqrt(),
-    )
+    off(drive, refined, INSIDE..SCANS - 1)
 }
 
 fn slid(refined: &Refined) -> bool {
@@ -90,7 +80,7 @@ fn slid(refined: &Refined) -> bool {
 #[test]
 fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
     let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let mut refiner = refiner();
     let refined = refine_with(&mut refiner, (&drive, &scans), |_| Some(SCALE));
     assert!(!refined[..6].iter().any(slid), "houses tell the way");
     for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
@@ -133,7 +123,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
 #[test]
 fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
     let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let mut refiner = refiner();
     let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
     let refined = refine_with(&mut refiner, (&drive, &scans), measured);
     let (off, sigma_m) = inside(&drive, &refined);
@@ -148,7 +138,7 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
 #[test]
 fn one_scan_without_wheels_inside_does_not_ask_the_search() {
     let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let mut refiner = refiner();
     let measured = |k: usize| (!k.is_multiple_of(5)).then_some(SCALE);
     // It is wrong, but not by so much as to contradict the wheels.
     let search = |k: usize| match k < INSIDE {
@@ -169,7 +159,7 @@ fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let (drive, scans) = between_walls_and(posts);
     let search = |k: usize| searched(&drive, k - 1);
     for wheels in [None, Some(SCALE)] {
-        let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+        let mut refiner = refiner();
         let refined = refine_searched(&mut refiner, (&drive, &scans), |_| wheels, search);
         let (off, sigma_m) = inside(&drive, &refined);
         println!("{wheels:?}: {off}, sigma {sigma_m:.2} m");
@@ -203,13 +193,7 @@ fn behind_a_tunnel_the_way_is_seen_again() {
     let from = drive.pose(last + 1);
     println!("until {:.1} m", from.translation.x);
     assert!((155.0..260.0).contains(&from.translation.x), "{from}");
-    let mut composed = ComposedMotion::of(&refined[last + 1].motion);
-    for refined in &refined[last + 2..] {
-        composed = composed.then(&refined.motion);
-    }
-    let off = from
-        .inv_mul(&drive.pose(refined.len()))
-        .inv_mul(&composed.motion().motion);
+    let (off, _) = off(&drive, &refined, last + 1..refined.len());
     println!("{off}");
     assert!(off.translation.vector.norm() < 0.5, "{off}");
 }

@@ -16,7 +16,7 @@ use super::{
 impl Refiner {
     /// Predicts the turn since the scan before by the gyro, if that has measured it.
     pub(super) fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
-        let Some(turn) = self.turn else {
+        let Some(turn) = self.aiding.turn else {
             let heading = self.state.heading.iter_mut();
             heading.for_each(|heading| heading.propagate(interval_s, &self.gyro));
             return None;
@@ -36,7 +36,7 @@ impl Refiner {
     /// Returns the displacement since the scan before by Doppler; `None` if one of both scans does
     /// not determine its velocity.
     pub(super) fn displacement_by_doppler(&self, interval_s: f64) -> Option<DopplerDisplacement> {
-        let [earlier, later] = &self.velocities;
+        let [earlier, later] = &self.aiding.velocities;
         let both = [earlier.as_ref()?, later.as_ref()?];
         let is_used = self.doppler.is_used();
         is_used.then(|| self.doppler.displacement(both, interval_s))
@@ -66,7 +66,7 @@ impl Refiner {
     }
 
     fn predict_by_wheels(&mut self, interval_s: f64) -> Option<PredictedDistance> {
-        let measured = self.distance;
+        let measured = self.aiding.distance;
         if measured.is_some() {
             self.state
                 .wheels
@@ -186,7 +186,11 @@ impl Refiner {
         by: DistanceBy,
     ) -> (Option<&WheelState>, Option<WheelDistance>, &WheelsConfig) {
         match by {
-            DistanceBy::Wheels => (self.state.wheels.as_ref(), self.distance, &self.wheels),
+            DistanceBy::Wheels => (
+                self.state.wheels.as_ref(),
+                self.aiding.distance,
+                &self.wheels,
+            ),
             DistanceBy::Doppler => (
                 self.state.doppler.as_ref(),
                 self.displacement.map(|it| it.ahead),
@@ -206,7 +210,7 @@ impl Refiner {
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
         let displacement = self.displacement.map(|it| it.ahead);
         let sensors = [
-            (&mut self.state.wheels, self.distance, &self.wheels),
+            (&mut self.state.wheels, self.aiding.distance, &self.wheels),
             (
                 &mut self.state.doppler,
                 displacement,
@@ -224,7 +228,11 @@ impl Refiner {
         let by = scan.step.distance.map(|it| it.by);
         let displacement = self.displacement.map(|it| it.ahead);
         let sensors = [
-            (&mut self.state.wheels, self.distance, DistanceBy::Wheels),
+            (
+                &mut self.state.wheels,
+                self.aiding.distance,
+                DistanceBy::Wheels,
+            ),
             (&mut self.state.doppler, displacement, DistanceBy::Doppler),
         ];
         for (state, measured, sensor) in sensors {

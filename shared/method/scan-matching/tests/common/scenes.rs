@@ -1,7 +1,7 @@
 //! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that
 //! scans clockwise.
 
-use gyre_geometry::{Pose, SparsePoint};
+use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
 use gyre_scan_matching::{Refined, RefinementConfig, Refiner};
 use nalgebra::{Point2, Vector2, Vector3};
 
@@ -46,11 +46,6 @@ pub fn rectangle(
     })
 }
 
-/// A car that drives along x.
-pub fn car(middle: [f64; 2], speed_mps: f64) -> [Reflector; 4] {
-    rectangle(middle, [4.5, 1.8], 0.0, [speed_mps, 0.0], 6)
-}
-
 pub fn wall(from: [f64; 2], to: [f64; 2], points: usize) -> Reflector {
     let from = Vector2::from(from);
     Reflector {
@@ -81,18 +76,6 @@ pub fn town(area: [[f64; 2]; 2], seed: u64) -> Vec<Reflector> {
         rectangle(place.from.into(), size, numbers.within(0.3), [0.0; 2], 5)
     });
     houses.chain(posts(area, 100.0, seed + 2)).collect()
-}
-
-/// The scene with left and right exchanged.
-pub fn mirrored(scene: &[Reflector]) -> Vec<Reflector> {
-    let mirror = |v: Vector2<f64>| Vector2::new(v.x, -v.y);
-    let mirrored = |r: &Reflector| Reflector {
-        from: mirror(r.from),
-        along: mirror(r.along),
-        velocity: mirror(r.velocity),
-        points: r.points,
-    };
-    scene.iter().map(mirrored).collect()
 }
 
 /// A drive that accelerates or turns, not both.
@@ -317,6 +300,21 @@ pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));
     true_motion(drive, k) * Pose::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
+}
+
+/// The displacement over scans by the motions against the true one, and its standard deviation
+/// ahead, m.
+pub fn off(drive: &Drive, refined: &[Refined], over: std::ops::Range<usize>) -> (Pose, f64) {
+    let mut composed = ComposedMotion::of(&refined[over.start].motion);
+    for refined in &refined[over.start + 1..over.end] {
+        composed = composed.then(&refined.motion);
+    }
+    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
+    let motion = composed.motion();
+    (
+        truth.inv_mul(&motion.motion),
+        motion.covariance[(0, 0)].sqrt(),
+    )
 }
 
 /// The scans of a drive.

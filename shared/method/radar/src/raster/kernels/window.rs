@@ -72,6 +72,9 @@ pub fn sum_pieces(
     match bins_per_piece {
         1 => sum_each(above_floor, pieces, |[a]: [u8; 1]| u16::from(a)),
         2 => sum_each(above_floor, pieces, sum_2),
+        3 => sum_each(above_floor, pieces, |bins: [u8; 3]| {
+            bins.map(u16::from).iter().sum()
+        }),
         4 => sum_each(above_floor, pieces, sum_4),
         _ => sum_long(above_floor, bins_per_piece, pieces),
     }
