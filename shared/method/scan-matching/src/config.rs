@@ -3,6 +3,7 @@
 
 use std::ops::RangeInclusive;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -15,9 +16,7 @@ pub struct ConfigError {
 }
 
 /// The comparison of two polar spectra.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub enum RotationForm {
     /// Circular correlation along the angle, summed over radii (Weston et al., Eq. 7).
     #[default]
@@ -42,9 +41,7 @@ pub enum Magnitude {
 }
 
 /// The weight of the raster before the Fourier transform of the rotation search.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Taper {
     /// No weight, for rasters that already end in zeros.
@@ -58,7 +55,7 @@ pub enum Taper {
 }
 
 /// The interpolation of a peak between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Peak {
     /// A Gaussian over a pedestal, the lowest of the neighbouring samples: errors up to 0.02 of a
@@ -78,9 +75,7 @@ pub enum Peak {
 }
 
 /// The normalisation for an overlap that shrinks as the shift grows.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Overlap {
     /// None: the plain correlation, biased towards zero shift.
@@ -94,7 +89,7 @@ pub enum Overlap {
 }
 
 /// Configuration of [`RotationSearch`](crate::RotationSearch): section `[rotation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RotationConfig {
     /// Comparison of the polar spectra: `eq7` (Weston et al., Eq. 7) or `line14` (their Algorithm
@@ -143,7 +138,7 @@ impl Default for RotationConfig {
 }
 
 /// Configuration of [`TranslationSearch`](crate::TranslationSearch): section `[translation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TranslationConfig {
     /// Largest shift searched along each axis, m.
@@ -169,30 +164,6 @@ impl Default for TranslationConfig {
 }
 
 impl RotationConfig {
-    /// The search of Weston et al., Algorithm 1, with its misprints corrected.
-    pub fn weston() -> Self {
-        Self {
-            form: RotationForm::ProfileMean,
-            magnitude: Magnitude::Linear,
-            window: Taper::Hann,
-            angles: 733,
-            band_low: 0.01,
-            band_high: 0.35,
-            peak: Peak::Parabola,
-            ..Self::default()
-        }
-    }
-
-    /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6
-    /// to 8).
-    pub fn checchin() -> Self {
-        Self {
-            magnitude: Magnitude::Linear,
-            phase_only: true,
-            ..Self::default()
-        }
-    }
-
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("rotation");
         section.require(
@@ -214,23 +185,6 @@ impl RotationConfig {
 }
 
 impl TranslationConfig {
-    /// The search of Weston et al., Algorithm 1: no normalisation of the overlap.
-    pub fn weston() -> Self {
-        Self {
-            overlap: Overlap::None,
-            peak: Peak::Parabola,
-            ..Self::default()
-        }
-    }
-
-    /// Phase correlation in (x, y) (Checchin et al., Algorithm 1, lines 10 to 13).
-    pub fn checchin() -> Self {
-        Self {
-            phase_only: true,
-            ..Self::default()
-        }
-    }
-
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("translation");
         let fits = positive(self.reach_m);

@@ -5,7 +5,7 @@ mod config;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use gyre_geometry::wrap_angle;
-use nalgebra::{Matrix3, Rotation2, Vector2};
+use nalgebra::{Rotation2, Vector2};
 use ndarray::ArrayView2;
 
 use crate::config::{ConfigError, Overlap, Peak};
@@ -335,28 +335,14 @@ impl ExhaustiveSearch {
             y_m: place.y,
             score,
         };
-        let here = self.turned[0]
-            .scores
-            .runner_up(found.highest)
-            .map(|((i, j), score)| {
-                at(
-                    translation(
-                        found.angle_rad,
-                        Vector2::new(i as f64, j as f64),
-                        self.cell_m,
-                    ),
-                    score,
-                )
-            });
+        let here = self.turned[0].scores.runner_up(found.highest);
+        let here = here.map(|((i, j), score)| {
+            let shift = Vector2::new(i as f64, j as f64);
+            at(translation(found.angle_rad, shift, self.cell_m), score)
+        });
         let there = other_angle.map(|k| at(self.candidates[k].place, self.at(k)));
-        match (here, there) {
-            (Some(here), Some(there)) => Some(if there.score > here.score {
-                there
-            } else {
-                here
-            }),
-            (one, other) => one.or(other),
-        }
+        let higher = |a: MotionRunnerUp, b: MotionRunnerUp| if b.score > a.score { b } else { a };
+        [here, there].into_iter().flatten().reduce(higher)
     }
 
     /// The k-th angle, in (-pi, pi].
@@ -365,26 +351,10 @@ impl ExhaustiveSearch {
     }
 
     fn no_match(&self, prior_rad: f64) -> JointMatch {
-        let (guess, angle_rad, variance_rad2) = (
-            guess(self.config.reach_m),
-            wrap_angle(prior_rad),
-            self.angles.guess(),
-        );
+        let (angle_rad, variance_rad2) = (wrap_angle(prior_rad), self.angles.guess());
         JointMatch {
-            rotation: RotationMatch {
-                angle_rad,
-                variance_rad2,
-                score: 0.0,
-                runner_up: None,
-            },
-            motion: MotionMatch {
-                x_m: 0.0,
-                y_m: 0.0,
-                yaw_rad: angle_rad,
-                covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
-                score: 0.0,
-                runner_up: None,
-            },
+            rotation: RotationMatch::none(angle_rad, variance_rad2),
+            motion: MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2),
         }
     }
 }

@@ -50,57 +50,43 @@ pub use spectrum::PolarSpectrum;
 pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 
 /// A raster or a spectrum that does not fit the search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum ShapeError {
-    #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
-    Shape {
-        what: &'static str,
-        actual: [usize; 2],
-        expected: [usize; 2],
-    },
-    #[error("{what} is not in row-major, contiguous layout")]
-    Layout { what: &'static str },
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ShapeError(String);
+
+impl ShapeError {
+    /// Not row-major and contiguous.
+    fn layout(what: &str) -> Self {
+        Self(format!("{what} is not in row-major, contiguous layout"))
+    }
 }
 
-fn by([rows, columns]: &[usize; 2]) -> String {
-    format!("{rows} x {columns}")
-}
-
-fn expect_shape(
-    what: &'static str,
-    actual: [usize; 2],
-    expected: [usize; 2],
-) -> Result<(), ShapeError> {
-    if actual == expected {
-        Ok(())
-    } else {
-        Err(ShapeError::Shape {
-            what,
-            actual,
-            expected,
-        })
+fn expect_shape(what: &str, actual: [usize; 2], expected: [usize; 2]) -> Result<(), ShapeError> {
+    let by = |[rows, columns]: [usize; 2]| format!("{rows} x {columns}");
+    match actual == expected {
+        true => Ok(()),
+        false => {
+            let (actual, expected) = (by(actual), by(expected));
+            Err(ShapeError(format!(
+                "{what} is {actual}: expected {expected}"
+            )))
+        }
     }
 }
 
 /// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
 pub fn square<'a>(
-    what: &'static str,
+    what: &str,
     cells: &'a [f32],
     n: usize,
 ) -> Result<ArrayView2<'a, f32>, ShapeError> {
-    ArrayView2::from_shape((n, n), cells).map_err(|_| ShapeError::Shape {
-        what,
-        actual: [1, cells.len()],
-        expected: [n, n],
-    })
+    let count = cells.len();
+    ArrayView2::from_shape((n, n), cells)
+        .map_err(|_| ShapeError(format!("{what} is 1 x {count}: expected {n} x {n}")))
 }
 
 /// The cells of an `n` x `n` raster, row after row.
-fn cells<'a>(
-    what: &'static str,
-    raster: &ArrayView2<'a, f32>,
-    n: usize,
-) -> Result<&'a [f32], ShapeError> {
+fn cells<'a>(what: &str, raster: &ArrayView2<'a, f32>, n: usize) -> Result<&'a [f32], ShapeError> {
     expect_shape(what, [raster.nrows(), raster.ncols()], [n, n])?;
-    raster.to_slice().ok_or(ShapeError::Layout { what })
+    raster.to_slice().ok_or_else(|| ShapeError::layout(what))
 }

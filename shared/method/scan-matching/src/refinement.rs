@@ -9,7 +9,6 @@ mod alignment;
 mod along_walls;
 mod config;
 mod heading;
-mod initial_guess;
 mod keyframe_aligner;
 mod local_map;
 mod map_level;
@@ -30,7 +29,6 @@ use gyre_samples::{
     WheelsConfig,
 };
 pub use heading::{GyroBias, Heading, Verdict};
-pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
 use nalgebra::{UnitVector2, Vector2};
@@ -43,6 +41,7 @@ use crate::ConfigError;
 use alignment::Alignment;
 use local_map::LocalMap;
 use points::DeskewedPoints;
+pub use registration::InitialGuess;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
 use tracker::Step;

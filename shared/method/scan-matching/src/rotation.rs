@@ -9,6 +9,7 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Peak, RotationConfig, RotationForm};
+use crate::covariance::guess;
 use crate::fft::{RealLines, RealSpectrum, fast_size};
 use crate::peak::{line_peak, soft_argmax};
 use crate::polar::PolarGrid;
@@ -46,6 +47,18 @@ pub struct RotationMatch {
     pub score: f64,
     /// The highest other local maximum within reach.
     pub runner_up: Option<RotationRunnerUp>,
+}
+
+impl RotationMatch {
+    /// No match: the angle may be anywhere about this one.
+    pub(crate) fn none(angle_rad: f64, variance_rad2: f64) -> Self {
+        Self {
+            angle_rad,
+            variance_rad2,
+            score: 0.0,
+            runner_up: None,
+        }
+    }
 }
 
 /// Finds the angle between two scans (Weston et al., Algorithm 1, lines 5 to 15).
@@ -281,7 +294,7 @@ impl RotationSearch {
     /// distribution over the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = VARIANCE_SCALE * (1.0 - score).max(1e-6) / -curvature;
-        let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;
+        let guess = guess(self.config.reach_deg.to_radians());
         if variance > 0.0 && variance < guess {
             variance
         } else {
@@ -302,13 +315,7 @@ impl RotationSearch {
     }
 
     fn no_match(&self) -> RotationMatch {
-        let variance_rad2 = self.config.reach_deg.to_radians().powi(2) / 3.0;
-        RotationMatch {
-            angle_rad: 0.0,
-            variance_rad2,
-            score: 0.0,
-            runner_up: None,
-        }
+        RotationMatch::none(0.0, guess(self.config.reach_deg.to_radians()))
     }
 }
 

@@ -44,6 +44,19 @@ impl MotionMatch {
     pub fn pose(&self) -> Pose {
         pose(self.x_m, self.y_m, self.yaw_rad)
     }
+
+    /// No match: the shift may be anywhere within reach.
+    pub(crate) fn none(reach_m: f64, yaw_rad: f64, variance_rad2: f64) -> Self {
+        let guess = guess(reach_m);
+        Self {
+            x_m: 0.0,
+            y_m: 0.0,
+            yaw_rad,
+            covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
+            score: 0.0,
+            runner_up: None,
+        }
+    }
 }
 
 /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated like
@@ -98,23 +111,13 @@ impl TranslationSearch {
         earlier: ArrayView2<'_, f32>,
         rotation: &RotationMatch,
     ) -> Result<MotionMatch, ShapeError> {
-        self.search_in(later, earlier, None, rotation)
+        self.search_seen(later, earlier, None, rotation)
     }
 
     /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`,
     /// in the directions of the later raster, is 1 where it could, and 0 elsewhere. The earlier
     /// raster counts only there, as seen from its own sensor.
     pub fn search_seen(
-        &mut self,
-        later: ArrayView2<'_, f32>,
-        earlier: ArrayView2<'_, f32>,
-        seen: ArrayView2<'_, f32>,
-        rotation: &RotationMatch,
-    ) -> Result<MotionMatch, ShapeError> {
-        self.search_in(later, earlier, Some(seen), rotation)
-    }
-
-    fn search_in(
         &mut self,
         later: ArrayView2<'_, f32>,
         earlier: ArrayView2<'_, f32>,
@@ -145,11 +148,11 @@ impl TranslationSearch {
         self.turned_energy.measure(&self.turned);
         let energy = (self.later_energy.total() * self.turned_energy.total()).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
-            return self.no_match(angle_rad, variance_rad2);
+            return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         }
         self.correlate(energy); // lines 17 and 18
         let Some(best) = self.scores.highest() else {
-            return self.no_match(angle_rad, variance_rad2);
+            return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         };
         let peak = self.scores.peak(self.config.peak, best);
         let shift = self.scores.place(self.config.peak, best, &peak); // line 19
@@ -247,17 +250,5 @@ impl TranslationSearch {
     fn lever(&self, turn: &Rotation2<f64>) -> Vector2<f64> {
         let centre = self.later_energy.centre() * -self.cell_m;
         turn * Vector2::new(centre.y, -centre.x)
-    }
-
-    fn no_match(&self, angle_rad: f64, variance_rad2: f64) -> MotionMatch {
-        let guess = guess(self.config.reach_m);
-        MotionMatch {
-            x_m: 0.0,
-            y_m: 0.0,
-            yaw_rad: angle_rad,
-            covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
-            score: 0.0,
-            runner_up: None,
-        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{Motion, draw, pair, search};
 use gyre_scan_matching::{
-    MotionMatch, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig,
+    MotionMatch, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
 };
 
 type Configs = (RotationConfig, TranslationConfig);
@@ -39,42 +39,42 @@ fn shifts_up_to_the_reach_are_found_in_every_direction() {
 #[test]
 fn every_form_of_the_search_finds_the_motion() {
     let motion = Motion::degrees(2.3, -0.7, 6.4);
+    let soft = Peak::SoftArgmax { temperature: 6.0 };
+    let (rotation, translation) = Configs::default();
+    // Weston et al., Algorithm 1, and phase correlation (Checchin et al., Algorithm 1).
     let line14 = RotationConfig {
         form: RotationForm::ProfileMean,
-        ..RotationConfig::default()
+        window: Taper::Hann,
+        angles: 733,
+        peak: Peak::Parabola,
+        ..rotation.clone()
     };
-    let soft = Peak::SoftArgmax { temperature: 6.0 };
-    let forms: [(&str, Configs, [f64; 2]); 5] = [
-        ("default", Configs::default(), [0.1, 0.1]),
-        (
-            "line 14",
-            (line14, TranslationConfig::default()),
-            [0.3, 0.5],
-        ),
-        (
-            "Weston et al.",
-            (RotationConfig::weston(), TranslationConfig::weston()),
-            [0.4, 1.0],
-        ),
-        (
-            "Checchin et al.",
-            (RotationConfig::checchin(), TranslationConfig::checchin()),
-            [0.4, 1.0],
-        ),
-        (
-            "soft-argmax",
-            (
-                RotationConfig {
-                    peak: soft,
-                    ..RotationConfig::default()
-                },
-                TranslationConfig {
-                    peak: soft,
-                    ..TranslationConfig::default()
-                },
-            ),
-            [0.4, 1.0],
-        ),
+    let plain = TranslationConfig {
+        overlap: Overlap::None,
+        peak: Peak::Parabola,
+        ..translation.clone()
+    };
+    let phase = RotationConfig {
+        phase_only: true,
+        ..rotation.clone()
+    };
+    let phase_shift = TranslationConfig {
+        phase_only: true,
+        ..translation.clone()
+    };
+    let soft_angle = RotationConfig {
+        peak: soft,
+        ..rotation.clone()
+    };
+    let soft_shift = TranslationConfig {
+        peak: soft,
+        ..translation.clone()
+    };
+    let forms: [(&str, Configs, [f64; 2]); 4] = [
+        ("default", (rotation, translation), [0.1, 0.1]),
+        ("Weston et al.", (line14, plain), [0.4, 1.0]),
+        ("Checchin et al.", (phase, phase_shift), [0.4, 1.0]),
+        ("soft-argmax", (soft_angle, soft_shift), [0.4, 1.0]),
     ];
     for (name, configs, [metres, degrees]) in forms {
         let [dx, dy, dyaw] = errors(&recovered(255, 0.4, &configs, motion, 3), motion);

@@ -145,7 +145,7 @@ impl LoopVerifier {
 
     fn correlation_at(&mut self, motion: &Pose) -> f64 {
         self.correlation
-            .at(self.later.view(), self.earlier.view(), motion)
+            .at(self.later.view(), self.earlier.view(), None, motion)
             .expect(PLANNED)
     }
 

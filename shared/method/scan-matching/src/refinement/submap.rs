@@ -69,7 +69,7 @@ impl Submap {
         expect_shape(WHAT, raster.dim().into(), [n, n])?;
         let cells = raster
             .as_slice_mut()
-            .ok_or(ShapeError::Layout { what: WHAT })?;
+            .ok_or_else(|| ShapeError::layout(WHAT))?;
         cells.fill(0.0);
         let (per_m, middle, last) = (1.0 / cell_m as f32, 0.5 * (n as f32 - 1.0), n as f32 - 1.0);
         for [x_m, y_m, weight] in self.points() {

@@ -72,11 +72,9 @@ impl Registration {
             runner_up: None,
         };
         let (scan, place) = (self.scan.view(), self.place.view());
-        let found = match self.sight.seen() {
-            Some(seen) => self.translation.search_seen(scan, place, seen, &rotation),
-            None => self.translation.search(scan, place, &rotation),
-        };
-        found.expect(PLANNED)
+        self.translation
+            .search_seen(scan, place, self.sight.seen(), &rotation)
+            .expect(PLANNED)
     }
 
     /// Aligns the scan from an initial guess within some metres: its pose in the submap's frame,
@@ -90,12 +88,10 @@ impl Registration {
         let mut motion = self.aligner.align_to_submap(scan, place, initial)?;
         motion.covariance *= self.variance_scale;
         let rasters = (self.scan.view(), self.place.view());
-        let correlation = match self.sight.seen() {
-            Some(seen) => self
-                .correlation
-                .at_seen(rasters.0, rasters.1, seen, &motion.motion),
-            None => self.correlation.at(rasters.0, rasters.1, &motion.motion),
-        };
+        let seen = self.sight.seen();
+        let correlation = self
+            .correlation
+            .at(rasters.0, rasters.1, seen, &motion.motion);
         Some((motion, correlation.expect(PLANNED)))
     }
 }

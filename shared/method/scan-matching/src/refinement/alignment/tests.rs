@@ -120,7 +120,7 @@ proptest! {
         let (view, points) = (level.view(), deskewed(&world));
         let mut cost = linearise(&view, &points, &initial).cost;
         for iterations in 0..12 {
-            let found = align(&view, &points, &initial, iterations);
+            let found = align(&view, &points, &initial, iterations, None);
             prop_assert!(found.normal.cost <= cost, "{} after {cost} at step {iterations}", found.normal.cost);
             prop_assert_eq!(linearise(&view, &points, &found.pose).cost, found.normal.cost);
             cost = found.normal.cost;
@@ -133,7 +133,7 @@ proptest! {
         let (points, mut image) = (deskewed(&world), level.new_image());
         level.draw(&points, &Pose::identity(), &mut image);
         level.sum_images(std::iter::once(&image));
-        let found = align(&level.view(), &points, &initial, 30).pose;
+        let found = align(&level.view(), &points, &initial, 30, None).pose;
         prop_assert!(found.translation.vector.norm() < 0.15 && found.rotation.angle().abs() < 0.015, "{found}");
     }
 }
@@ -143,11 +143,11 @@ fn an_empty_map_or_scan_leaves_the_initial_pose() {
     let initial = Pose::new(Vector2::new(1.0, 2.0), 0.3);
     let (empty, full) = (MapLevel::new(CELL_M, 20.0), map(&[[1.0, 2.0], [-3.0, 4.0]]));
     assert_eq!(
-        align(&empty.view(), &deskewed(&[[1.0, 2.0]]), &initial, 10).pose,
+        align(&empty.view(), &deskewed(&[[1.0, 2.0]]), &initial, 10, None).pose,
         initial
     );
     assert_eq!(
-        align(&full.view(), &deskewed(&[]), &initial, 10).pose,
+        align(&full.view(), &deskewed(&[]), &initial, 10, None).pose,
         initial
     );
 }
