@@ -170,33 +170,33 @@ impl Refiner {
         let Some(by) = scan.step.distance.map(|it| it.by) else {
             return false;
         };
-        let (state, measured, config) = self.distance_by(by);
-        match (state, measured) {
-            (Some(state), Some(measured)) => {
-                !state.agrees(&measured, &self.driven(registered, config))
-            }
-            _ => false,
-        }
+        let displacement = self.displacement.map(|it| it.ahead);
+        let (state, measured, config) = match by {
+            DistanceBy::Wheels => (&self.state.wheels, self.aiding.distance, &self.wheels),
+            DistanceBy::Doppler => (&self.state.doppler, displacement, &self.doppler_as_wheels),
+        };
+        let both = state.as_ref().zip(measured);
+        both.is_some_and(|(state, measured)| {
+            !state.agrees(&measured, &self.driven(registered, config))
+        })
     }
 
-    /// Returns the state of an aiding sensor of the distance, its measurement since the scan
+    /// Returns the state of each aiding sensor of the distance, its measurement since the scan
     /// before, and its settings.
-    fn distance_by(
-        &self,
-        by: DistanceBy,
-    ) -> (Option<&WheelState>, Option<WheelDistance>, &WheelsConfig) {
-        match by {
-            DistanceBy::Wheels => (
-                self.state.wheels.as_ref(),
-                self.aiding.distance,
-                &self.wheels,
-            ),
-            DistanceBy::Doppler => (
-                self.state.doppler.as_ref(),
-                self.displacement.map(|it| it.ahead),
-                &self.doppler_as_wheels,
-            ),
-        }
+    fn distances(
+        &mut self,
+    ) -> [(
+        &mut Option<WheelState>,
+        Option<WheelDistance>,
+        &WheelsConfig,
+    ); 2] {
+        let displacement = self.displacement.map(|it| it.ahead);
+        let distance = self.aiding.distance;
+        let state = &mut self.state;
+        [
+            (&mut state.wheels, distance, &self.wheels),
+            (&mut state.doppler, displacement, &self.doppler_as_wheels),
+        ]
     }
 
     /// Hands each aiding sensor of the distance its measurement and the distance driven to a
@@ -208,16 +208,7 @@ impl Refiner {
     ) {
         let driven =
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
-        let displacement = self.displacement.map(|it| it.ahead);
-        let sensors = [
-            (&mut self.state.wheels, self.aiding.distance, &self.wheels),
-            (
-                &mut self.state.doppler,
-                displacement,
-                &self.doppler_as_wheels,
-            ),
-        ];
-        for ((state, measured, config), driven) in sensors.into_iter().zip(driven) {
+        for ((state, measured, config), driven) in self.distances().into_iter().zip(driven) {
             if let Some(state) = state {
                 take(state, measured.as_ref(), &driven, config);
             }
@@ -226,16 +217,8 @@ impl Refiner {
 
     pub(super) fn propagate_distances(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
         let by = scan.step.distance.map(|it| it.by);
-        let displacement = self.displacement.map(|it| it.ahead);
-        let sensors = [
-            (
-                &mut self.state.wheels,
-                self.aiding.distance,
-                DistanceBy::Wheels,
-            ),
-            (&mut self.state.doppler, displacement, DistanceBy::Doppler),
-        ];
-        for (state, measured, sensor) in sensors {
+        let sensors = [DistanceBy::Wheels, DistanceBy::Doppler];
+        for ((state, measured, _), sensor) in self.distances().into_iter().zip(sensors) {
             let Some(state) = state else {
                 continue;
             };
