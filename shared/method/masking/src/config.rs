@@ -66,19 +66,10 @@ pub enum MaskKind {
     Learned,
 }
 
+/// Settings of `[masking]` that do not fit.
 #[derive(Debug, Error, PartialEq)]
-pub enum MaskingConfigError {
-    #[error("threads is {0}, but must be 1 to 64")]
-    Threads(usize),
-    #[error("point_exponent is {0}, but must be 0 to 4")]
-    PointExponent(f32),
-    #[error(
-        "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
-    )]
-    NotOfRten(&'static str),
-    #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
-    Lag,
-}
+#[error("{0}")]
+pub struct MaskingConfigError(String);
 
 impl Default for MaskingConfig {
     fn default() -> Self {
@@ -101,22 +92,27 @@ impl Default for MaskingConfig {
 
 impl MaskingConfig {
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
-        match () {
-            () if !(1..=64).contains(&self.threads) => {
-                Err(MaskingConfigError::Threads(self.threads))
+        let (threads, exponent) = (self.threads, self.point_exponent);
+        let is_rten = self.backend == Backend::Rten;
+        let not_of_rten = |key| {
+            format!(
+                "backend is `rten`, but {key} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {key} out"
+            )
+        };
+        Err(MaskingConfigError(match () {
+            () if !(1..=64).contains(&threads) => {
+                format!("threads is {threads}, but must be 1 to 64")
             }
-            () if !(0.0..=4.0).contains(&self.point_exponent) => {
-                Err(MaskingConfigError::PointExponent(self.point_exponent))
+            () if !(0.0..=4.0).contains(&exponent) => {
+                format!("point_exponent is {exponent}, but must be 0 to 4")
             }
-            () if self.backend == Backend::Rten && self.runtime.is_some() => {
-                Err(MaskingConfigError::NotOfRten("runtime"))
+            () if is_rten && self.runtime.is_some() => not_of_rten("runtime"),
+            () if is_rten && self.provider != Provider::Cpu => not_of_rten("provider"),
+            () if self.compensate && self.lag == 0 => {
+                "lag is 0, but must be 1 or more: the motion of a scan is not known before its search".to_owned()
             }
-            () if self.backend == Backend::Rten && self.provider != Provider::Cpu => {
-                Err(MaskingConfigError::NotOfRten("provider"))
-            }
-            () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
-            () => Ok(()),
-        }
+            () => return Ok(()),
+        }))
     }
 
     /// Returns the highest power that is set to zero.

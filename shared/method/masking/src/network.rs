@@ -5,18 +5,12 @@ mod onnx_runtime;
 mod rten;
 mod tensors;
 
-use std::path::PathBuf;
-
 use gyre_radar::raster::RasterConfig;
 use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::networks::runtime::RuntimeError;
-use crate::{
-    Backend, Library, MaskingConfig, Provider,
-    model::{Model, ModelError},
-};
+use crate::{Backend, Library, MaskingConfig, model::Model, networks::runtime::RuntimeError};
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
@@ -27,44 +21,27 @@ const OUTPUT: &str = "masks";
 #[derive(Debug, Error)]
 pub enum NetworkError {
     #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    #[error(
-        "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
-    )]
-    NotBuiltIn(Provider),
-    #[error(
-        "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
-    )]
-    Provider { provider: Provider, reason: String },
-    #[error("{} cannot load {path}: {reason}", .by.name())]
-    Load {
-        by: Backend,
-        path: PathBuf,
-        reason: String,
-    },
-    #[error(
-        "{path} has operators of version {opset}, and this {} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime",
-        .by.name()
-    )]
-    Opset {
-        /// The model's file.
-        path: PathBuf,
-        /// The version of its operators.
-        opset: i64,
-        by: Backend,
-        /// The newest version that the backend supports.
-        known: String,
-    },
-    #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
-    Interface {
-        path: PathBuf,
-        has: String,
-        expected: String,
-    },
+    /// A model or an execution provider that cannot be used.
+    #[error("{0}")]
+    Model(String),
     #[error("the learned mask cannot be computed: {0}")]
     Run(String),
+}
+
+impl NetworkError {
+    fn load(by: Backend, model: &Model, reason: &str) -> Self {
+        let (by, path) = (by.name(), model.file.display());
+        Self::Model(format!("{by} cannot load {path}: {reason}"))
+    }
+
+    /// A model with operators of a version newer than the newest that a backend supports.
+    fn opset(by: Backend, model: &Model, opset: i64, known: &str) -> Self {
+        let (by, path) = (by.name(), model.file.display());
+        Self::Model(format!(
+            "{path} has operators of version {opset}, and this {by} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime"
+        ))
+    }
 }
 
 /// A network that computes masks from rasters.
@@ -185,10 +162,10 @@ fn check(
     let expected = format!("`{name}` Float32 {shape:?}");
     match tensors {
         [tensor] if *tensor == expected => Ok(()),
-        _ => Err(NetworkError::Interface {
-            path: model.file.clone(),
-            has: format!("{verb} {}", tensors.join(" and ")),
-            expected,
-        }),
+        _ => Err(NetworkError::Model(format!(
+            "{} {verb} {}, but by its card it must have only {expected}: export it again",
+            model.file.display(),
+            tensors.join(" and ")
+        ))),
     }
 }

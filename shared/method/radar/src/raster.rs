@@ -48,10 +48,7 @@ pub enum Sampling {
 
 impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Averaged => "averaged",
-            Self::Bilinear => "bilinear",
-        })
+        self.serialize(f)
     }
 }
 

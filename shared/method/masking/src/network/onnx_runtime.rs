@@ -59,9 +59,9 @@ fn builder(
         .map_err(|error| NetworkError::Run(one_line(error.message())))?;
     builder
         .with_execution_providers(providers)
-        .map_err(|error| NetworkError::Provider {
-            provider: config.provider,
-            reason: one_line(error.message()),
+        .map_err(|error| {
+            let (provider, reason) = (config.provider, one_line(error.message()));
+            NetworkError::Model(format!("masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"))
         })
 }
 
@@ -82,7 +82,9 @@ fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispat
             unreachable_patterns,
             reason = "unreachable if all providers are built in"
         )]
-        other => Err(NetworkError::NotBuiltIn(other)),
+        other => Err(NetworkError::Model(format!(
+            "masking.provider is `{other}`, which this build does not have: build Gyre with --features {other}, or set it to `cpu`"
+        ))),
     }
 }
 
@@ -94,21 +96,16 @@ fn describe(tensor: &Outlet) -> String {
 }
 
 fn rejected(model: &Model, message: &str) -> NetworkError {
-    let path = model.file.clone();
     match message.split_once("ai.onnx is till opset ") {
         Some((_, known)) => {
-            let known = known.trim_end().trim_end_matches('.').to_owned();
-            NetworkError::Opset {
-                path,
-                opset: model.card.model.opset.into(),
-                by: Backend::OnnxRuntime,
+            let known = known.trim_end().trim_end_matches('.');
+            NetworkError::opset(
+                Backend::OnnxRuntime,
+                model,
+                model.card.model.opset.into(),
                 known,
-            }
+            )
         }
-        None => NetworkError::Load {
-            by: Backend::OnnxRuntime,
-            path,
-            reason: one_line(message),
-        },
+        None => NetworkError::load(Backend::OnnxRuntime, model, &one_line(message)),
     }
 }

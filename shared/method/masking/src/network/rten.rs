@@ -29,29 +29,25 @@ pub(super) struct Rten {
 pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
         let reason = format!("it is not a model in ONNX, or is damaged: {error}");
-        rejected(model, reason)
+        rejected(model, &reason)
     })?;
     let opset = newest_operators(&file);
     if opset > OPSET {
-        return Err(NetworkError::Opset {
-            path: model.file.clone(),
+        return Err(NetworkError::opset(
+            Backend::Rten,
+            model,
             opset,
-            by: Backend::Rten,
-            known: OPSET.to_string(),
-        });
+            &OPSET.to_string(),
+        ));
     }
     match file.graph {
         Some(_) => Ok(file),
-        None => Err(rejected(model, "it has no graph".to_owned())),
+        None => Err(rejected(model, "it has no graph")),
     }
 }
 
-fn rejected(model: &Model, reason: String) -> NetworkError {
-    NetworkError::Load {
-        by: Backend::Rten,
-        path: model.file.clone(),
-        reason,
-    }
+fn rejected(model: &Model, reason: &str) -> NetworkError {
+    NetworkError::load(Backend::Rten, model, reason)
 }
 
 impl Rten {
@@ -60,7 +56,7 @@ impl Rten {
         if let Some(graph) = &mut file.graph {
             state_kernel_sizes(graph);
         }
-        let rejected = |reason| rejected(model, reason);
+        let rejected = |reason: String| rejected(model, &reason);
         let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
         let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
         Ok(Self {
@@ -73,11 +69,7 @@ impl Rten {
     /// other.
     pub fn rehearse(&mut self, model: &Model, empty: Array3<f32>) -> Result<(), NetworkError> {
         match self.run(empty.view(), empty.clone().view_mut()) {
-            Err(NetworkError::Run(reason)) => Err(NetworkError::Load {
-                by: Backend::Rten,
-                path: model.file.clone(),
-                reason,
-            }),
+            Err(NetworkError::Run(reason)) => Err(rejected(model, &reason)),
             computed => computed,
         }
     }

@@ -39,20 +39,8 @@ pub enum RuntimeError {
          masking.backend = \"rten\" does not need it"
     )]
     Missing,
-    #[error(
-        "{named_by} is {path}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
-    )]
-    NotFound {
-        named_by: &'static str,
-        path: PathBuf,
-    },
-    #[error(
-        "ONNX Runtime at {path} is version {version}, but at least 1.{} is needed: `{INSTALL}` installs one",
-        ort::MINOR_VERSION
-    )]
-    TooOld { path: PathBuf, version: String },
-    #[error("{path} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one")]
-    Unusable { path: PathBuf, reason: String },
+    #[error("{0}")]
+    Unusable(String),
 }
 
 /// Returns the path of the library: named by `configured` (`masking.runtime`) or by the
@@ -75,7 +63,12 @@ fn find_in(
         (None, None) => None,
     };
     if let Some((named_by, path)) = named {
-        return library_at(&path).ok_or(RuntimeError::NotFound { named_by, path });
+        let shown = path.display();
+        return library_at(&path).ok_or_else(|| {
+            RuntimeError::Unusable(format!(
+                "{named_by} is {shown}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
+            ))
+        });
     }
     installed_in
         .iter()
@@ -174,30 +167,25 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     if let Some(environment) = &*opened {
         return Ok(environment.clone());
     }
-    let unusable = |reason: String| RuntimeError::Unusable {
-        path: path.to_owned(),
-        reason,
+    let named = path.display();
+    let unusable = |reason: &str| {
+        RuntimeError::Unusable(format!(
+            "{named} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one"
+        ))
     };
     let builder = ort::init_from(path).map_err(|error| match error {
-        LoadDynamicError::BadVersion { version_str, path } => RuntimeError::TooOld {
-            path,
-            version: version_str,
-        },
+        LoadDynamicError::BadVersion { version_str, path } => RuntimeError::Unusable(format!(
+            "ONNX Runtime at {} is version {version_str}, but at least 1.{} is needed: `{INSTALL}` installs one",
+            path.display(),
+            ort::MINOR_VERSION
+        )),
         LoadDynamicError::Dlopen { error, .. } => {
-            let reason = error
-                .source()
-                .map_or_else(|| error.to_string(), ToString::to_string);
+            let reason = error.source().map_or_else(|| error.to_string(), ToString::to_string);
             // The dynamic linker's message starts with the file.
-            unusable(
-                reason
-                    .trim_start_matches(&format!("{}: ", path.display()))
-                    .to_owned(),
-            )
+            unusable(reason.trim_start_matches(&format!("{named}: ")))
         }
-        LoadDynamicError::MissingApi { .. } => {
-            unusable("it does not have ONNX Runtime's functions".to_owned())
-        }
-        LoadDynamicError::InvalidVersionString => unusable("its version is not text".to_owned()),
+        LoadDynamicError::MissingApi { .. } => unusable("it does not have ONNX Runtime's functions"),
+        LoadDynamicError::InvalidVersionString => unusable("its version is not text"),
     })?;
     // Errors are returned; other messages go to the run's log.
     let log = |level, _: &str, _: &str, location: &str, message: &str| match level {
@@ -208,7 +196,7 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
         .with_telemetry(false)
         .with_logger(Arc::new(log))
         .build();
-    let environment = environment.map_err(|error| unusable(error.to_string()))?;
+    let environment = environment.map_err(|error| unusable(&error.to_string()))?;
     environment.set_log_level(LogLevel::Error);
     Ok(opened.insert(environment).clone())
 }
