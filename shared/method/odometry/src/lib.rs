@@ -9,7 +9,6 @@
 
 mod compensation;
 mod config;
-mod mask;
 mod odometry;
 mod pair;
 mod parts;
@@ -17,9 +16,8 @@ mod registered;
 mod search;
 
 pub use config::{OdometryConfig, SearchConfig, SearchKind};
-pub use mask::{Mask, Rasters};
 pub use odometry::Odometry;
 pub use pair::Pair;
-pub use parts::{Parts, Refine};
+pub use parts::Parts;
 pub use registered::{OdometryError, Outcome, Registered, SetupError};
 pub use search::{DecoupledSearch, Search};

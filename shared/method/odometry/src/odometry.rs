@@ -1,23 +1,24 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
+use gyre_masking::Masker;
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, NoDoppler, PlacedRows, PolarScan,
 };
 use gyre_samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate};
-use gyre_scan_matching::{JointMatch, Refined};
+use gyre_scan_matching::{JointMatch, Refined, Refiner};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    Mask, OdometryConfig, OdometryError, Outcome, Pair, Parts, Refine, Registered, Search,
-    SetupError, compensation::LaggedTwists,
+    OdometryConfig, OdometryError, Outcome, Pair, Parts, Registered, Search, SetupError,
+    compensation::LaggedTwists,
 };
 
 /// Radar odometry. Registers scan after scan against the previous ones.
 pub struct Odometry {
-    masker: Box<dyn Mask>,
+    masker: Masker,
     search: Box<dyn Search>,
-    refiner: Option<Box<dyn Refine>>,
+    refiner: Option<Refiner>,
     twists: LaggedTwists,
     gyro: Gyro,
     wheels: Wheels,
@@ -108,7 +109,7 @@ impl Odometry {
         scan.check()?;
         self.lost = self.finder.find(scan, twist);
         let placed = self.rows.place(scan, &self.lost);
-        self.pair.mask(self.masker.as_mut(), &placed, twist)?;
+        self.pair.mask(&mut self.masker, &placed, twist)?;
         let doppler = self.doppler.as_mut();
         self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
         let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
@@ -130,7 +131,12 @@ impl Odometry {
     /// is configured.
     pub fn refine(&mut self, searched: &JointMatch) -> Option<Refined> {
         let refiner = self.refiner.as_mut()?;
-        Some(refiner.refine(&self.pair, &searched.motion.pose()))
+        let pair = &self.pair;
+        refiner.aiding = pair.aiding();
+        let (later, earlier) = (pair.later_points(), pair.earlier_points());
+        let searched = searched.motion.pose();
+        let interval_s = pair.interval_ns() as f64 * 1e-9;
+        Some(refiner.refine(pair.seq(), later, earlier, &searched, interval_s))
     }
 
     /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2; see [`ComposedMotion`]).

@@ -1,13 +1,13 @@
 //! The scan that is being registered and the one before it.
 
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_masking::Sweep;
+use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
 use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use gyre_scan_matching::Aiding;
 use ndarray::{Array2, ArrayView2};
 
-use crate::{Mask, OdometryError, Rasters};
+use crate::OdometryError;
 
 /// Two consecutive scans: their masked rasters (n x n, row 0 far ahead) and their points.
 pub struct Pair {
@@ -84,7 +84,7 @@ impl Pair {
     }
 
     /// Returns what is known about the motion beside the rasters and the points.
-    pub fn aiding(&self) -> Aiding {
+    pub(crate) fn aiding(&self) -> Aiding {
         let [earlier, later] = [&self.earlier, &self.later];
         Aiding {
             azimuth_variance_rad2: earlier.azimuth_variance_rad2 + later.azimuth_variance_rad2,
@@ -108,7 +108,7 @@ impl Pair {
     /// Makes the scan the later one: masks it with motion compensation, and extracts its points.
     pub(crate) fn mask(
         &mut self,
-        masker: &mut dyn Mask,
+        masker: &mut Masker,
         scan: &PolarScan<'_>,
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
@@ -118,12 +118,9 @@ impl Pair {
             twist,
         };
         let frame = &mut self.later;
-        let mut rasters = Rasters {
-            later: frame.raster.view_mut(),
-            earlier: self.earlier_for_pair.as_mut().map(|r| r.view_mut()),
-            follows: self.seq.checked_sub(1),
-        };
-        frame.twist = masker.mask(&sweep, &mut rasters)?;
+        let follows = self.seq.checked_sub(1);
+        let earlier = self.earlier_for_pair.as_mut().map(|r| r.view_mut());
+        frame.twist = masker.mask(&sweep, follows, frame.raster.view_mut(), earlier)?;
         frame.count = masker.points(scan, frame.twist, &mut frame.points)?;
         frame.stamp_ns = scan.geometry.stamp_ns;
         Ok(())
