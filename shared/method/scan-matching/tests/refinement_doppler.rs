@@ -3,7 +3,7 @@
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{SparsePoint, pose};
 use gyre_samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig};
-use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
+use gyre_scan_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
 /// From there on there is nothing but walls, or nothing that matches.
@@ -18,18 +18,6 @@ fn slower() -> Drive {
         acceleration_mps2: -0.2,
         ..Drive::steady(10.0, 0.0, SCANS)
     }
-}
-
-/// Makes the scans of a vehicle that leaves a town for a tunnel.
-fn into_a_tunnel(drive: &Drive) -> Vec<Vec<SparsePoint>> {
-    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
-    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
-    scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500)));
-    let sensor = Sensor {
-        noise_m: 0.05,
-        ..NOISY
-    };
-    scans(&scene, drive, &sensor)
 }
 
 fn witnessed() -> Refiner {
@@ -58,21 +46,21 @@ fn refine_with(
         })
     };
     let mut numbers = Numbers(7);
-    let mut refine = |k: usize| {
-        refiner.aiding.velocities = [velocity(k - 1), velocity(k)];
-        let searched = match k < INSIDE {
-            true => searched(drive, k - 1),
-            false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
-        };
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let search = |k: usize| match k < INSIDE {
+        true => searched(drive, k - 1),
+        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
     };
-    (1..scans.len()).map(&mut refine).collect()
+    let aiding = |k: usize| Aiding {
+        velocities: [velocity(k - 1), velocity(k)],
+        ..Aiding::default()
+    };
+    refine_aided(refiner, scans, aiding, search)
 }
 
 #[test]
 fn in_a_tunnel_doppler_says_how_far() {
     let drive = slower();
-    let scans = into_a_tunnel(&drive);
+    let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut witnessed(), (&drive, &scans), |_| Some(SCALE));
     for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
         let slid = refined.guess == InitialGuess::AlongWalls;
@@ -143,7 +131,7 @@ fn a_velocity_that_a_certain_match_contradicts_is_refused_and_changes_no_motion(
 #[test]
 fn without_the_section_velocities_change_no_bit() {
     let drive = slower();
-    let scans = &into_a_tunnel(&drive)[..INSIDE + 20];
+    let scans = &into_a_tunnel(&drive, Vec::new())[..INSIDE + 20];
     let poses = |refined: &[Refined]| -> Vec<_> {
         refined
             .iter()

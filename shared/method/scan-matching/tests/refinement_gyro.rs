@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::common::scenes::*;
 use gyre_geometry::{SparsePoint, pose};
-use gyre_samples::{DopplerConfig, GyroConfig, GyroTurn, WheelsConfig};
-use gyre_scan_matching::{Outcome, Refined, Verdict};
+use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
+use gyre_scan_matching::{Aiding, Outcome, Refined, Verdict};
 
 const SCANS: usize = 60;
 /// Scans with a wrong gyro.
@@ -28,21 +28,16 @@ fn refine_with(
     const REACH_RAD: f64 = 0.07;
     let (wheels, doppler) = (WheelsConfig::default(), DopplerConfig::default());
     let mut refiner = refiner().with_sensors(gyro, &wheels, &doppler);
-    let refine = |k: usize| {
-        let off_radps = off_radps(k);
-        let rate_radps = drive.yaw_rate_radps + off_radps;
-        refiner.aiding.turn = Some(GyroTurn {
-            yaw_rad: rate_radps * SWEEP_S,
-            variance_rad2: 1e-9,
-            interval_s: SWEEP_S,
-            sweep_rate_radps: rate_radps,
-        });
-        let misled_rad = off_radps * SWEEP_S;
-        let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
-        let searched = drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad);
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let aiding = |k: usize| Aiding {
+        turn: Some(by_gyro(drive, off_radps(k))),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(refine).collect()
+    let search = |k: usize| {
+        let misled_rad = off_radps(k) * SWEEP_S;
+        let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
+        drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad)
+    };
+    refine_aided(&mut refiner, scans, aiding, search)
 }
 
 /// The scans of this verdict.

@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use crate::common::scenes::*;
 use gyre_geometry::{SparsePoint, pose};
-use gyre_samples::{GyroTurn, WheelDistance};
-use gyre_scan_matching::{Outcome, Refined, Refiner};
+use gyre_scan_matching::{Aiding, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
 /// Six seconds.
@@ -32,31 +31,17 @@ fn refine_with(
     measured: impl Fn(usize) -> Option<f64>,
     turns: bool,
 ) -> Vec<Refined> {
-    let refine = |k: usize| {
-        let yaw_rad = drive.yaw_rate_radps * SWEEP_S;
-        let turn = GyroTurn {
-            yaw_rad: yaw_rad + BIAS_RADPS * SWEEP_S,
-            variance_rad2: 1e-9,
-            interval_s: SWEEP_S,
-            sweep_rate_radps: drive.yaw_rate_radps + BIAS_RADPS,
-        };
-        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
-        let distance = |factor: f64| WheelDistance {
-            distance_m: factor * (to_m - from_m),
-            variance_m2: 1e-4,
-            side_variance_m2: 1e-4,
-            interval_s: SWEEP_S,
-        };
-        refiner.aiding.turn = turns.then_some(turn);
-        refiner.aiding.distance = measured(k).map(distance);
-        // The search finds nothing where there is nothing.
-        let searched = match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
-            true => pose(-3.0, 4.0, 0.5),
-            false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
-        };
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let aiding = |k: usize| Aiding {
+        turn: turns.then(|| by_gyro(drive, BIAS_RADPS)),
+        distance: measured(k).map(|factor| by_wheels(drive, k, factor)),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(refine).collect()
+    // The search finds nothing where there is nothing.
+    let search = |k: usize| match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
+        true => pose(-3.0, 4.0, 0.5),
+        false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
+    };
+    refine_aided(refiner, scans, aiding, search)
 }
 
 #[test]

@@ -2,37 +2,20 @@
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{Pose, SparsePoint, pose};
-use gyre_samples::WheelDistance;
-use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
+use gyre_scan_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
 
-const LITTLE_NOISE: Sensor = Sensor {
-    noise_m: 0.05,
-    ..NOISY
-};
 const SCANS: usize = 100;
 /// The last houses are out of sight.
 const INSIDE: usize = 40;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-/// A vehicle that leaves a town for a tunnel and slows down there, and its scans.
-fn into_a_tunnel() -> (Drive, Vec<Vec<SparsePoint>>) {
-    between_walls_and(Vec::new())
-}
-
-/// As in a tunnel, but with something beside the walls.
-fn between_walls_and(more: Vec<Reflector>) -> (Drive, Vec<Vec<SparsePoint>>) {
-    let drive = Drive {
+/// A vehicle that slows down in the tunnel.
+fn slower() -> Drive {
+    Drive {
         acceleration_mps2: -0.2,
         ..Drive::steady(10.0, 0.0, SCANS)
-    };
-    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
-    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
-    // At every place of a wall another point in each scan: speckle.
-    let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
-    scene.extend(walls);
-    scene.extend(more);
-    (drive, scans(&scene, &drive, &LITTLE_NOISE))
+    }
 }
 
 fn refine_with(
@@ -53,20 +36,13 @@ fn refine_searched(
     refiner: &mut Refiner,
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),
     wheels: impl Fn(usize) -> Option<f64>,
-    mut search: impl FnMut(usize) -> Pose,
+    search: impl FnMut(usize) -> Pose,
 ) -> Vec<Refined> {
-    let mut refine = |k: usize| {
-        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
-        let distance = |factor: f64| WheelDistance {
-            distance_m: factor * (to_m - from_m),
-            variance_m2: 1e-4,
-            side_variance_m2: 1e-4,
-            interval_s: SWEEP_S,
-        };
-        refiner.aiding.distance = wheels(k).map(distance);
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
+    let aiding = |k: usize| Aiding {
+        distance: wheels(k).map(|factor| by_wheels(drive, k, factor)),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(&mut refine).collect()
+    refine_aided(refiner, scans, aiding, search)
 }
 
 fn inside(drive: &Drive, refined: &[Refined]) -> (Pose, f64) {
@@ -79,7 +55,8 @@ fn slid(refined: &Refined) -> bool {
 
 #[test]
 fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
-    let (drive, scans) = into_a_tunnel();
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let refined = refine_with(&mut refiner, (&drive, &scans), |_| Some(SCALE));
     assert!(!refined[..6].iter().any(slid), "houses tell the way");
@@ -106,7 +83,8 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
 
 #[test]
 fn radar_alone_says_that_it_does_not_know_how_far() {
-    let (drive, scans) = into_a_tunnel();
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut refiner(), (&drive, &scans), |_| None);
     assert!(refined[INSIDE..].iter().all(slid));
     let (off, sigma_m) = inside(&drive, &refined);
@@ -122,7 +100,8 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
 
 #[test]
 fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
-    let (drive, scans) = into_a_tunnel();
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
     let refined = refine_with(&mut refiner, (&drive, &scans), measured);
@@ -137,7 +116,8 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
 
 #[test]
 fn one_scan_without_wheels_inside_does_not_ask_the_search() {
-    let (drive, scans) = into_a_tunnel();
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let measured = |k: usize| (!k.is_multiple_of(5)).then_some(SCALE);
     // It is wrong, but not by so much as to contradict the wheels.
@@ -156,7 +136,8 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
-    let (drive, scans) = between_walls_and(posts);
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, posts);
     let search = |k: usize| searched(&drive, k - 1);
     for wheels in [None, Some(SCALE)] {
         let mut refiner = refiner();
