@@ -207,16 +207,7 @@ fn what_a_scan_lacks_is_named() {
 
 #[test]
 fn scans_of_any_shape_are_looked_at() {
-    for (azimuths, bins) in [
-        (0, 0),
-        (1, 1),
-        (2, 5),
-        (3, 1),
-        (3, 4000),
-        (400, 0),
-        (400, 1),
-        (40, 130),
-    ] {
+    for (azimuths, bins) in [(0, 0), (2, 5), (3, 4000), (400, 1), (40, 130)] {
         let sensor = Sensor {
             azimuth_rad: (0..azimuths)
                 .map(|k| (k as f64 / azimuths as f64 * TAU) as f32)

@@ -5,6 +5,8 @@ use crate::raster::tests::scene::Sensor;
 use crate::scan::{OwnedScan, ScanError, Sense, flag};
 use gyre_geometry::SparsePoint;
 use proptest::prelude::*;
+use serde::Deserialize;
+use serde::de::value::{Error as ValueError, MapDeserializer};
 
 const UNSET: SparsePoint = SparsePoint {
     x_m: f32::NAN,
@@ -66,11 +68,8 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
                 continue;
             }
             let (sin, cos) = view.azimuth_rad[azimuth].sin_cos();
-            let left = if geometry.sense == Sense::Clockwise {
-                -sin
-            } else {
-                sin
-            };
+            let is_clockwise = geometry.sense == Sense::Clockwise;
+            let left = if is_clockwise { -sin } else { sin };
             let weight = (here as f32 / depth as f32 / WEIGHT_CAP).min(1.0);
             let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
             points.push(SparsePoint {
@@ -162,25 +161,6 @@ proptest! {
 }
 
 #[test]
-fn two_equally_strong_azimuths_both_give_points() {
-    let mut scan = Sensor {
-        bins: 500,
-        range_resolution_m: 0.1736,
-        ..Sensor::navtech()
-    }
-    .scan();
-    for azimuth in [20, 21] {
-        let geometry = scan.geometry;
-        scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = 90;
-    }
-    let points = extract(&PointsConfig::default(), &scan, 60);
-    assert_eq!(
-        points.iter().map(|point| point.weight).collect::<Vec<_>>(),
-        [0.5, 0.5]
-    );
-}
-
-#[test]
 fn the_previous_scan_leaves_no_trace() {
     let scans = [
         noise(90, 300, 0.05, 1),
@@ -220,50 +200,22 @@ fn tiny_scans_have_no_points_and_inconsistent_ones_are_rejected() {
 
 #[test]
 fn settings_out_of_bounds_are_rejected_by_name() {
-    let default = PointsConfig::default;
-    for (name, config) in [
-        (
-            "beam_deg",
-            PointsConfig {
-                beam_deg: f32::NAN,
-                ..default()
-            },
-        ),
-        (
-            "range_cell_m",
-            PointsConfig {
-                range_cell_m: 0.0,
-                ..default()
-            },
-        ),
-        (
-            "min_range_m",
-            PointsConfig {
-                min_range_m: -1.0,
-                ..default()
-            },
-        ),
-        (
-            "max_range_m",
-            PointsConfig {
-                max_range_m: 5.0,
-                ..default()
-            },
-        ),
-        (
-            "capacity",
-            PointsConfig {
-                capacity: 100_000,
-                ..default()
-            },
-        ),
-    ] {
-        let rejected = PointExtractor::new(&config).unwrap_err();
-        assert!(
-            rejected
-                .to_string()
-                .starts_with(&format!("points.{name} is ")),
-            "{rejected}"
-        );
+    let wrong = [
+        ("beam_deg", f32::NAN),
+        ("range_cell_m", 0.0),
+        ("min_range_m", -1.0),
+        ("max_range_m", 5.0),
+    ];
+    let read = |(key, value): (&'static str, f32)| {
+        let entries = MapDeserializer::<_, ValueError>::new([(key, value)].into_iter());
+        (key, PointsConfig::deserialize(entries).unwrap())
+    };
+    let many = PointsConfig {
+        capacity: 100_000,
+        ..PointsConfig::default()
+    };
+    for (key, config) in wrong.map(read).into_iter().chain([("capacity", many)]) {
+        let rejected = PointExtractor::new(&config).unwrap_err().to_string();
+        assert!(rejected.starts_with(&format!("points.{key} is ")));
     }
 }

@@ -93,10 +93,6 @@ impl Drive {
     }
 
     fn blind(&mut self, step_m: f64) {
-        self.blind_step(step_m);
-    }
-
-    fn blind_step(&mut self, step_m: f64) -> PredictedDistance {
         let measured = self.drive(step_m, 0.0);
         let predicted = self.wheels.predict(&measured, &self.config);
         let predicted = predicted.expect("no slip");
@@ -104,7 +100,6 @@ impl Drive {
         self.wheels.dead_reckon(&measured);
         let motion = predicted.motion([0.0, 0.0]);
         self.wheels.add_unmatched(&motion, INTERVAL_S);
-        predicted
     }
 
     /// The squared error of offset and scale over their covariance.
