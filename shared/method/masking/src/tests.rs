@@ -83,23 +83,16 @@ fn points_start_above_the_threshold() {
         let count = masker.points(&wall().view(), None, &mut out).unwrap();
         (count, out[0].weight)
     };
-    assert_eq!(
-        count(&MaskingConfig::default()),
-        (20 * AZIMUTHS, 40.0 / 60.0)
-    );
-    assert_eq!(
-        count(&MaskingConfig {
-            threshold: 100,
-            ..MaskingConfig::default()
-        })
-        .0,
-        0
-    );
-    assert_eq!(
-        count(&MaskingConfig {
-            kind: MaskKind::None,
-            ..MaskingConfig::default()
-        }),
-        (20 * AZIMUTHS, 1.0)
-    );
+    let default = count(&MaskingConfig::default());
+    assert_eq!(default, (20 * AZIMUTHS, 40.0 / 60.0));
+    let high = MaskingConfig {
+        threshold: 100,
+        ..MaskingConfig::default()
+    };
+    assert_eq!(count(&high).0, 0);
+    let none = MaskingConfig {
+        kind: MaskKind::None,
+        ..MaskingConfig::default()
+    };
+    assert_eq!(count(&none), (20 * AZIMUTHS, 1.0));
 }

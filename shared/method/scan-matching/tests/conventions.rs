@@ -1,6 +1,6 @@
 //! Signs and frames, pinned by three points and no transform, and by single scatterers.
 
-use crate::common::{Motion, draw, scene_aside, search};
+use crate::common::{Motion, draw, pair_of, scene_aside, search};
 use gyre_scan_matching::{RotationMatch, TranslationConfig, TranslationSearch};
 
 const CELL_M: f64 = 0.5;
@@ -23,13 +23,7 @@ fn three_points_give_their_motion_back() {
         Motion::degrees(-1.5, 2.5, -9.0),
         Motion::degrees(3.0, 0.0, 90.0),
     ] {
-        let earlier = draw(points.iter().map(|&p| (p, 1.0)), N, CELL_M, 1.2);
-        let later = draw(
-            points.iter().map(|&p| (motion.seen_from_later(p), 1.0)),
-            N,
-            CELL_M,
-            1.2,
-        );
+        let (earlier, later) = pair_of(&points.map(|p| (p, 1.0)), N, CELL_M, 1.2, motion);
         let mut translation =
             TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
         let found = translation
@@ -61,13 +55,9 @@ fn scatterers_do_not_wrap_around_the_edges() {
         ..TranslationConfig::default()
     };
     let mut translation = TranslationSearch::new(N, CELL_M, &config).unwrap();
-    let found = translation
-        .search(
-            raster(&later).view(),
-            raster(&earlier).view(),
-            &known_angle(0.0),
-        )
-        .unwrap();
+    let (later, earlier) = (raster(&later), raster(&earlier));
+    let found = translation.search(later.view(), earlier.view(), &known_angle(0.0));
+    let found = found.unwrap();
     assert!(found.score < 1e-3, "{found:?}");
 }
 
@@ -89,7 +79,7 @@ fn the_scene_behind_the_lever_moves_with_the_angle() {
         let predicted = middle.covariance[(axis, 2)] / variance;
         assert!(
             (predicted - seen).abs() < 1.5,
-            "axis {axis}: predicted {predicted}, seen {seen}"
+            "axis {axis}: {predicted} {seen}"
         );
     }
     assert!(slope[1] < -10.0, "{slope:?}");

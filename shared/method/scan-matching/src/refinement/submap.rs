@@ -123,22 +123,6 @@ mod tests {
     }
 
     #[test]
-    fn the_doppler_shift_of_opposite_passes_is_removed() {
-        // A wall 20 m ahead is measured 0.42 m too near at 10 m/s; on the way back, behind, 0.42 m
-        // too far.
-        let ahead = SparsePoint::from([19.58, 0.0, 0.0, 1.0, 0.042]);
-        let behind = SparsePoint::from([-20.42, 0.0, 0.0, 1.0, 0.042]);
-        let twist = Twist {
-            vx_mps: 10.0,
-            ..Twist::default()
-        };
-        let mut submap = Submap::default();
-        submap.start(&[ahead, behind], &twist);
-        assert!((submap.all.x_m[0] - 20.0).abs() < 1e-5);
-        assert!((submap.all.x_m[1] + 20.0).abs() < 1e-5);
-    }
-
-    #[test]
     fn a_raster_that_is_not_square_is_refused() {
         let mut raster = Array2::zeros((4, 5));
         assert!(Submap::default().draw(1.0, raster.view_mut()).is_err());
