@@ -7,9 +7,7 @@ use crate::Pose;
 /// A constant velocity in the moving frame: motion along a circular arc or a straight line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
-    /// Forward speed, m/s.
     pub vx_mps: f64,
-    /// Speed to the left, m/s.
     pub vy_mps: f64,
     /// Yaw rate, counter-clockwise, rad/s.
     pub yaw_rate_radps: f64,
@@ -79,7 +77,6 @@ impl Twist {
         }
     }
 
-    /// Interpolates linearly from this twist (`share` 0) to `other` (1).
     pub fn lerp(&self, other: &Self, share: f64) -> Self {
         let between = |a: f64, b: f64| a * (1.0 - share) + b * share;
         Self {

@@ -28,7 +28,6 @@ pub struct Odometry {
     finder: LostAzimuthFinder,
     lost: LostAzimuths,
     rows: PlacedRows,
-    /// The scan that is being registered and the one before it.
     pair: Pair,
     driven: ComposedMotion,
 }

@@ -21,18 +21,14 @@ pub struct Pair {
     pub(crate) distance: Option<WheelDistance>,
 }
 
-/// The products of a scan.
 pub(crate) struct Frame {
     stamp_ns: i64,
-    /// The velocity for the motion compensation.
     pub twist: Option<Twist>,
     /// Variance of the mean azimuth of the rows: not zero if azimuths were lost at unknown places.
     pub azimuth_variance_rad2: f32,
-    /// The velocity by Doppler.
     pub velocity: Option<DopplerVelocity>,
     pub raster: Array2<f32>,
     points: Vec<SparsePoint>,
-    /// Number of points in use.
     count: usize,
 }
 
@@ -131,7 +127,6 @@ impl Pair {
         self.seq == 0 || continues(self.earlier.stamp_ns, stamp_ns)
     }
 
-    /// Makes the later scan the earlier one.
     pub(crate) fn advance(&mut self) {
         std::mem::swap(&mut self.later, &mut self.earlier);
         self.seq += 1;

@@ -9,9 +9,7 @@ use crate::{DecoupledSearch, OdometryConfig, Search, SearchKind, SetupError};
 /// configuration. [`Masker::with_function`] has a mask of your own, and `examples/own_search.rs`
 /// replaces the search.
 pub struct Parts {
-    /// Makes masked rasters and points.
     pub masker: Masker,
-    /// Searches the motion between two masked scans.
     pub search: Box<dyn Search>,
     /// Refines the searched motion; `None`: it is the result.
     pub refiner: Option<Refiner>,

@@ -10,7 +10,6 @@ use thiserror::Error;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
-    /// Sequence number in the chain of motions, from 0.
     pub seq: u64,
     /// The pose of this scan's frame in the previous scan's frame, with its covariance. The
     /// identity where the chain starts.
@@ -19,9 +18,7 @@ pub struct Registered {
     pub pose: UncertainMotion,
     pub outcome: Outcome,
     pub interval_ns: i64,
-    /// The result of the search; `None` where the chain starts.
     pub searched: Option<JointMatch>,
-    /// The result of the refinement; `None` without one.
     pub refined: Option<Refined>,
 }
 
@@ -35,7 +32,6 @@ impl Registered {
     }
 }
 
-/// The origin of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// No previous scan: the chain of motions starts here.

@@ -45,11 +45,8 @@ pub mod flag {
 pub struct SweepGeometry {
     pub azimuths: usize,
     pub bins: usize,
-    /// Bytes between the first bins of consecutive azimuths.
     pub stride: usize,
-    /// Index of the first azimuth's first bin.
     pub first_byte: usize,
-    /// Depth of a range bin, m.
     pub range_resolution_m: f32,
     /// Offset of the ranges, m: the centre of bin `b` is at
     /// `(b + 0.5) * range_resolution_m + range_offset_m`.
@@ -75,12 +72,10 @@ pub struct PolarScan<'a> {
     pub azimuth_rad: &'a [f32],
     /// Time of each azimuth, ns since 1970, on the sensor's clock.
     pub stamp_ns: &'a [i64],
-    /// Flags of each azimuth; see [`flag`].
     pub flags: &'a [u8],
 }
 
 impl<'a> PolarScan<'a> {
-    /// Returns the powers of one azimuth, nearest bin first.
     pub fn row(&self, azimuth: usize) -> &'a [u8] {
         let first = self.geometry.first_byte + azimuth * self.geometry.stride;
         &self.bytes[first..first + self.geometry.bins]
@@ -138,13 +133,9 @@ impl<'a> PolarScan<'a> {
 /// [`ScanLimits`].
 #[derive(Debug)]
 pub struct ScanSlot<'a> {
-    /// Bytes of the image.
     pub bytes: &'a mut [u8],
-    /// See [`PolarScan::azimuth_rad`].
     pub azimuth_rad: &'a mut [f32],
-    /// See [`PolarScan::stamp_ns`].
     pub stamp_ns: &'a mut [i64],
-    /// See [`PolarScan::flags`].
     pub flags: &'a mut [u8],
 }
 
@@ -152,22 +143,16 @@ pub struct ScanSlot<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanLimits {
     pub bytes: usize,
-    /// Number of azimuths, at most [`MAX_AZIMUTHS`].
     pub azimuths: usize,
 }
 
 /// A scan that owns its memory: for tests, tools and generators.
 #[derive(Clone, Debug)]
 pub struct OwnedScan {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
-    /// All bytes of the scan.
     pub bytes: Vec<u8>,
-    /// See [`PolarScan::azimuth_rad`].
     pub azimuth_rad: Vec<f32>,
-    /// See [`PolarScan::stamp_ns`].
     pub stamp_ns: Vec<i64>,
-    /// See [`PolarScan::flags`].
     pub flags: Vec<u8>,
 }
 

@@ -8,7 +8,6 @@ pub struct Trajectory {
     /// Time of each pose, ns (since 1970 in recordings), non-decreasing; `None` if the source has
     /// no times.
     pub stamp_ns: Option<Vec<i64>>,
-    /// Pose of the sensor in the world frame, one per stamp.
     pub poses: Vec<Pose>,
 }
 
@@ -24,7 +23,6 @@ impl Trajectory {
         self.poses.is_empty()
     }
 
-    /// Length of the path, m: the sum of the distances between consecutive poses.
     pub fn path_length_m(&self) -> f64 {
         self.poses
             .windows(2)

@@ -15,7 +15,6 @@ use crate::kernels;
 pub(crate) struct KeptCorrelation {
     n: usize,
     size: usize,
-    /// The wanted shifts down, as rows of the transform.
     shifts: Arc<[usize]>,
     rows: RowPass,
     columns: Transform,
@@ -50,7 +49,6 @@ impl KeptCorrelation {
         }
     }
 
-    /// The factor that scales the correlations: one over the cells of the transform.
     pub fn scale(&self) -> f64 {
         1.0 / (self.size * self.size) as f64
     }

@@ -37,7 +37,6 @@ const OFFSET: f64 = 0.211_324_865_405_187_1;
 /// unknowns.
 const VARIANCE_SCALE: f64 = 0.015;
 
-/// The motion between two scans, and its angle alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointMatch {
     /// The angle; its runner-up is the next highest local maximum over the angles.
@@ -90,7 +89,6 @@ struct Candidate {
 
 struct JointPeak {
     prior_rad: f64,
-    /// The nearest angle of the grid.
     best: usize,
     angle_rad: f64,
     over_angles: LinePeak,
@@ -253,7 +251,6 @@ impl ExhaustiveSearch {
         line_peak(self.config.peak, |by| self.at(self.angles.beside(best, by)))
     }
 
-    /// The next highest local maximum over the angles.
     fn angle_runner_up(&self, best: usize) -> Option<usize> {
         let summit = |k: usize| (-1..=1).all(|by| self.at(self.angles.beside(k, by)) <= self.at(k));
         let others =
@@ -345,7 +342,6 @@ impl ExhaustiveSearch {
         [here, there].into_iter().flatten().reduce(higher)
     }
 
-    /// The k-th angle, in (-pi, pi].
     fn angle(&self, found: &JointPeak, k: usize) -> f64 {
         wrap_angle(found.prior_rad + self.angles.angle(k as f64))
     }

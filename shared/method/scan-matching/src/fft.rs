@@ -63,7 +63,6 @@ impl Columns {
         &mut self.data[c * self.stride..][..self.len]
     }
 
-    /// The first `count` columns, gaps between them included.
     fn first_mut(&mut self, count: usize) -> &mut [Complex32] {
         &mut self.data[..count * self.stride]
     }
@@ -137,7 +136,6 @@ impl Transform {
     }
 }
 
-/// First pass of a complex transform: along the rows that are not zero.
 pub(crate) struct RowPass {
     row: Transform,
     block: Vec<Complex32>,

@@ -84,7 +84,6 @@ pub(crate) fn plane_peak(kind: Peak, sample: impl Fn(isize, isize) -> f64) -> Pl
     }
 }
 
-/// The pedestal of a Gaussian peak of height `highest`, from the samples around it.
 fn pedestal(around: impl Iterator<Item = f64>, highest: f64) -> f64 {
     let lowest = around.fold(highest, f64::min);
     lowest - PEDESTAL_MARGIN * (highest - lowest)

@@ -57,7 +57,6 @@ const MIN_SUPPORT: f64 = 0.6;
 const SEARCH_AGREES_M: f64 = 2.0;
 const SEARCH_AGREES_DEG: f64 = 6.0;
 
-/// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     Refined,
@@ -78,13 +77,9 @@ pub struct Refined {
     pub outcome: Outcome,
     /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
-    /// The vehicle stands: the motion is zero.
     pub stationary: bool,
-    /// The bias of the gyro; `None` where it has not measured the turn.
     pub gyro: Option<GyroBias>,
-    /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
-    /// The scale of the velocity by Doppler; `None` if one of both scans does not determine it.
     pub doppler: Option<WheelScale>,
 }
 
@@ -92,7 +87,6 @@ struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
     guess: InitialGuess,
-    /// Displacement by the search beyond a predicted place, m.
     ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
     leaves_map: bool,
@@ -121,12 +115,10 @@ pub struct Refiner {
     gyro: GyroConfig,
     wheels: WheelsConfig,
     doppler: DopplerConfig,
-    /// [`DopplerConfig::as_wheels`].
     doppler_as_wheels: WheelsConfig,
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
-    /// The points of an alternative match.
     other_points: DeskewedPoints,
     pub aiding: Aiding,
     displacement: Option<DopplerDisplacement>,
@@ -238,7 +230,6 @@ impl Refiner {
         self.state = state;
     }
 
-    /// Returns the state that the next motion depends on, apart from the keyframes.
     pub fn state(&self) -> &TrackerState {
         &self.state
     }
@@ -369,7 +360,6 @@ impl Refiner {
         self.fits_firmly(best) && self.agrees_with_search(scan, best, undetermined)
     }
 
-    /// Returns whether the scan overlaps the map well and has enough points.
     fn fits_firmly(&self, best: &Candidate) -> bool {
         best.overlap >= self.config.firm_overlap * self.state.mean_overlap
             && best.support >= MIN_SUPPORT

@@ -45,7 +45,6 @@ pub struct RotationMatch {
     /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no
     /// match.
     pub score: f64,
-    /// The highest other local maximum within reach.
     pub runner_up: Option<RotationRunnerUp>,
 }
 
@@ -119,8 +118,6 @@ impl RotationSearch {
         })
     }
 
-    /// Returns an empty spectrum of this search's shape, to be filled by
-    /// [`spectrum`](Self::spectrum).
     pub fn new_spectrum(&self) -> PolarSpectrum {
         PolarSpectrum::new(self.grid.angles, self.profiles())
     }
@@ -168,7 +165,6 @@ impl RotationSearch {
         Ok(self.best_match(self.shifts_near(turn_rad)))
     }
 
-    /// Number of profiles along the angle that are compared: one per radius, or one in all.
     fn profiles(&self) -> usize {
         if self.config.form == RotationForm::Eq7 {
             self.grid.radii
@@ -244,7 +240,6 @@ impl RotationSearch {
         self.correlation.iter_mut().for_each(|c| *c *= scale);
     }
 
-    /// The correlation at a shift of `k` samples, on the circle.
     fn at(&self, k: isize) -> f64 {
         f64::from(self.correlation[k.rem_euclid(self.grid.angles as isize) as usize])
     }

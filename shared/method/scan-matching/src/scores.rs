@@ -12,7 +12,6 @@ use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
 /// Half width of the neighbourhood where a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
 
-/// A shift (down, right), cells.
 pub(crate) type Shift = (isize, isize);
 
 /// Scores of all shifts of up to `reach + SUPPORT` cells; maxima are looked for within `reach`.
@@ -21,7 +20,6 @@ pub(crate) struct Scores {
     reach: isize,
     /// Row (and column) of the transform for each shift.
     wrapped: Arc<[usize]>,
-    /// Row after row.
     values: Vec<f32>,
 }
 
@@ -32,7 +30,6 @@ impl Scores {
         n + Self::around(reach)
     }
 
-    /// Largest shift that has a score.
     pub fn around(reach: usize) -> usize {
         reach + SUPPORT
     }
@@ -55,7 +52,6 @@ impl Scores {
         self.wrapped.clone()
     }
 
-    /// Fills row `r` of the scores from the same row of the transform.
     pub fn fill<T: Copy>(&mut self, r: usize, row: &[T], score: impl Fn(T) -> f32) {
         let side = self.wrapped.len();
         for (value, &column) in self.values[r * side..][..side]
@@ -111,7 +107,6 @@ impl Scores {
         (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| ((i, j), self.at(i, j))))
     }
 
-    /// The shift of the highest score, if any is above zero.
     pub fn highest(&self) -> Option<Shift> {
         let finite = self.scored().filter(|(_, score)| score.is_finite());
         let best = finite.fold(None, |best: Option<(Shift, f64)>, new| match best {
@@ -125,7 +120,6 @@ impl Scores {
         plane_peak(kind, |i, j| self.at(best.0 + i, best.1 + j))
     }
 
-    /// The peak's place in cells (down, right).
     pub fn place(&self, kind: Peak, best: Shift, peak: &PlanePeak) -> Vector2<f64> {
         match kind {
             Peak::SoftArgmax { temperature } => {
@@ -138,7 +132,6 @@ impl Scores {
         }
     }
 
-    /// The highest local maximum outside the best peak.
     pub fn runner_up(&self, best: Shift) -> Option<(Shift, f64)> {
         let apart = |(i, j): Shift| (i - best.0).abs().max((j - best.1).abs()) > SAME_PEAK_CELLS;
         let summit = |(i, j): Shift, score: f64| {

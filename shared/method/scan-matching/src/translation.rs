@@ -36,7 +36,6 @@ pub struct MotionMatch {
     pub covariance: Matrix3<f64>,
     /// Correlation coefficient at the peak, at most 1; 0 if there is no match.
     pub score: f64,
-    /// The highest other local maximum within reach.
     pub runner_up: Option<MotionRunnerUp>,
 }
 

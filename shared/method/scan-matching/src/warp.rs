@@ -34,7 +34,6 @@ impl Rotation {
         }
     }
 
-    /// This rotation with each lookup `offset` cells farther down and to the right.
     pub fn with_offset(self, offset: [f64; 2]) -> Self {
         Self { offset, ..self }
     }

@@ -32,18 +32,15 @@ const DEPENDENT_AZIMUTHS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct Fit {
     seen: Vec<Seen>,
-    /// Absolute residuals, for their median.
     sizes: Vec<f64>,
 }
 
-/// The approach at a bearing.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     azimuth: usize,
     direction: Vector2<f64>,
     /// Measured approach less the fitted velocity's, m/s.
     residual_mps: f64,
-    /// By the height of its peak.
     weight: f64,
 }
 
@@ -96,7 +93,6 @@ impl Fit {
         }));
     }
 
-    /// The residual beyond which a bearing has no weight, m/s.
     fn cutoff_mps(&mut self, rows: &[RowShifts]) -> f64 {
         self.sizes.clear();
         let sizes = self.seen.iter().map(|seen| seen.residual_mps.abs());
@@ -153,7 +149,6 @@ impl Fit {
     }
 }
 
-/// Returns the velocity with the highest sum of the correlations of all rows.
 fn vote(rows: &[RowShifts]) -> Vector2<f64> {
     let cell_mps = rows[0].mps_per_lag.abs();
     let reach = REACH as i32;

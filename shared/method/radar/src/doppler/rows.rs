@@ -27,7 +27,6 @@ const RINGING_M: f32 = 2.5;
 pub(super) struct Rows {
     layout: Layout,
     powers: Vec<f32>,
-    /// The bins and the cells of a row.
     bins: Vec<u8>,
     sums: Vec<u16>,
 }
@@ -36,11 +35,9 @@ pub(super) struct Rows {
 pub(super) struct Layout {
     bins_per_cell: usize,
     first_bin: usize,
-    /// Cells of a row.
     cells: usize,
     /// Cells before and behind it that are not empty.
     beside: [usize; 2],
-    /// Depth of a cell, m.
     pub cell_m: f32,
 }
 
@@ -67,14 +64,12 @@ impl Layout {
         }
     }
 
-    /// Cells of a row with the empty ones.
     fn stride(&self) -> usize {
         self.cells + WIDTH
     }
 }
 
 impl Rows {
-    /// Computes the cells of a checked scan.
     pub fn update(&mut self, scan: &PolarScan<'_>, min_range_m: f32) {
         let layout = Layout::of(scan, min_range_m);
         let (azimuths, stride) = (scan.geometry.azimuths, layout.stride());
@@ -117,7 +112,6 @@ impl Rows {
     }
 }
 
-/// Returns the median power of these bins of all rows.
 fn median(scan: &PolarScan<'_>, bins: std::ops::Range<usize>) -> u8 {
     let mut counts = [0_u32; 256];
     for azimuth in (0..scan.geometry.azimuths).step_by(MEDIAN_STEP) {

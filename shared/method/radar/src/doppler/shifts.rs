@@ -9,7 +9,6 @@ use super::{
 };
 use crate::scan::{PolarScan, Sense};
 
-/// Shifts that are looked at.
 pub(super) const LAGS: usize = 2 * REACH + 1;
 /// The mean of this many shifts on either side, about a metre, is subtracted from the correlation.
 /// Walls along the beam, at places of their own, correlate broadly; only the scatterers that both
@@ -23,7 +22,6 @@ const MIN_SHARE: f32 = 0.5;
 #[derive(Debug, Default)]
 pub(super) struct Shifts {
     rows: Vec<RowShifts>,
-    /// The sum of both neighbours.
     beside: Vec<f32>,
 }
 
@@ -44,13 +42,11 @@ pub(super) struct RowShifts {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peak {
-    /// Shift, cells.
     pub lag: f64,
     pub height: f64,
 }
 
 impl Shifts {
-    /// Correlates the rows of a checked scan.
     pub fn update(&mut self, scan: &PolarScan<'_>, rows: &Rows) {
         self.rows.clear();
         self.rows.reserve(scan.geometry.azimuths);
@@ -128,7 +124,6 @@ impl RowShifts {
     }
 }
 
-/// Returns the place of the highest value, and the value.
 fn highest(values: &[f32; WIDTH], places: std::ops::Range<usize>) -> (usize, f32) {
     let mut best = (places.start, values[places.start]);
     for at in places {
@@ -161,7 +156,6 @@ fn mps_per_lag(scan: &PolarScan<'_>, cell_m: f32, azimuth: usize) -> f64 {
 fn correlate(row: &[f32], beside: &[f32], sums: &mut [f32; WIDTH]) {
     let mut totals = [0.0_f32; WIDTH];
     for (power, shifted) in row.iter().zip(beside.windows(WIDTH)) {
-        // Most cells are empty.
         if let Some(shifted) = shifted.first_chunk::<WIDTH>().filter(|_| *power > 0.0) {
             for (total, other) in totals.iter_mut().zip(shifted) {
                 *total += power * other;

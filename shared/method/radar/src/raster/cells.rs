@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 /// Cells per iteration of the vectorised loops.
 pub(super) const BLOCK: usize = 32;
 
-/// One value per cell of a block.
 pub(super) type Block<T> = [T; BLOCK];
 
 /// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points towards
@@ -23,14 +22,11 @@ pub(super) struct Cells {
     z_m: Vec<Block<f32>>,
     /// Bearing from straight ahead towards `z`, turns in `[0, 1]`, row by row.
     bearing: Vec<Block<f32>>,
-    /// Range, m, row by row.
     range_m: Vec<Block<f32>>,
-    /// Range of the corners, m.
     pub max_range_m: f32,
 }
 
 pub(super) struct CellRow<'a> {
-    /// x of the row, m.
     pub x_m: f32,
     /// See [`Cells`]; all three have the same number of blocks.
     pub z_m: &'a [Block<f32>],

@@ -16,7 +16,6 @@ pub(super) struct PolarImage {
     samples: Vec<u16>,
     /// Piecewise sums of one azimuth, padded with zeros by the reach of the window.
     pieces: Vec<u16>,
-    /// Powers above the floor of one azimuth.
     above_floor: Vec<u8>,
     /// Samples of one azimuth before Doppler compensation.
     measured: Vec<u16>,
@@ -49,7 +48,6 @@ impl Layout {
         self.window.reach() + 1
     }
 
-    /// Number of columns; the last two are empty.
     fn stride(&self) -> usize {
         self.lead() + self.pieces + self.window.reach() + 2
     }
@@ -147,7 +145,6 @@ impl PolarImage {
         1.0 / self.layout.piece_m()
     }
 
-    /// The fractional column at range 0.
     pub fn column_at_sensor(&self, range_offset_m: f32) -> f32 {
         self.layout.lead() as f32 - 0.5 - range_offset_m / self.layout.piece_m()
     }

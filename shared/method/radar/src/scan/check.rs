@@ -25,12 +25,7 @@ pub enum ScanError {
     #[error(
         "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
     )]
-    StampOrder {
-        /// The row, from 0.
-        row: usize,
-        /// Difference to the earlier stamp, s.
-        back_s: f64,
-    },
+    StampOrder { row: usize, back_s: f64 },
     #[error(
         "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
@@ -40,10 +35,7 @@ pub enum ScanError {
         max_s: f64,
     },
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
-    StampApart {
-        /// Stamp of the scan minus the stamp of the first row, s.
-        apart_s: f64,
-    },
+    StampApart { apart_s: f64 },
     #[error("azimuth {index} of the scan is at {value} rad")]
     Azimuth { index: usize, value: f32 },
 }

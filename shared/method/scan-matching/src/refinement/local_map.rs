@@ -17,7 +17,6 @@ use super::{
 const KEYFRAME_DISTANCE_M: f64 = 1.5;
 const KEYFRAME_ANGLE_DEG: f64 = 3.0;
 
-/// A scan that is part of the local map.
 #[derive(Debug, Clone)]
 pub struct Keyframe {
     pub id: u64,
@@ -69,7 +68,6 @@ impl LocalMap {
         }
     }
 
-    /// Cells of both images of a keyframe.
     pub fn keyframe_cells(&self) -> usize {
         self.levels.iter().map(|level| level.n.pow(2)).sum()
     }
@@ -133,7 +131,6 @@ impl LocalMap {
         self.levels[1].view()
     }
 
-    /// The fine image of each keyframe, and its [`Keyframe::ahead_m`].
     pub fn fine_images(&self) -> impl Iterator<Item = (&Image, Vector2<f64>)> {
         self.used.iter().map(|it| (&it.images[0], it.ahead_m))
     }

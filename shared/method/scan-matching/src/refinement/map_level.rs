@@ -16,13 +16,11 @@ const BLUR_REACH: usize = 3;
 /// Cells along an axis over which a point is spread: it is between two cells, which are both
 /// blurred.
 const SPREAD: usize = 2 * BLUR_REACH + 2;
-/// Cells that are worked on together.
 const CHUNK: usize = 16;
 // A row of a point's cells lies within two chunks.
 const _: () = assert!(SPREAD <= CHUNK + 1);
 /// The farthest cell from the origin: a damaged checkpoint may contain any number.
 const FARTHEST: f64 = 1e15;
-/// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
 
 const SQUARE: &str = "an image has n x n cells";
@@ -32,9 +30,7 @@ const SQUARE: &str = "an image has n x n cells";
 pub(super) struct Image {
     /// The map's cell (x, y) that the first value belongs to.
     pub corner: [i64; 2],
-    /// Cells a side.
     n: usize,
-    /// Metres a cell.
     cell_m: f64,
     /// Row after row. Rows are of equal x, which grows with the row; y grows within a row.
     pub cells: Vec<u8>,
@@ -81,11 +77,9 @@ pub(super) struct MapLevel {
     /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few
     /// cells more than n x n.
     drawing: Vec<f32>,
-    /// True if there is anything in a chunk of the drawing.
     drawn: Vec<bool>,
 }
 
-/// A level as alignments read it.
 pub(super) struct MapView<'a> {
     /// Sums of the images, row after row; divided by `full` they are shares from 0 to 1.
     pub sum: &'a [u16],
@@ -177,13 +171,10 @@ impl MapLevel {
 }
 
 struct Drawing {
-    /// Of the scan, in map coordinates.
     pose: Pose,
     /// The map's cell (x, y) that the drawing begins with.
     corner: [i64; 2],
-    /// Cells a metre.
     per_m: f64,
-    /// Cells a side.
     n: usize,
 }
 
@@ -254,7 +245,6 @@ fn mean(drawing: &[f32], drawn: &[bool]) -> f32 {
     }
 }
 
-/// Saturates the cells that are drawn, and clears the drawing.
 #[simd]
 fn saturate(drawing: &mut [f32], drawn: &mut [bool], mean: f32, cells: &mut [u8]) {
     cells.fill(0);

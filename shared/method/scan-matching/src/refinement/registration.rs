@@ -57,7 +57,6 @@ pub(super) struct Registration<'a> {
     pub points: &'a mut DeskewedPoints,
 }
 
-/// An alignment on the fine map and how well it fits.
 pub(super) struct Candidate {
     pub guess: InitialGuess,
     pub alignment: Alignment,
@@ -65,7 +64,6 @@ pub(super) struct Candidate {
     /// Sum of the points' weights, and the same as a share of its running mean.
     pub weight: f64,
     pub support: f64,
-    /// The scan overlaps the map about as much as the scans before.
     pub fits: bool,
     /// So it does, and a vehicle can have driven there.
     pub is_plausible: bool,
@@ -173,7 +171,6 @@ impl Registration<'_> {
         fine(&pose)
     }
 
-    /// Aligns the scan from a pose whose place in a direction along the map's axes stays.
     pub fn align_across(
         &mut self,
         guess: InitialGuess,
@@ -185,7 +182,6 @@ impl Registration<'_> {
         self.assess(guess, alignment)
     }
 
-    /// Deskews the scan with the motion that leads to `pose`.
     pub fn deskew(&mut self, pose: &Pose) {
         let twist = self.state.twist_to(pose, &self.scan.step);
         self.points.deskew(self.scan.points, &twist);

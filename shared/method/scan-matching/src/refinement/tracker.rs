@@ -16,7 +16,6 @@ const TWIST_GAIN: f64 = 0.5;
 /// Weight of the newest scan in the running means of overlap and weight.
 const FIT_GAIN: f64 = 0.2;
 
-/// The pose of the vehicle, the scans it is predicted from, and how well scans match on average.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackerState {
     /// Pose of the last scan in the first one's frame.
@@ -26,9 +25,7 @@ pub struct TrackerState {
     pub anchors: [Option<Anchor>; 2],
     pub mean_overlap: f64,
     pub mean_weight: f64,
-    /// Number of scans in a row that were weak or predicted.
     pub doubtful: u32,
-    /// Number of scans in a row that were predicted.
     pub unmatched: u32,
     /// Number of scans in a row, but for predicted ones, whose place along walls without structure
     /// was the predicted one.
@@ -37,7 +34,6 @@ pub struct TrackerState {
     pub sliding: u32,
     /// Displacement by the search beyond such guesses, m, along the axes of the map.
     pub ahead_m: Vector2<f64>,
-    /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
     /// The bias of the gyro, and the like; `None` until it has measured a turn.
     pub heading: Option<Heading>,
@@ -48,12 +44,9 @@ pub struct TrackerState {
     pub doppler: Option<WheelState>,
 }
 
-/// The time, the turn and the distance since the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
-    /// Time since the scan before, s.
     pub interval_s: f64,
-    /// The turn since then, by the gyro.
     pub turn: Option<PredictedTurn>,
     /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
@@ -66,12 +59,10 @@ impl Step {
     }
 }
 
-/// A refined scan for predicting the next poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     pub pose: Pose,
     pub twist: Twist,
-    /// Time from its stamp to the last scan's, s.
     pub age_s: f64,
 }
 

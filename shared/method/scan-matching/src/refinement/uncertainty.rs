@@ -15,7 +15,6 @@ use super::{
     tracker::Step,
 };
 
-/// Factor on the covariance of a weak match.
 pub(super) const WEAK_FACTOR: f64 = 4.0;
 /// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero,
 /// since edges of a pose graph need a covariance that has an inverse.
@@ -28,9 +27,7 @@ pub(super) struct Uncertainty {
     of_step: Matrix3<f64>,
     /// The same behind the predictions in a row before it.
     of_prediction: Matrix3<f64>,
-    /// Predictions in a row whose error a match takes back.
     predictions: u32,
-    /// The covariance of all of these.
     of_predictions: Matrix3<f64>,
     /// The share of a match's covariance that makes the map drift.
     of_map: f64,
