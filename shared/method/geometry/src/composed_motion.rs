@@ -72,7 +72,6 @@ impl OdometryMotion {
         turn * self.noise() * turn.transpose()
     }
 
-    /// The noise of one of its poses.
     fn noise(&self) -> Matrix3<f64> {
         self.covariance * (0.5 * (1.0 - self.drift_share))
     }
@@ -100,7 +99,6 @@ impl ComposedMotion {
         Self::resume(UncertainMotion::identity(), Matrix3::zeros())
     }
 
-    /// Starts with the first of some motions, at a pose with noise.
     pub fn of(first: &OdometryMotion) -> Self {
         // A vehicle that stands keeps the noise that the pose has here.
         let start = UncertainMotion {

@@ -52,10 +52,8 @@ pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -y_m, 0.0, 1.0, x_m, 0.0, 0.0, 1.0)
 }
 
-/// A motion, or a pose, with the covariance of its (x, y, yaw).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainMotion {
-    /// The pose of the later frame in the earlier one.
     pub motion: Pose,
     /// The covariance of (x, y, yaw) along the axes of the earlier frame.
     pub covariance: Matrix3<f64>,

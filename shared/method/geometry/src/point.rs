@@ -12,9 +12,7 @@ use crate::Twist;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SparsePoint {
-    /// Forward of the sensor at the time of the point's azimuth, m.
     pub x_m: f32,
-    /// To the left of it, m.
     pub y_m: f32,
     /// Time of the azimuth relative to the scan's stamp, s.
     pub time_s: f32,

@@ -22,7 +22,6 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// The name of the library.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "ONNX Runtime or rten",
@@ -59,7 +58,6 @@ impl fmt::Display for Provider {
     }
 }
 
-/// Reads a backend of a configuration.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
     let name = String::deserialize(source)?;
     if name == "tract" {

@@ -66,7 +66,6 @@ pub enum MaskKind {
     Learned,
 }
 
-/// Settings of `[masking]` that do not fit.
 #[derive(Debug, Error, PartialEq)]
 #[error("{0}")]
 pub struct MaskingConfigError(String);
@@ -115,7 +114,6 @@ impl MaskingConfig {
         }))
     }
 
-    /// Returns the highest power that is set to zero.
     pub fn floor(&self) -> u8 {
         match self.kind {
             MaskKind::None => 0,

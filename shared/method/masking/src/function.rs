@@ -55,7 +55,6 @@ pub trait MaskFunction: fmt::Debug + Send + Sync {
     ) -> Result<Factors, Box<dyn Error + Send + Sync>>;
 }
 
-/// Factors from 0 to 1.
 #[derive(Debug)]
 pub enum Factors {
     /// Of the powers, azimuth x range bin: raster and points are made from the masked powers.
@@ -65,7 +64,6 @@ pub enum Factors {
     OfRaster(Array2<f32>),
 }
 
-/// A function, and its result for the last scan.
 #[derive(Debug)]
 pub(crate) struct AppliedFunction {
     function: Box<dyn MaskFunction>,

@@ -6,10 +6,8 @@ use crate::networks::runtime::{self, RuntimeError};
 
 use crate::{Backend, MaskingConfig, Provider};
 
-/// The library that a configuration chooses on this machine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Library {
-    /// ONNX Runtime, with the path of its library.
     OnnxRuntime(PathBuf),
     Rten,
 }

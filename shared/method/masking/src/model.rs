@@ -19,7 +19,6 @@ const MAX_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Card {
     pub model: NetworkFacts,
-    /// The rasters that it was trained on.
     pub raster: RasterFacts,
     /// The processing of these rasters; optional.
     #[serde(default)]
@@ -30,19 +29,16 @@ pub struct Card {
 pub struct NetworkFacts {
     /// The model's file, in the folder of the card.
     pub file: PathBuf,
-    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
     pub inputs: usize,
     pub opset: u32,
 }
 
-/// The section `[raster]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct RasterFacts {
     pub n: usize,
     pub cell_m: f32,
     pub sampling: Option<Sampling>,
-    /// Ranges below this are left out, m.
     pub min_range_m: Option<f32>,
     /// Width of the average of [`Sampling::Averaged`], in cells.
     pub averaged_cells: Option<f32>,
@@ -53,9 +49,7 @@ pub struct RasterFacts {
 pub struct MaskingFacts {
     /// The highest power that was set to zero.
     pub floor: Option<u8>,
-    /// True if rasters were motion-compensated.
     pub compensate: Option<bool>,
-    /// True if the Doppler shift of ranges was compensated.
     pub undo_doppler: Option<bool>,
 }
 
@@ -64,7 +58,6 @@ pub struct MaskingFacts {
 pub struct Model {
     pub card: Card,
     pub file: PathBuf,
-    /// The content of the file.
     pub bytes: Vec<u8>,
 }
 

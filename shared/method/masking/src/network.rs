@@ -44,7 +44,6 @@ impl NetworkError {
     }
 }
 
-/// A network that computes masks from rasters.
 #[derive(Debug)]
 pub struct Network {
     engine: Engine,
@@ -123,7 +122,6 @@ fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), Network
     Ok((engine, inputs, outputs))
 }
 
-/// Copies computed factors, clamped to 0 to 1.
 fn fill(mut masks: ArrayViewMut3<'_, f32>, computed: &[f32]) -> Result<(), NetworkError> {
     let cells = masks.len();
     let Some(masks) = masks.as_slice_mut().filter(|_| cells == computed.len()) else {

@@ -7,11 +7,8 @@ use ndarray::ArrayView2;
 /// The properties of a raster that determine a point's cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterFrame {
-    /// Cells per side.
     pub n: usize,
-    /// Size of a cell, m.
     pub cell_m: f32,
-    /// The velocity of motion compensation.
     pub twist: Option<Twist>,
     /// True if the Doppler shift is compensated with the same velocity.
     pub doppler_compensated: bool,
@@ -38,7 +35,6 @@ impl RasterFrame {
         self.cell_seen_from(self.sensor_at(point), point)
     }
 
-    /// Returns the pose of the sensor in the raster's frame at the time of the point's azimuth.
     fn sensor_at(&self, point: &SparsePoint) -> Option<Pose> {
         self.twist.map(|twist| twist.pose_at(point.time_s.into()))
     }

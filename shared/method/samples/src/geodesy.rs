@@ -77,7 +77,6 @@ impl LocalPlane {
     }
 }
 
-/// Returns the coordinates of a place about the centre of the earth, m.
 fn earth_centred(place: Geographic, altitude_m: f64) -> [f64; 3] {
     let (sin_lat, cos_lat) = place.latitude_deg.to_radians().sin_cos();
     let (sin_lon, cos_lon) = place.longitude_deg.to_radians().sin_cos();

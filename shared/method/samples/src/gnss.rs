@@ -109,11 +109,8 @@ impl GnssConfig {
 pub struct GnssFix {
     /// Time on the radar's clock, ns since 1970.
     pub stamp_ns: i64,
-    /// Place, m east of the origin of the plane.
     pub east_m: f64,
-    /// Place, m north.
     pub north_m: f64,
-    /// Standard deviation along each of both axes, m.
     pub sigma_m: f64,
 }
 
@@ -155,6 +152,5 @@ impl RawFix {
 pub struct BagFixes {
     pub topic: String,
     pub fixes: Vec<RawFix>,
-    /// Messages without a fix.
     pub without_fix: usize,
 }

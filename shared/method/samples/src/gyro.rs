@@ -13,13 +13,11 @@ pub struct GyroTurn {
     pub yaw_rad: f64,
     /// Variance but for the bias and the scale, rad².
     pub variance_rad2: f64,
-    /// The time between both, s.
     pub interval_s: f64,
     /// Mean rate during the sweep of the scan, rad/s, with the bias.
     pub sweep_rate_radps: f64,
 }
 
-/// Integrates the yaw rate between scans.
 pub type Gyro = Integrator<GyroConfig>;
 
 impl Gyro {

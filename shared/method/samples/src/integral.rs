@@ -13,7 +13,6 @@ const MIN_TURN_NS: i64 = 250_000_000;
 pub struct Integrator<C> {
     pub(crate) config: C,
     kind: SampleKind,
-    /// Which of the values of a sample.
     value: usize,
     /// Longest time between two samples over which the rate is interpolated.
     max_gap_ns: i64,
@@ -31,20 +30,17 @@ pub(crate) struct Integral {
     pub sum: f64,
     /// From the rate at the first stamp to that at the second.
     pub change: f64,
-    /// The time between both, s.
     pub interval_s: f64,
 }
 
 /// A stamp, ns, and the rate.
 type Rate = (i64, f64);
 
-/// A scan with its samples.
 #[derive(Clone, Debug, Default)]
 struct Sweep {
     stamp_ns: i64,
     /// Times of the first and of the last azimuth.
     span_ns: [i64; 2],
-    /// In the order of their stamps.
     rates: Vec<Rate>,
     /// Mean rate during the sweep; `None` where samples are missing.
     mean: Option<f64>,

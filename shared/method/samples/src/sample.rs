@@ -55,7 +55,6 @@ impl Sample {
         }
     }
 
-    /// Creates a sample of the wheels, m/s.
     pub fn speed(stamp_ns: i64, speed_mps: f64) -> Self {
         Self {
             stamp_ns,

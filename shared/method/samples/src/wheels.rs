@@ -17,11 +17,9 @@ pub struct WheelDistance {
     pub variance_m2: f64,
     /// Variance of the place across the path, m².
     pub side_variance_m2: f64,
-    /// The time between both, s.
     pub interval_s: f64,
 }
 
-/// Integrates the speed of the wheels between scans.
 pub type Wheels = Integrator<WheelsConfig>;
 
 impl Wheels {

@@ -94,7 +94,6 @@ fn dims(tensor: &TensorProto) -> Option<Vec<usize>> {
         .collect()
 }
 
-/// Returns the shape of an input, if it is stated.
 pub fn shape_of(input: &ValueInfoProto) -> Option<Vec<usize>> {
     let tensor = input.r#type.as_ref()?.tensor_type.as_ref()?;
     let sizes = tensor.shape.as_ref()?.dim.iter();
@@ -139,7 +138,6 @@ impl<'a> Attributes<'a> {
             && self.sizes("pads") == Some(vec![1; 4])
     }
 
-    /// Returns whether they are of maxima of 2 x 2.
     pub fn are_of_plain_pool(&self) -> bool {
         self.is("auto_pad", "NOTSET")
             && self.are("dilations", &[1, 1])
@@ -149,14 +147,12 @@ impl<'a> Attributes<'a> {
             && self.sizes("strides") == Some(vec![2; 2])
     }
 
-    /// Returns whether they are of a linear resize between the centres of values.
     pub fn are_of_linear_resize(&self) -> bool {
         self.text("mode") == Some("linear")
             && self.is("coordinate_transformation_mode", "half_pixel")
             && self.integer("antialias").unwrap_or(0) == 0
     }
 
-    /// Returns whether they are of a padding by a constant.
     pub fn is_constant_padding(&self) -> bool {
         self.is("mode", "constant")
     }

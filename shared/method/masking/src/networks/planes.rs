@@ -50,7 +50,6 @@ impl PlanesNetwork {
         Self::of(name, bytes, runtime, shapes)
     }
 
-    /// Loads a network from the bytes of its file.
     pub fn of(
         name: &'static str,
         bytes: &'static [u8],

@@ -20,7 +20,6 @@ use thiserror::Error;
 /// The command that installs it in the user's data folder: the release of `models/onnxruntime.txt`.
 /// The library does not depend on the version of Python.
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" onnxruntime==1.31.1";
-/// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 /// The folder that [`INSTALL`] creates in Gyre's data folder; beside the program it has the same
 /// name.
@@ -100,7 +99,6 @@ pub fn search_packages(folder: PathBuf) {
     PACKAGES.get_or_init(|| folder);
 }
 
-/// Returns the folders of packages of the Python environment whose programs are in `bin`.
 fn packages_beside(bin: &Path) -> Vec<PathBuf> {
     let lib = bin.parent().map(|environment| environment.join("lib"));
     let entries = lib.and_then(|lib| fs::read_dir(lib).ok());
@@ -138,7 +136,6 @@ fn library_at(path: &Path) -> Option<PathBuf> {
             .ok()?
             .flatten()
             .map(|file| file.path());
-        // Take the newest of several versions.
         files
             .filter_map(|file| Some((version(&file)?, file)))
             .max()
