@@ -13,9 +13,10 @@ use ndarray::{ArrayView2, ShapeBuilder};
 pub const MAX_AZIMUTHS: usize = 1024;
 
 /// The direction of increasing azimuths, seen from above.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sense {
     /// Ahead, right, behind, left: Navtech sensors.
+    #[default]
     Clockwise,
     /// Ahead, left, behind, right.
     CounterClockwise,
@@ -41,7 +42,7 @@ pub mod flag {
 /// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the
 /// metadata bytes that a file stores before each row (Oxford: 11), so that an image decodes in
 /// place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SweepGeometry {
     pub azimuths: usize,
     pub bins: usize,
@@ -161,17 +162,7 @@ impl OwnedScan {
     /// and assign the geometry that the reader returns.
     pub fn with_limits(limits: ScanLimits) -> Self {
         Self {
-            geometry: SweepGeometry {
-                azimuths: 0,
-                bins: 0,
-                stride: 0,
-                first_byte: 0,
-                range_resolution_m: 0.0,
-                range_offset_m: 0.0,
-                doppler_s: 0.0,
-                sense: Sense::Clockwise,
-                stamp_ns: 0,
-            },
+            geometry: SweepGeometry::default(),
             bytes: vec![0; limits.bytes],
             azimuth_rad: vec![0.0; limits.azimuths],
             stamp_ns: vec![0; limits.azimuths],

@@ -16,7 +16,7 @@ const TWIST_GAIN: f64 = 0.5;
 /// Weight of the newest scan in the running means of overlap and weight.
 const FIT_GAIN: f64 = 0.2;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrackerState {
     /// Pose of the last scan in the first one's frame.
     pub pose: Pose,
@@ -64,26 +64,6 @@ pub struct Anchor {
     pub pose: Pose,
     pub twist: Twist,
     pub age_s: f64,
-}
-
-impl Default for TrackerState {
-    fn default() -> Self {
-        Self {
-            pose: Pose::identity(),
-            anchors: [None; 2],
-            mean_overlap: 0.0,
-            mean_weight: 0.0,
-            doubtful: 0,
-            unmatched: 0,
-            along_walls: 0,
-            sliding: 0,
-            ahead_m: Vector2::zeros(),
-            standstill: Standstill::default(),
-            heading: None,
-            wheels: None,
-            doppler: None,
-        }
-    }
 }
 
 impl Anchor {
@@ -226,15 +206,13 @@ impl TrackerState {
             self.mean_overlap = running_mean(self.mean_overlap, overlap);
             self.mean_weight = running_mean(self.mean_weight, weight);
         }
-        self.doubtful = if outcome == Outcome::Refined {
-            0
-        } else {
-            self.doubtful.saturating_add(1)
+        self.doubtful = match outcome {
+            Outcome::Refined => 0,
+            _ => self.doubtful.saturating_add(1),
         };
-        self.unmatched = if outcome == Outcome::Predicted {
-            self.unmatched.saturating_add(1)
-        } else {
-            0
+        self.unmatched = match outcome {
+            Outcome::Predicted => self.unmatched.saturating_add(1),
+            _ => 0,
         };
         self.pose = pose;
     }
@@ -246,16 +224,17 @@ impl TrackerState {
         let twist = self.mean_twist_to(&pose, interval_s);
         let [first, second] = self.anchors;
         let refined = if self.unmatched == 0 { first } else { second };
-        let aged = refined.map(|anchor| Anchor {
+        self.set_anchors(pose, twist, refined, interval_s);
+    }
+
+    fn set_anchors(&mut self, pose: Pose, twist: Twist, second: Option<Anchor>, interval_s: f64) {
+        let age_s = 0.0;
+        let newest = Anchor { pose, twist, age_s };
+        let aged = second.map(|anchor| Anchor {
             age_s: anchor.age_s + interval_s,
             ..anchor
         });
-        let carried = Anchor {
-            pose,
-            twist,
-            age_s: 0.0,
-        };
-        self.anchors = [Some(carried), aged];
+        self.anchors = [Some(newest), aged];
     }
 
     /// Makes `pose` the newest anchor. An anchor is wrong and dropped if `pose` is out of its
@@ -274,18 +253,7 @@ impl TrackerState {
                 .lerp(&anchor.twist_to(&pose, interval_s), TWIST_GAIN),
             None => self.mean_twist_to(&pose, interval_s),
         };
-        let aged = valid.map(|anchor| Anchor {
-            age_s: anchor.age_s + interval_s,
-            ..anchor
-        });
-        self.anchors = [
-            Some(Anchor {
-                pose,
-                twist,
-                age_s: 0.0,
-            }),
-            aged,
-        ];
+        self.set_anchors(pose, twist, valid, interval_s);
     }
 }
 
