@@ -74,38 +74,20 @@ impl RasterFrame {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::tests::{AZIMUTHS, empty};
     use gyre_radar::{
-        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
-        raster::Rasteriser, scan::flag,
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, Sense, raster::Rasteriser,
     };
     use ndarray::Array2;
 
-    const AZIMUTHS: usize = 400;
     const BINS: usize = 500;
 
     /// A return in every twentieth azimuth, at ranges from 15 to 80 m, seen within 0.25 s.
     fn spots(sense: Sense) -> OwnedScan {
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: AZIMUTHS * BINS,
-            azimuths: AZIMUTHS,
-        });
-        let sizes = SweepGeometry {
-            azimuths: AZIMUTHS,
-            bins: BINS,
-            stride: BINS,
-            ..scan.geometry
-        };
-        scan.geometry = SweepGeometry {
-            range_resolution_m: 0.175,
-            doppler_s: 0.05,
-            sense,
-            ..sizes
-        };
-        for azimuth in 0..AZIMUTHS {
-            scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
-            scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
-            scan.flags[azimuth] = flag::MEASURED;
-        }
+        let mut scan = empty(BINS);
+        let geometry = &mut scan.geometry;
+        (geometry.range_resolution_m, geometry.doppler_s) = (0.175, 0.05);
+        geometry.sense = sense;
         for azimuth in (5..AZIMUTHS).step_by(20) {
             scan.bytes[azimuth * BINS + 90 + azimuth * 7 % 360..][..6].fill(200);
         }
