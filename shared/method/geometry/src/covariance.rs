@@ -157,9 +157,8 @@ mod tests {
     fn composed_covariances_rotate_with_the_first_motion() {
         let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), diagonal(0.0, 0.0, 1e-4));
         let both = turn.then(&uncertain(pose(10.0, 0.0, 0.0), diagonal(4.0, 1.0, 0.0)));
-        assert!(
-            (both.motion.translation.vector - nalgebra::Vector2::new(2.0, 10.0)).norm() < 1e-12
-        );
+        let place = nalgebra::Vector2::new(2.0, 10.0);
+        assert!((both.motion.translation.vector - place).norm() < 1e-12);
         // 10 m to the left at 0.01 rad: 0.1 m along x. The second motion's x is now y.
         let expected = Matrix3::new(1.01, 0.0, -1e-3, 0.0, 4.0, 0.0, -1e-3, 0.0, 1e-4);
         assert!(
@@ -183,10 +182,7 @@ mod tests {
     fn zero_nan_and_indefinite_matrices_are_not_covariances() {
         let has = |covariance| uncertain(Pose::identity(), covariance).has_covariance();
         assert!(has(diagonal(1e-4, 1e-4, 1e-8)));
-        assert!(
-            !has(Matrix3::zeros())
-                && !has(diagonal(1.0, f64::NAN, 1.0))
-                && !has(diagonal(1.0, -1.0, 1.0))
-        );
+        assert!(!has(Matrix3::zeros()));
+        assert!(!has(diagonal(1.0, f64::NAN, 1.0)) && !has(diagonal(1.0, -1.0, 1.0)));
     }
 }

@@ -83,7 +83,6 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
             ..4_000_000 => (16.0 / 255.0, 0.5 / 255.0),
             _ => (1e-5, 1e-6),
         };
-        println!("{}: at most {most}, in the mean {mean}", path.display());
         assert!(
             most <= limits.0 && mean <= limits.1,
             "{}: at most {most}, in the mean {mean}",

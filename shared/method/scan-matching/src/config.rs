@@ -267,20 +267,11 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_rejected() {
-        assert!(
-            toml::from_str::<RotationConfig>("angels = 720")
-                .unwrap_err()
-                .to_string()
-                .contains("angels")
-        );
-        assert!(
-            toml::from_str::<TranslationConfig>("reach = 3.0")
-                .unwrap_err()
-                .to_string()
-                .contains("reach")
-        );
-        assert!(
-            toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err()
-        );
+        let wrong = toml::from_str::<RotationConfig>("angels = 720").unwrap_err();
+        assert!(wrong.to_string().contains("angels"));
+        let wrong = toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err();
+        assert!(wrong.to_string().contains("reach"));
+        let text = "peak = { soft_argmax = { t = 1.0 } }";
+        assert!(toml::from_str::<TranslationConfig>(text).is_err());
     }
 }

@@ -353,21 +353,12 @@ mod tests {
     fn fast_sizes_have_small_factors_and_waste_little() {
         for min in 2..3000 {
             let size = fast_size(min);
-            assert!(
-                size >= min && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]),
-                "{min}: {size}"
-            );
+            let is_fast = size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]);
+            assert!(size >= min && is_fast, "{min}: {size}");
             assert!(size * 3 <= min * 4 || min < 16, "{min}: {size}");
         }
-        assert_eq!(
-            [
-                fast_size(255),
-                fast_size(288),
-                fast_size(511),
-                fast_size(544)
-            ],
-            [256, 288, 512, 576]
-        );
+        let sizes = [255, 288, 511, 544].map(fast_size);
+        assert_eq!(sizes, [256, 288, 512, 576]);
     }
 
     #[test]

@@ -68,7 +68,6 @@ fn in_a_tunnel_doppler_says_how_far() {
         assert!(refined.motion.covariance.cholesky().is_some());
     }
     let (off, sigma_m) = off(&drive, &refined, INSIDE..SCANS - 1);
-    println!("{off}, sigma {sigma_m:.2} m");
     // Two percent of 140 m; the scale was estimated before.
     assert!(off.translation.x.abs() < 2.8, "{off}");
     assert!(off.translation.x.abs() < 3.0 * sigma_m && sigma_m < 3.0);
@@ -92,7 +91,6 @@ fn scans_that_match_nothing_are_bridged_by_doppler_alone() {
             .all(|it| it.outcome == Outcome::Predicted)
     );
     let (away, sigma_m) = off(&drive, &refined, blind.clone());
-    println!("{away}, sigma {sigma_m:.2} m");
     // Two percent of 50 m.
     assert!(away.translation.x.abs() < 1.0, "{away}");
     assert!(away.translation.x.abs() < 3.0 * sigma_m && sigma_m < 1.5);

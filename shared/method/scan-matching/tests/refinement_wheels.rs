@@ -58,7 +58,6 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
         let both = refine_with(&mut refiner(), (&drive, &scans), |_| Some(SCALE), true);
         let around = BLIND.start - 2..BLIND.end + 2;
         let (off_by, _) = off(&drive, &both, around.clone());
-        println!("{fault}: {off_by}");
         // 80 m: half a percent.
         assert!(off_by.translation.vector.norm() < 0.4, "{fault}: {off_by}");
         for (k, refined) in (1..).zip(&both) {

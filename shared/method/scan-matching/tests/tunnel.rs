@@ -68,7 +68,6 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
         assert!(refined.motion.covariance.cholesky().is_some());
     }
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     // One percent of 140 m; the scale was estimated before.
     assert!(
         off.translation.x.abs() < 1.4 && off.translation.y.abs() < 0.5,
@@ -88,7 +87,6 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
     let refined = refine_with(&mut refiner(), (&drive, &scans), |_| None);
     assert!(refined[INSIDE..].iter().all(slid));
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     // The estimate keeps its speed, while the vehicle slows down.
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
@@ -106,7 +104,6 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
     let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
     let refined = refine_with(&mut refiner, (&drive, &scans), measured);
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     assert!(
         off.translation.x.abs() < 3.0 && sigma_m > 2.0,
         "{off}, {sigma_m} m"
@@ -126,8 +123,7 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
         false => searched(&drive, k - 1) * pose(0.3, 0.0, 0.0),
     };
     let refined = refine_searched(&mut refiner, (&drive, &scans), measured, search);
-    let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
+    let (off, _) = inside(&drive, &refined);
     assert!(refined[INSIDE..].iter().all(slid));
     assert!(off.translation.x.abs() < 1.4, "{off}");
 }
@@ -143,7 +139,6 @@ fn as_long_as_the_search_sees_the_way_it_is_seen() {
         let mut refiner = refiner();
         let refined = refine_searched(&mut refiner, (&drive, &scans), |_| wheels, search);
         let (off, sigma_m) = inside(&drive, &refined);
-        println!("{wheels:?}: {off}, sigma {sigma_m:.2} m");
         assert!(!refined.iter().any(slid));
         assert!(
             off.translation.vector.norm() < 1.0 && sigma_m < 2.0,
@@ -172,9 +167,7 @@ fn behind_a_tunnel_the_way_is_seen_again() {
     let refined = refine_searched(&mut refiner(), (&drive, &scans), |_| None, search);
     let last = refined.iter().rposition(slid).unwrap();
     let from = drive.pose(last + 1);
-    println!("until {:.1} m", from.translation.x);
     assert!((155.0..260.0).contains(&from.translation.x), "{from}");
     let (off, _) = off(&drive, &refined, last + 1..refined.len());
-    println!("{off}");
     assert!(off.translation.vector.norm() < 0.5, "{off}");
 }

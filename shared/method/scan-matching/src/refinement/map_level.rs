@@ -281,19 +281,14 @@ mod tests {
         }
     }
 
-    fn brightest(level: &MapLevel) -> [f64; 2] {
+    /// The brightest place of the map, m, and its share.
+    fn brightest(level: &MapLevel) -> ([f64; 2], f32) {
         let view = level.view();
-        let brightest = (0..view.sum.len())
-            .max_by_key(|k| (view.sum[*k], std::cmp::Reverse(*k)))
-            .unwrap_or(0);
-        [brightest / level.n, brightest % level.n]
-            .map(|k| k as f64 * level.cell_m)
-            .into_iter()
-            .zip(view.origin)
-            .map(|(at, origin)| at + origin)
-            .collect::<Vec<_>>()
-            .try_into()
-            .unwrap_or([f64::NAN; 2])
+        let most = view.sum.iter().copied().max().unwrap_or(0);
+        let at = view.sum.iter().position(|sum| *sum == most).unwrap_or(0);
+        let cell = [at / level.n, at % level.n];
+        let place = [0, 1].map(|axis| cell[axis] as f64 * level.cell_m + view.origin[axis]);
+        (place, f32::from(most) / view.full)
     }
 
     #[test]
@@ -303,18 +298,13 @@ mod tests {
         level.draw(&points(&[[6.0, 2.0]]), &Pose::identity(), &mut first);
         let pose = pose(3.0, 1.0, std::f64::consts::FRAC_PI_2);
         let seen = pose.inverse() * Point2::new(6.0, 2.0);
-        level.draw(
-            &points(&[[seen.x as f32, seen.y as f32]]),
-            &pose,
-            &mut second,
-        );
+        let seen = points(&[[seen.x as f32, seen.y as f32]]);
+        level.draw(&seen, &pose, &mut second);
         level.sum_images([&first, &second].into_iter());
-        assert_eq!(brightest(&level), [6.0, 2.0]);
-        let peak = f32::from(level.view().sum.iter().copied().max().unwrap_or(0));
-        assert!(
-            (peak / level.view().full - 2.0 / 3.0).abs() < 0.01,
-            "{peak}: m / (m + mean), a Gaussian's mean being half its peak"
-        );
+        let (place, share) = brightest(&level);
+        assert_eq!(place, [6.0, 2.0]);
+        // m / (m + mean): the mean of a Gaussian is half of its peak.
+        assert!((share - 2.0 / 3.0).abs() < 0.01, "{share}");
     }
 
     /// The definition: the points are shared between the cells around them, and these are blurred
@@ -372,11 +362,8 @@ mod tests {
     fn points_out_of_reach_are_ignored() {
         let mut level = MapLevel::new(1.0, 20.0);
         let mut image = level.new_image();
-        level.draw(
-            &points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]),
-            &Pose::identity(),
-            &mut image,
-        );
+        let outside = points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]);
+        level.draw(&outside, &Pose::identity(), &mut image);
         assert!(image.cells.iter().all(|cell| *cell == 0));
         level.sum_images([&image].into_iter());
         assert!(level.view().sum.iter().all(|sum| *sum == 0));
