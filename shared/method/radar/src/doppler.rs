@@ -129,6 +129,6 @@ impl DopplerEstimator {
         check_chirps(scan)?;
         self.rows.update(scan, min_range_m);
         self.shifts.update(scan, &self.rows);
-        self.fit.velocity(self.shifts.rows())
+        self.fit.velocity(&self.shifts.rows)
     }
 }

@@ -112,7 +112,7 @@ impl PointExtractor {
         self.cells.update(scan, floor, &self.config);
         let peaks = self.beam.peaks(scan, &self.cells);
         let weakest = weakest_that_fits(peaks, room, &mut self.counts);
-        let cap = WEIGHT_CAP * self.cells.bins_per_cell() as f32;
+        let cap = WEIGHT_CAP * self.cells.layout.bins_per_cell as f32;
         let mut count = 0;
         for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
             let view = View::of(scan, usize::from(peaks[0].azimuth));

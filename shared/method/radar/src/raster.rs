@@ -208,7 +208,7 @@ impl Rasteriser {
                 None => locate::locate(&cells, &lookup, &mut self.taps),
                 Some(motion) => locate::locate_moving(&cells, motion, &lookup, &mut self.taps),
             }
-            locate::blend(&self.taps, self.polar.samples(), stride, row);
+            locate::blend(&self.taps, &self.polar.samples, stride, row);
         }
     }
 

@@ -88,25 +88,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
-    use std::f64::consts::PI;
-
-    #[test]
-    fn interpolation_turns_the_shorter_way() {
-        let trajectory = Trajectory {
-            stamp_ns: Some(vec![0, 100]),
-            poses: vec![pose(0.0, 0.0, PI - 0.1), pose(2.0, 0.0, -PI + 0.1)],
-        };
-        let middle = trajectory.at(50).unwrap();
-        assert!((middle.translation.x - 1.0).abs() < 1e-12);
-        assert!(
-            (middle.rotation.angle().abs() - PI).abs() < 1e-9,
-            "{}",
-            middle.rotation.angle()
-        );
-        assert_eq!(trajectory.at(100).unwrap(), trajectory.poses[1]);
-        assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
-        assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
-    }
 
     #[test]
     fn times_within_the_tolerance_are_clamped_and_gaps_are_measured() {

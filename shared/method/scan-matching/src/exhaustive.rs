@@ -117,7 +117,7 @@ impl ExhaustiveSearch {
             cell_m,
             config: config.clone(),
             angles,
-            correlation: KeptCorrelation::new(n, size, turned[0].scores.wrapped()),
+            correlation: KeptCorrelation::new(n, size, turned[0].scores.wrapped.clone()),
             later: vec![0.0; n * n],
             earlier: vec![0.0; n * n],
             later_energy: energy(),
@@ -152,7 +152,7 @@ impl ExhaustiveSearch {
         kernels::finite_copy(earlier, &mut self.earlier);
         self.later_energy.measure(&self.later);
         self.turned[0].energy.measure(&self.earlier);
-        let energy = (self.later_energy.total() * self.turned[0].energy.total()).sqrt();
+        let energy = (self.later_energy.total * self.turned[0].energy.total).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
             return Ok(self.no_match(prior_rad));
         }

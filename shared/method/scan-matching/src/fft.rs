@@ -253,7 +253,7 @@ impl RealSpectrum {
 
 /// Spectra of two real square images by one complex transform, and the inverse for some rows.
 pub(crate) struct PairSpectrum {
-    size: usize,
+    pub size: usize,
     rows: RowPass,
     columns: Transform,
     inverse_columns: Transform,
@@ -285,10 +285,6 @@ impl PairSpectrum {
             plane: Columns::new(size, size),
             mirror: vec![Complex32::default(); size],
         }
-    }
-
-    pub fn size(&self) -> usize {
-        self.size
     }
 
     /// Transforms `rows` rows; `fill(r, row)` writes first + i second to the start of row r, the
@@ -395,7 +391,7 @@ mod tests {
             let (f, g) = values.split_at(14 * 14);
             let reach = (n / 2) as isize;
             let mut pair = PairSpectrum::new(fast_size(n + reach as usize));
-            let size = pair.size() as isize;
+            let size = pair.size as isize;
             let rows: Vec<usize> = (-reach..=reach).map(|s| s.rem_euclid(size) as usize).collect();
             pair.forward(n, |r, out| {
                 (0..n).for_each(|k| out[k] = Complex32::new(f[r * n + k], g[r * n + k]));

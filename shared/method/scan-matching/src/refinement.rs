@@ -327,7 +327,7 @@ impl Refiner {
 
     fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
-        let covariance = uncertainty.of_prediction();
+        let covariance = uncertainty.of_prediction;
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
             heading.inflate(covariance[(2, 2)]);
         }

@@ -19,7 +19,7 @@ pub(crate) struct Scores {
     n: usize,
     reach: isize,
     /// Row (and column) of the transform for each shift.
-    wrapped: Arc<[usize]>,
+    pub wrapped: Arc<[usize]>,
     values: Vec<f32>,
 }
 
@@ -48,10 +48,6 @@ impl Scores {
         }
     }
 
-    pub fn wrapped(&self) -> Arc<[usize]> {
-        self.wrapped.clone()
-    }
-
     pub fn fill<T: Copy>(&mut self, r: usize, row: &[T], score: impl Fn(T) -> f32) {
         let side = self.wrapped.len();
         for (value, &column) in self.values[r * side..][..side]
@@ -76,7 +72,7 @@ impl Scores {
             Overlap::Area => self.normalise_area(),
             // A shift by s drops the first s rows of g' and the last s rows of f.
             Overlap::Energy => {
-                kernels::divide_by_share(&mut self.values, later.left(), turned.left(), energy)
+                kernels::divide_by_share(&mut self.values, &later.left, &turned.left, energy)
             }
         }
     }

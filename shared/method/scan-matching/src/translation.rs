@@ -145,7 +145,7 @@ impl TranslationSearch {
             keep_seen(&mut self.turned, seen);
         }
         self.turned_energy.measure(&self.turned);
-        let energy = (self.later_energy.total() * self.turned_energy.total()).sqrt();
+        let energy = (self.later_energy.total * self.turned_energy.total).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
             return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         }
@@ -191,14 +191,14 @@ impl TranslationSearch {
     }
 
     fn read_scores(&mut self, energy: f64) {
-        let size = self.transform.size();
+        let size = self.transform.size;
         let cells = (size * size) as f64;
         let scale = if self.config.phase_only {
             1.0 / cells
         } else {
             1.0 / (cells * energy)
         };
-        let rows = self.scores.wrapped();
+        let rows = self.scores.wrapped.clone();
         self.transform.inverse(&rows, |r, row| {
             self.scores.fill(r, row, |value: f32| value * scale as f32)
         });

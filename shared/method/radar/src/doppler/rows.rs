@@ -25,7 +25,7 @@ const RINGING_M: f32 = 2.5;
 /// all ended at one range, a wall there would seem to stand still.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    layout: Layout,
+    pub layout: Layout,
     powers: Vec<f32>,
     bins: Vec<u8>,
     sums: Vec<u16>,
@@ -94,10 +94,6 @@ impl Rows {
                 *cell = f32::from(sum.saturating_sub(floor));
             }
         }
-    }
-
-    pub fn layout(&self) -> &Layout {
-        &self.layout
     }
 
     pub fn row(&self, azimuth: usize) -> &[f32] {

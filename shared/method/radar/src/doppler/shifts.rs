@@ -21,7 +21,7 @@ const MIN_SHARE: f32 = 0.5;
 /// The correlations of all rows with echoes that lie between two rows of the other chirp.
 #[derive(Debug, Default)]
 pub(super) struct Shifts {
-    rows: Vec<RowShifts>,
+    pub rows: Vec<RowShifts>,
     beside: Vec<f32>,
 }
 
@@ -69,16 +69,12 @@ impl Shifts {
             self.rows.push(RowShifts {
                 azimuth,
                 direction: direction(scan, azimuth),
-                mps_per_lag: mps_per_lag(scan, rows.layout().cell_m, azimuth),
+                mps_per_lag: mps_per_lag(scan, rows.layout.cell_m, azimuth),
                 correlation,
                 top_lag: top as f64 - REACH as f64,
                 top: height,
             });
         }
-    }
-
-    pub fn rows(&self) -> &[RowShifts] {
-        &self.rows
     }
 }
 

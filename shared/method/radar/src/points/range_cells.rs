@@ -13,7 +13,7 @@ pub(super) const MAX_POWER: usize = MAX_BINS_PER_CELL * 255;
 /// Powers of the cells between minimum and maximum range: sums over the bins of a cell.
 #[derive(Debug, Default)]
 pub(super) struct RangeCells {
-    layout: Layout,
+    pub layout: Layout,
     /// Row-major, one row per azimuth.
     powers: Vec<i16>,
     /// The bins and the cells of an azimuth.
@@ -24,12 +24,12 @@ pub(super) struct RangeCells {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Layout {
-    bins_per_cell: usize,
+pub(super) struct Layout {
+    pub bins_per_cell: usize,
     /// Cells below the minimum range.
     skipped: usize,
     /// Cells per azimuth between minimum and maximum range.
-    cells: usize,
+    pub cells: usize,
     cell_m: f32,
     range_offset_m: f32,
 }
@@ -81,15 +81,6 @@ impl RangeCells {
             }
             self.active[azimuth] = powers.iter().fold(0, |any, power| any | power) != 0;
         }
-    }
-
-    pub fn cells(&self) -> usize {
-        self.layout.cells
-    }
-
-    /// Bins per cell, the divisor from a sum to a mean power.
-    pub fn bins_per_cell(&self) -> usize {
-        self.layout.bins_per_cell
     }
 
     /// Powers of the cells of an azimuth, nearest first, 0 where not above the floor. `None` where

@@ -13,7 +13,7 @@ use crate::scan::{PolarScan, SweepGeometry};
 pub(super) struct PolarImage {
     window_m: f32,
     layout: Layout,
-    samples: Vec<u16>,
+    pub samples: Vec<u16>,
     /// Piecewise sums of one azimuth, padded with zeros by the reach of the window.
     pieces: Vec<u16>,
     above_floor: Vec<u8>,
@@ -131,10 +131,6 @@ impl PolarImage {
         }
         self.samples.resize((layout.azimuths + 1) * stride, 0);
         self.layout = layout;
-    }
-
-    pub fn samples(&self) -> &[u16] {
-        &self.samples
     }
 
     pub fn stride(&self) -> usize {

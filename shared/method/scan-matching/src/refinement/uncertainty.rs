@@ -26,7 +26,7 @@ pub(super) struct Uncertainty {
     /// The covariance of a prediction over the scan's interval, behind a match.
     of_step: Matrix3<f64>,
     /// The same behind the predictions in a row before it.
-    of_prediction: Matrix3<f64>,
+    pub of_prediction: Matrix3<f64>,
     predictions: u32,
     of_predictions: Matrix3<f64>,
     /// The share of a match's covariance that makes the map drift.
@@ -59,10 +59,6 @@ impl Uncertainty {
             of_predictions,
             of_map: drift_share(map.len(), config),
         }
-    }
-
-    pub fn of_prediction(&self) -> Matrix3<f64> {
-        self.of_prediction
     }
 
     /// Returns the variance of the prediction in an otherwise undetermined direction, such that the
