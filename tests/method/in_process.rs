@@ -9,6 +9,7 @@ use gyre_odometry::{Odometry, OdometryConfig, Outcome, Registered};
 use gyre_radar::OwnedScan;
 
 use crate::common::{Run, real_data, runtime_is_installed};
+use crate::method::learned_masks::card;
 
 /// Registers all scans that a finished run played.
 fn register_all(run: &Run) -> Vec<Registered> {
@@ -75,18 +76,12 @@ fn on_the_demo() {
     assert_eq!(assert_same_bits(&run), 24);
 }
 
-/// Asserts it of the first scans of a real drive.
-fn on_a_real_drive(scans: usize) {
-    if let Some(data) = real_data("radiate-2019-02-12") {
-        let run = configuration("radiate.toml").data(&data);
-        let run = run.set(&format!("source.scans={scans}"));
-        assert_eq!(assert_same_bits(&run), scans);
-    }
-}
-
 #[test]
 fn on_real_scans() {
-    on_a_real_drive(80);
+    if let Some(data) = real_data("radiate-2019-02-12") {
+        let run = configuration("radiate.toml").data(&data);
+        assert_eq!(assert_same_bits(&run.set("source.scans=80")), 80);
+    }
 }
 
 #[test]
@@ -107,12 +102,6 @@ fn with_the_gyro_of_a_real_drive() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: a whole drive"]
-fn on_all_real_scans() {
-    on_a_real_drive(466);
-}
-
-#[test]
 fn with_every_angle_tried() {
     let run = Run::of_recording()
         .set("search.kind=exhaustive")
@@ -126,10 +115,6 @@ fn with_networks_of_one_and_of_two_scans() {
         return;
     }
     for model in ["single-127", "pair-127"] {
-        let card = Path::new(crate::PROJECT)
-            .join("shared/method/masking/tests/models")
-            .join(model)
-            .with_extension("toml");
-        assert_same_bits(&Run::of_recording().masked_by(&card));
+        assert_same_bits(&Run::of_recording().masked_by(&card(model)));
     }
 }

@@ -34,14 +34,10 @@ fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
             run.summary()["mask"].clone(),
             run.result("config.toml").parse::<toml::Table>().unwrap(),
         );
-        assert_eq!(
-            said["model"],
-            card(model).canonicalize().unwrap().to_str().unwrap()
-        );
-        assert_eq!(
-            said["sha256"],
-            resolved["masking"]["sha256"].as_str().unwrap()
-        );
+        let path = card(model).canonicalize().unwrap();
+        assert_eq!(said["model"], path.to_str().unwrap());
+        let sha256 = &resolved["masking"]["sha256"];
+        assert_eq!(said["sha256"], sha256.as_str().unwrap());
     }
 }
 
@@ -56,12 +52,8 @@ fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
         run.complete();
         let stages = &run.summary()["stages"];
         let scans = recording::SCANS as u64 - 5;
-        assert_eq!(
-            stages["masking"]["allocations_after_five"],
-            OF_THE_BINDING * scans,
-            "{}",
-            stages["masking"]
-        );
+        let allocations = &stages["masking"]["allocations_after_five"];
+        assert_eq!(*allocations, OF_THE_BINDING * scans);
         assert_eq!(stages["refinement"]["allocations_after_five"], 0);
     }
 }
@@ -114,12 +106,8 @@ fn a_library_in_the_current_folder_is_not_opened_unless_it_is_named() {
     };
     for data_home in ["", ".", "gyre/.."] {
         let ended = in_its_folder(None, data_home);
-        ended.succeeded();
-        assert!(
-            ended.stderr.contains("computed by rten"),
-            "{}",
-            ended.stderr
-        );
+        let said = &ended.succeeded().stderr;
+        assert!(said.contains("computed by rten"), "{said}");
         fs::remove_dir_all(run.out()).unwrap();
     }
     in_its_folder(Some("onnxruntime"), "").refused_with(&["cannot be used as ONNX Runtime"]);

@@ -27,7 +27,7 @@ fn without() -> Run {
     Run::of_recording().set("refinement.kind=none")
 }
 
-fn names(object: &Value) -> BTreeSet<String> {
+pub fn names(object: &Value) -> BTreeSet<String> {
     object.as_object().unwrap().keys().cloned().collect()
 }
 
@@ -38,26 +38,16 @@ fn each_motion_is_counted_by_how_its_refinement_ended() {
     let run = Run::of_recording();
     let outcomes: Vec<String> = columns(&run.complete(), &["outcome"]).concat();
     let summary = run.summary();
-    assert_eq!(
-        names(&summary["stages"]),
-        BTreeSet::from(STAGES.map(str::to_owned))
-    );
-    assert_eq!(
-        names(&summary["latency"]["stages"]),
-        BTreeSet::from(STAGES.map(str::to_owned))
-    );
+    let stages = BTreeSet::from(STAGES.map(str::to_owned));
+    assert_eq!(names(&summary["stages"]), stages);
+    assert_eq!(names(&summary["latency"]["stages"]), stages);
     let motions = &summary["motions"];
     for outcome in ["refined", "weak", "predicted"] {
-        assert_eq!(
-            motions[outcome],
-            outcomes.iter().filter(|word| *word == outcome).count(),
-            "{outcome}"
-        );
+        let count = outcomes.iter().filter(|word| *word == outcome).count();
+        assert_eq!(motions[outcome], count, "{outcome}");
     }
-    assert!(
-        motions["refined"].as_u64().unwrap() > recording::SCANS as u64 / 2,
-        "{motions}"
-    );
+    let refined = motions["refined"].as_u64().unwrap();
+    assert!(refined > recording::SCANS as u64 / 2, "{motions}");
     assert_eq!(outcomes.len(), recording::SCANS - 1);
 }
 
@@ -69,17 +59,10 @@ fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts
     assert!(summary.get("motions").is_none());
     assert!(!names(&summary["stages"]).contains(REFINEMENT));
     assert!(!run.out().join(MAP).exists());
-    assert_eq!(
-        columns(&odometry, &MOTION),
-        columns(&odometry, &SEARCHED[..3]),
-        "what was searched is the motion"
-    );
-    assert!(
-        columns(&odometry, &["outcome"])
-            .concat()
-            .iter()
-            .all(|outcome| outcome == "searched")
-    );
+    let [motions, searched] = [&MOTION[..], &SEARCHED[..3]].map(|names| columns(&odometry, names));
+    assert_eq!(motions, searched);
+    let outcomes = columns(&odometry, &["outcome"]).concat();
+    assert!(outcomes.iter().all(|outcome| outcome == "searched"));
 }
 
 /// Masking compensates with searched motions, so the search sees the same rasters whether its
@@ -103,24 +86,7 @@ fn refined_motions_are_nearer_to_the_truth() {
             .unwrap()
     };
     let (refined, searched) = (error(Run::of_recording()), error(without()));
-    assert!(
-        refined < searched,
-        "{refined} m refined, {searched} m as searched"
-    );
-}
-
-#[test]
-fn joint_search_is_refined_as_well() {
-    let run = Run::of_recording().set("search.kind=exhaustive");
-    let without = without().set("search.kind=exhaustive").complete();
-    assert_eq!(
-        columns(&run.complete(), &SEARCHED),
-        columns(&without, &SEARCHED)
-    );
-    assert_eq!(
-        run.summary()["stages"].as_object().unwrap().len(),
-        STAGES.len() - 1
-    );
+    assert!(refined < searched, "{refined} m, {searched} m as searched");
 }
 
 // Its map.
@@ -166,12 +132,8 @@ fn a_map_that_was_lost_soon_after_the_start_lets_the_run_begin_anew() {
         let damaged = &damages(&fs::read(&map).unwrap())[k];
         fs::write(&map, damaged).unwrap();
         let ended = run.finish();
-        ended.succeeded();
-        assert!(
-            ended.stderr.contains("knows none of the"),
-            "{}",
-            ended.stderr
-        );
+        let said = &ended.succeeded().stderr;
+        assert!(said.contains("knows none of the"), "{said}");
         assert_eq!(run.odometry(), undisturbed());
     }
 }
@@ -197,14 +159,9 @@ fn poses_that_the_map_does_not_know_are_cut_off_and_computed_anew() {
     let run = interrupted();
     append_unknown_poses(&run, 70);
     let ended = run.finish();
-    ended.succeeded();
-    assert!(
-        ended
-            .stderr
-            .contains("a power failure took the last 70 poses"),
-        "{}",
-        ended.stderr
-    );
+    let said = &ended.succeeded().stderr;
+    let words = "a power failure took the last 70 poses";
+    assert!(said.contains(words), "{said}");
     assert_eq!(run.odometry(), undisturbed());
     assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
 }

@@ -8,7 +8,7 @@ use gyre_journal::{
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
 use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
-use gyre_scan_matching::{RefinementConfig, Refiner};
+use gyre_scan_matching::{Aiding, RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView},
@@ -26,9 +26,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
         .map_err(|error| StageError::Configuration(error.to_string()))?
-        .with_gyro(&gyro)
-        .with_wheels(&wheels)
-        .with_doppler(&doppler);
+        .with_sensors(&gyro, &wheels, &doppler);
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }
@@ -71,13 +69,13 @@ impl Stage for RefinementStage {
         output.header().motion = match input.pair.previous {
             Some(previous) if !item.is(flag::BREAK) => {
                 let (masked, before) = (input.pair.current.header(), previous.header());
-                self.refiner.expect_azimuth_errors(
-                    before.azimuth_variance_rad2 + masked.azimuth_variance_rad2,
-                );
-                self.refiner.expect_turn(masked.turn());
-                self.refiner.expect_distance(masked.distance());
-                let velocities = [before.velocity(), masked.velocity()];
-                self.refiner.expect_velocities(velocities);
+                self.refiner.aiding = Aiding {
+                    azimuth_variance_rad2: before.azimuth_variance_rad2
+                        + masked.azimuth_variance_rad2,
+                    turn: masked.turn(),
+                    distance: masked.distance(),
+                    velocities: [before.velocity(), masked.velocity()],
+                };
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,

@@ -1,15 +1,4 @@
 //! Motion in the plane: poses, twists and covariances in SE(2), and the points of a scan.
-//!
-//! Reading order:
-//! - [`Pose`]: the pose of a frame in another frame; [`pose`] creates one, [`interpolate`]
-//!   interpolates between two;
-//! - [`Twist`]: a constant velocity and its poses over time;
-//! - [`covariance`]: packed covariances of (x, y, yaw), and [`UncertainMotion`], which composes
-//!   them;
-//! - [`ComposedMotion`]: motions of an odometry whose errors are only in part independent,
-//!   composed;
-//! - [`SparsePoint`]: one return of a scan, in the sensor's frame at the time of its azimuth.
-//!
 //! # Frames and units
 //! Frames follow REP-103: x forward, y left, yaw counter-clockwise. Lengths are in m, angles in
 //! rad, times in s. A motion is the pose of the later frame in the earlier frame. Composition is

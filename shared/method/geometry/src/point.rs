@@ -12,9 +12,7 @@ use crate::Twist;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SparsePoint {
-    /// Forward of the sensor at the time of the point's azimuth, m.
     pub x_m: f32,
-    /// To the left of it, m.
     pub y_m: f32,
     /// Time of the azimuth relative to the scan's stamp, s.
     pub time_s: f32,
@@ -37,14 +35,12 @@ impl SparsePoint {
     }
 }
 
-/// A point from its fields in their order.
 impl From<[f32; 5]> for SparsePoint {
     fn from(fields: [f32; 5]) -> Self {
         bytemuck::cast(fields)
     }
 }
 
-/// The fields of a point in their order.
 impl From<SparsePoint> for [f32; 5] {
     fn from(point: SparsePoint) -> Self {
         bytemuck::cast(point)

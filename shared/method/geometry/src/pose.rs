@@ -7,7 +7,6 @@ use nalgebra::{Isometry2, Vector2};
 /// The pose of a frame in another frame: x forward and y left in m, yaw counter-clockwise in rad.
 pub type Pose = Isometry2<f64>;
 
-/// Creates the pose at (`x_m`, `y_m`) with yaw `yaw_rad`.
 pub fn pose(x_m: f64, y_m: f64, yaw_rad: f64) -> Pose {
     Pose::new(Vector2::new(x_m, y_m), yaw_rad)
 }

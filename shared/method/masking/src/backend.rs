@@ -2,15 +2,14 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{
     Deserialize, Deserializer, Serialize,
     de::{Error as _, IntoDeserializer},
 };
 
 /// The library that computes a network.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
     /// ONNX Runtime where it is found, else rten.
@@ -23,7 +22,6 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// The name of the library.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "ONNX Runtime or rten",
@@ -35,18 +33,12 @@ impl Backend {
 
 impl fmt::Display for Backend {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::OnnxRuntime => "onnxruntime",
-            Self::Rten => "rten",
-        })
+        self.serialize(f)
     }
 }
 
 /// The execution provider of a network.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Provider {
     /// The processor.
@@ -62,16 +54,10 @@ pub enum Provider {
 
 impl fmt::Display for Provider {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Cpu => "cpu",
-            Self::Cuda => "cuda",
-            Self::Tensorrt => "tensorrt",
-            Self::Openvino => "openvino",
-        })
+        self.serialize(f)
     }
 }
 
-/// Reads a backend of a configuration.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
     let name = String::deserialize(source)?;
     if name == "tract" {

@@ -6,7 +6,6 @@ use ndarray::ArrayViewMut2;
 
 use crate::{MaskingConfig, Sweep};
 
-/// Rasterises scans with motion compensation.
 #[derive(Debug)]
 pub(crate) struct CompensatedRaster {
     rasteriser: Rasteriser,

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::backend::{self, Backend, Provider};
 
 /// The mask and motion compensation: section `[masking]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskingConfig {
     /// `none`: everything counts. `threshold`: power up to `threshold` counts as zero. `learned`:
@@ -54,7 +55,7 @@ pub struct MaskingConfig {
 }
 
 /// The kind of a mask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskKind {
     /// Everything counts.
@@ -65,21 +66,9 @@ pub enum MaskKind {
     Learned,
 }
 
-/// A setting out of its bounds.
 #[derive(Debug, Error, PartialEq)]
-pub enum MaskingConfigError {
-    #[error("threads is {0}, but must be 1 to 64")]
-    Threads(usize),
-    #[error("point_exponent is {0}, but must be 0 to 4")]
-    PointExponent(f32),
-    #[error(
-        "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
-    )]
-    NotOfRten(&'static str),
-    /// A lag of 0: the motion of a scan is not known yet when it is masked.
-    #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
-    Lag,
-}
+#[error("{0}")]
+pub struct MaskingConfigError(String);
 
 impl Default for MaskingConfig {
     fn default() -> Self {
@@ -101,27 +90,30 @@ impl Default for MaskingConfig {
 }
 
 impl MaskingConfig {
-    /// Checks the bounds of all settings, without reading any file.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
-        match () {
-            () if !(1..=64).contains(&self.threads) => {
-                Err(MaskingConfigError::Threads(self.threads))
+        let (threads, exponent) = (self.threads, self.point_exponent);
+        let is_rten = self.backend == Backend::Rten;
+        let not_of_rten = |key| {
+            format!(
+                "backend is `rten`, but {key} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {key} out"
+            )
+        };
+        Err(MaskingConfigError(match () {
+            () if !(1..=64).contains(&threads) => {
+                format!("threads is {threads}, but must be 1 to 64")
             }
-            () if !(0.0..=4.0).contains(&self.point_exponent) => {
-                Err(MaskingConfigError::PointExponent(self.point_exponent))
+            () if !(0.0..=4.0).contains(&exponent) => {
+                format!("point_exponent is {exponent}, but must be 0 to 4")
             }
-            () if self.backend == Backend::Rten && self.runtime.is_some() => {
-                Err(MaskingConfigError::NotOfRten("runtime"))
+            () if is_rten && self.runtime.is_some() => not_of_rten("runtime"),
+            () if is_rten && self.provider != Provider::Cpu => not_of_rten("provider"),
+            () if self.compensate && self.lag == 0 => {
+                "lag is 0, but must be 1 or more: the motion of a scan is not known before its search".to_owned()
             }
-            () if self.backend == Backend::Rten && self.provider != Provider::Cpu => {
-                Err(MaskingConfigError::NotOfRten("provider"))
-            }
-            () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
-            () => Ok(()),
-        }
+            () => return Ok(()),
+        }))
     }
 
-    /// Returns the highest power that is set to zero.
     pub fn floor(&self) -> u8 {
         match self.kind {
             MaskKind::None => 0,
@@ -129,7 +121,6 @@ impl MaskingConfig {
         }
     }
 
-    /// Returns the lag of the motions that masking waits for; 0 if it waits for none.
     pub fn feedback_lag(&self) -> usize {
         if self.compensate { self.lag } else { 0 }
     }

@@ -1,11 +1,10 @@
 //! The errors of a masker.
 
-use gyre_radar::{PointsError, ScanError, raster::RasterError};
+use gyre_radar::{ScanError, SettingError, raster::RasterError};
 use thiserror::Error;
 
 use crate::{MaskingConfigError, network::NetworkError};
 
-/// An invalid configuration of a masker.
 #[derive(Debug, Error)]
 pub enum MaskerError {
     #[error("masking.{0}")]
@@ -13,12 +12,11 @@ pub enum MaskerError {
     #[error(transparent)]
     Raster(#[from] RasterError),
     #[error(transparent)]
-    Points(#[from] PointsError),
+    Points(#[from] SettingError),
     #[error(transparent)]
     Network(#[from] NetworkError),
 }
 
-/// An error in masking a scan.
 #[derive(Debug, Error)]
 pub enum MaskError {
     #[error(transparent)]
@@ -29,7 +27,6 @@ pub enum MaskError {
     Network(#[from] NetworkError),
     #[error("{0}")]
     Function(String),
-    /// The mask takes two scans, but the previous one or the output for it is missing.
     #[error(
         "the mask takes two scans, but the previous scan {0} or the output for its raster is missing"
     )]

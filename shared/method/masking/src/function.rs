@@ -55,7 +55,6 @@ pub trait MaskFunction: fmt::Debug + Send + Sync {
     ) -> Result<Factors, Box<dyn Error + Send + Sync>>;
 }
 
-/// Factors from 0 to 1.
 #[derive(Debug)]
 pub enum Factors {
     /// Of the powers, azimuth x range bin: raster and points are made from the masked powers.
@@ -65,7 +64,6 @@ pub enum Factors {
     OfRaster(Array2<f32>),
 }
 
-/// A function, and its result for the last scan.
 #[derive(Debug)]
 pub(crate) struct AppliedFunction {
     function: Box<dyn MaskFunction>,
@@ -84,7 +82,6 @@ impl AppliedFunction {
         }
     }
 
-    /// Masks a scan: see [`Masker::mask`](crate::Masker::mask).
     pub fn mask(
         &mut self,
         rasters: &mut CompensatedRaster,
@@ -118,7 +115,6 @@ impl AppliedFunction {
         Ok(twist)
     }
 
-    /// Returns the last masked scan with the powers that are left.
     pub fn left<'a>(&'a self, scan: &PolarScan<'a>) -> PolarScan<'a> {
         if self.powers.is_empty() {
             return *scan;
@@ -130,13 +126,11 @@ impl AppliedFunction {
         left
     }
 
-    /// Returns the factors of the last masked scan's raster.
     pub fn factors(&self) -> Option<ArrayView2<'_, f32>> {
         self.raster.as_ref().map(|factors| factors.view())
     }
 }
 
-/// Checks the shape and the range of factors.
 fn check(factors: &Array2<f32>, expected: (usize, usize)) -> Result<(), MaskError> {
     let failed = |reason: String| Err(MaskError::Function(reason));
     if factors.dim() != expected {

@@ -10,7 +10,6 @@ use crate::{
     network::{Network, NetworkError},
 };
 
-/// A network and, if it takes two scans, their rasters.
 #[derive(Debug)]
 pub(crate) struct LearnedMask {
     network: Network,
@@ -31,7 +30,6 @@ impl LearnedMask {
         })
     }
 
-    /// Returns the number of scans that the network takes, and of rasters that it masks.
     pub fn scans(&self) -> usize {
         self.network.scans()
     }
@@ -46,7 +44,6 @@ impl LearnedMask {
         (scan < masks.len_of(Axis(0))).then(|| masks.index_axis_move(Axis(0), scan))
     }
 
-    /// Makes a scan the previous one.
     pub fn set_previous(
         &mut self,
         rasters: &mut CompensatedRaster,
@@ -59,7 +56,6 @@ impl LearnedMask {
         Ok(())
     }
 
-    /// See [`Masker::mask`](crate::Masker::mask).
     pub fn mask(
         &mut self,
         rasters: &mut CompensatedRaster,

@@ -1,9 +1,4 @@
 //! Rasterises and masks scans, and extracts their sparse points.
-//!
-//! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold);
-//! `learned` and [`network`] (masks of a network); [`MaskFunction`] (masks of your own); `points`
-//! (weights of sparse points); [`model`] (networks and their cards) and [`Library`] (what computes
-//! them).
 
 pub mod backend;
 mod compensation;
@@ -51,7 +46,6 @@ pub struct Masker {
     points: PointExtractor,
 }
 
-/// The origin of the factors.
 #[derive(Debug)]
 enum Weights {
     None,
@@ -60,7 +54,6 @@ enum Weights {
 }
 
 impl Masker {
-    /// Allocates all buffers and loads the network, if there is one.
     pub fn new(
         raster: &RasterConfig,
         points: &PointsConfig,

@@ -6,10 +6,8 @@ use crate::networks::runtime::{self, RuntimeError};
 
 use crate::{Backend, MaskingConfig, Provider};
 
-/// The library that a configuration chooses on this machine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Library {
-    /// ONNX Runtime, with the path of its library.
     OnnxRuntime(PathBuf),
     Rten,
 }
@@ -30,7 +28,6 @@ impl Library {
         }
     }
 
-    /// Returns the path of ONNX Runtime; `None` for rten.
     pub fn onnx_runtime(&self) -> Option<&Path> {
         match self {
             Self::OnnxRuntime(path) => Some(path),

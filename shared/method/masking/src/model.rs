@@ -1,7 +1,7 @@
 //! A model and its card, which states the model's file and the rasters that it was trained on.
 
 use std::{
-    fmt, io,
+    fmt,
     path::{Path, PathBuf},
 };
 
@@ -9,9 +9,8 @@ use gyre_radar::{RasterConfig, Sampling};
 use gyre_storage::quoted;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
-use thiserror::Error;
 
-use crate::{MaskingConfig, external::external_file};
+use crate::{MaskingConfig, external::external_file, network::NetworkError};
 
 /// The size limit of models: hundreds of times a mask's.
 const MAX_BYTES: u64 = 1 << 30;
@@ -20,36 +19,26 @@ const MAX_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Card {
     pub model: NetworkFacts,
-    /// The rasters that it was trained on.
     pub raster: RasterFacts,
     /// The processing of these rasters; optional.
     #[serde(default)]
     pub masking: MaskingFacts,
 }
 
-/// The section `[model]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct NetworkFacts {
     /// The model's file, in the folder of the card.
     pub file: PathBuf,
-    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Number of scans that it takes: 1, or 2 (this one and the previous one).
     pub inputs: usize,
-    /// Version of the ONNX operators.
     pub opset: u32,
 }
 
-/// The section `[raster]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct RasterFacts {
-    /// Cells per side.
     pub n: usize,
-    /// Size of a cell, m.
     pub cell_m: f32,
-    /// Sampling of range bins to cells.
     pub sampling: Option<Sampling>,
-    /// Ranges below this are left out, m.
     pub min_range_m: Option<f32>,
     /// Width of the average of [`Sampling::Averaged`], in cells.
     pub averaged_cells: Option<f32>,
@@ -60,9 +49,7 @@ pub struct RasterFacts {
 pub struct MaskingFacts {
     /// The highest power that was set to zero.
     pub floor: Option<u8>,
-    /// True if rasters were motion-compensated.
     pub compensate: Option<bool>,
-    /// True if the Doppler shift of ranges was compensated.
     pub undo_doppler: Option<bool>,
 }
 
@@ -71,125 +58,68 @@ pub struct MaskingFacts {
 pub struct Model {
     pub card: Card,
     pub file: PathBuf,
-    /// The content of the file.
     pub bytes: Vec<u8>,
-}
-
-/// An error in reading a model.
-#[derive(Debug, Error)]
-pub enum ModelError {
-    #[error(
-        "masking.kind is `learned`, but masking.model does not name a model: set it to the card of one, as in models/NAME.toml"
-    )]
-    NotNamed,
-    #[error("cannot read the model's {what} {path}: {source}")]
-    Unreadable {
-        /// `card` or `file`.
-        what: &'static str,
-        path: PathBuf,
-        source: io::Error,
-    },
-    #[error("masking.model is {path}, which is not the card of a model: {reason}")]
-    NotACard { path: PathBuf, reason: String },
-    #[error(
-        "{path} has the SHA-256 {actual}, but its card says {expected}: it is damaged or another model's, so get it again together with its card"
-    )]
-    Checksum {
-        /// The model's file.
-        path: PathBuf,
-        /// The value of the card.
-        expected: String,
-        actual: String,
-    },
-    /// The file keeps weights in another file, which no checksum covers.
-    #[error(
-        "{path} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
-         `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",
-        quoted(.file)
-    )]
-    External {
-        /// The model's file.
-        path: PathBuf,
-        /// The name of the other file.
-        file: String,
-    },
-    #[error(
-        "masking.sha256 is {expected}, but {path} is the card of a model with {actual}: name the other model, or leave masking.sha256 out"
-    )]
-    OtherModel {
-        path: PathBuf,
-        /// The value of the configuration.
-        expected: String,
-        /// The value of the card.
-        actual: String,
-    },
-    /// The rasters have another size than those that the model was trained on.
-    #[error(
-        "raster.{key} is {actual}, but the model {path} is for {expected}: set raster.{key} = {expected}, or choose another masking.model"
-    )]
-    Raster {
-        /// The key of the section `[raster]`.
-        key: &'static str,
-        path: PathBuf,
-        /// The value of the card.
-        expected: f64,
-        /// The value of the configuration.
-        actual: f64,
-    },
 }
 
 impl Card {
     /// Reads the card that `masking.model` names.
-    pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
-        let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
-        let not_a_card = |reason: String| ModelError::NotACard {
-            path: path.to_owned(),
-            reason,
+    pub fn read(config: &MaskingConfig) -> Result<Self, NetworkError> {
+        let (_, card) = Self::named(config).map_err(NetworkError::Model)?;
+        Ok(card)
+    }
+
+    /// Returns the path and the content of the card that `masking.model` names.
+    fn named(config: &MaskingConfig) -> Result<(&Path, Self), String> {
+        let path = config.model.as_deref().ok_or(
+            "masking.kind is `learned`, but masking.model does not name a model: set it to the card of one, as in models/NAME.toml",
+        )?;
+        let shown = path.display();
+        let not_a_card = |reason: fmt::Arguments<'_>| {
+            format!("masking.model is {shown}, which is not the card of a model: {reason}")
         };
         if path
             .extension()
             .is_some_and(|extension| extension == "onnx")
         {
-            return Err(not_a_card(
-                "it is the model itself; its card is the .toml beside it".to_owned(),
-            ));
-        }
-        let unreadable = |source| ModelError::Unreadable {
-            what: "card",
-            path: path.to_owned(),
-            source,
-        };
-        let text = match gyre_shipped::text(path) {
-            Some(text) => text.to_owned(),
-            None => gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?,
-        };
-        let card: Self = toml::from_str(&text)
-            .map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
-        if !(1..=2).contains(&card.model.inputs) {
-            return Err(not_a_card(format!(
-                "model.inputs is {}, but must be 1 or 2",
-                card.model.inputs
+            return Err(not_a_card(format_args!(
+                "it is the model itself; its card is the .toml beside it"
             )));
         }
-        if !is_sha256(&card.model.sha256) {
-            let reason = "model.sha256 is not 64 hexadecimal digits";
-            return Err(not_a_card(reason.to_owned()));
+        let text = match gyre_shipped::text(path) {
+            Some(text) => text.to_owned(),
+            None => gyre_storage::read_text(path, gyre_storage::SETTINGS)
+                .map_err(|error| format!("cannot read the model's card {shown}: {error}"))?,
+        };
+        let card: Self = toml::from_str(&text).map_err(|error| {
+            let reason = error.message().trim().replace('\n', "; ");
+            not_a_card(format_args!("{reason}"))
+        })?;
+        let NetworkFacts {
+            inputs,
+            file,
+            sha256,
+            ..
+        } = &card.model;
+        if !(1..=2).contains(inputs) {
+            return Err(not_a_card(format_args!(
+                "model.inputs is {inputs}, but must be 1 or 2"
+            )));
         }
-        if !is_plain_name(&card.model.file) {
-            return Err(not_a_card(format!(
-                "model.file is {:?}, but must name a file in the folder of the card",
-                card.model.file
+        if !is_sha256(sha256) {
+            return Err(not_a_card(format_args!(
+                "model.sha256 is not 64 hexadecimal digits"
+            )));
+        }
+        if !is_plain_name(file) {
+            return Err(not_a_card(format_args!(
+                "model.file is {file:?}, but must name a file in the folder of the card"
             )));
         }
         match &config.sha256 {
-            Some(expected) if !expected.eq_ignore_ascii_case(&card.model.sha256) => {
-                Err(ModelError::OtherModel {
-                    path: path.to_owned(),
-                    expected: expected.clone(),
-                    actual: card.model.sha256,
-                })
-            }
-            _ => Ok(card),
+            Some(expected) if !expected.eq_ignore_ascii_case(sha256) => Err(format!(
+                "masking.sha256 is {expected}, but {shown} is the card of a model with {sha256}: name the other model, or leave masking.sha256 out"
+            )),
+            _ => Ok((path, card)),
         }
     }
 
@@ -200,34 +130,32 @@ impl Card {
         masking: &MaskingConfig,
         raster: &RasterConfig,
     ) -> Vec<String> {
-        let averaged = raster.sampling == Sampling::Averaged;
+        let (trained, trained_mask) = (&self.raster, &self.masking);
+        let averaged_cells = trained.averaged_cells;
+        let averaged_cells = averaged_cells.filter(|_| raster.sampling == Sampling::Averaged);
         let differences = [
-            mismatch("masking.threshold", self.masking.floor, masking.floor()),
+            mismatch("masking.threshold", trained_mask.floor, masking.floor()),
             mismatch(
                 "masking.compensate",
-                self.masking.compensate,
+                trained_mask.compensate,
                 masking.compensate,
             ),
             mismatch(
                 "masking.undo_doppler",
-                self.masking.undo_doppler,
+                trained_mask.undo_doppler,
                 masking.undo_doppler,
             ),
             mismatch(
                 "raster.min_range_m",
-                self.raster.min_range_m,
+                trained.min_range_m,
                 raster.min_range_m,
             ),
-            mismatch("raster.sampling", self.raster.sampling, raster.sampling),
-            averaged
-                .then(|| {
-                    mismatch(
-                        "raster.averaged_cells",
-                        self.raster.averaged_cells,
-                        raster.averaged_cells,
-                    )
-                })
-                .flatten(),
+            mismatch("raster.sampling", trained.sampling, raster.sampling),
+            mismatch(
+                "raster.averaged_cells",
+                averaged_cells,
+                raster.averaged_cells,
+            ),
         ];
         differences.into_iter().flatten().collect()
     }
@@ -251,65 +179,52 @@ fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T)
 
 impl Model {
     /// Reads the model that `masking.model` names and checks that it fits these rasters.
-    pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
-        let card = Card::read(config)?;
-        let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
+    pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
+        Self::fitting(config, raster).map_err(NetworkError::Model)
+    }
+
+    fn fitting(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, String> {
+        let (path, card) = Card::named(config)?;
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);
-        let unreadable = |source| ModelError::Unreadable {
-            what: "file",
-            path: file.clone(),
-            source,
-        };
+        let shown = file.display();
         let bytes = match gyre_shipped::bytes(&file) {
             Some(bytes) => bytes.to_owned(),
-            None => gyre_storage::read_bytes(&file, MAX_BYTES).map_err(unreadable)?,
+            None => gyre_storage::read_bytes(&file, MAX_BYTES)
+                .map_err(|error| format!("cannot read the model's file {shown}: {error}"))?,
         };
-        let actual = hexadecimal(&Sha256::digest(&bytes));
-        if !actual.eq_ignore_ascii_case(&card.model.sha256) {
-            return Err(ModelError::Checksum {
-                path: file,
-                expected: card.model.sha256,
-                actual,
-            });
+        let (expected, actual) = (&card.model.sha256, hexadecimal(&Sha256::digest(&bytes)));
+        if !actual.eq_ignore_ascii_case(expected) {
+            return Err(format!(
+                "{shown} has the SHA-256 {actual}, but its card says {expected}: it is damaged or another model's, so get it again together with its card"
+            ));
         }
         match external_file(&bytes) {
             None => Ok(Self { card, file, bytes }),
-            Some(other) => Err(ModelError::External {
-                path: file,
-                file: other,
-            }),
+            // No checksum covers the other file.
+            Some(other) => Err(format!(
+                "{shown} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
+                 `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",
+                quoted(&other)
+            )),
         }
     }
 }
 
-fn check_raster(
-    path: &Path,
-    trained: &RasterFacts,
-    raster: &RasterConfig,
-) -> Result<(), ModelError> {
-    let differs = |key, expected: f64, actual: f64| ModelError::Raster {
-        key,
-        path: path.to_owned(),
-        expected,
-        actual,
+fn check_raster(path: &Path, trained: &RasterFacts, raster: &RasterConfig) -> Result<(), String> {
+    let differs = |key: &str, expected: &dyn fmt::Display, actual: &dyn fmt::Display| {
+        let path = path.display();
+        Err(format!(
+            "raster.{key} is {actual}, but the model {path} is for {expected}: set raster.{key} = {expected}, or choose another masking.model"
+        ))
     };
     if trained.n != raster.n {
-        return Err(differs("n", trained.n as f64, raster.n as f64));
+        return differs("n", &trained.n, &raster.n);
     }
     match (trained.cell_m - raster.cell_m).abs() <= 1e-4 * trained.cell_m {
         true => Ok(()),
-        false => Err(differs(
-            "cell_m",
-            shortest_decimal(trained.cell_m),
-            shortest_decimal(raster.cell_m),
-        )),
+        false => differs("cell_m", &trained.cell_m, &raster.cell_m),
     }
-}
-
-/// Converts without the digits that an `f32` gains as `f64`: 0.8, not 0.800000011920929.
-fn shortest_decimal(value: f32) -> f64 {
-    value.to_string().parse().unwrap_or(value.into())
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

@@ -1,23 +1,16 @@
 //! A learned mask: a network in ONNX Runtime, in rten, or of 8-bit integers without either.
 
-mod fold;
 mod integers;
 mod onnx_runtime;
 mod rten;
 mod tensors;
-
-use std::path::PathBuf;
 
 use gyre_radar::raster::RasterConfig;
 use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::networks::runtime::RuntimeError;
-use crate::{
-    Backend, Library, MaskingConfig, Provider,
-    model::{Model, ModelError},
-};
+use crate::{Backend, Library, MaskingConfig, model::Model, networks::runtime::RuntimeError};
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
@@ -25,59 +18,32 @@ use rten::Rten;
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
 
-/// An error in loading or running a network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
     #[error(transparent)]
-    Model(#[from] ModelError),
-    #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    #[error(
-        "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
-    )]
-    NotBuiltIn(Provider),
-    /// The execution provider does not work on this machine or with this ONNX Runtime.
-    #[error(
-        "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
-    )]
-    Provider {
-        provider: Provider,
-        /// ONNX Runtime's error.
-        reason: String,
-    },
-    #[error("{} cannot load {path}: {reason}", .by.name())]
-    Load {
-        by: Backend,
-        /// The model's file.
-        path: PathBuf,
-        /// The backend's error.
-        reason: String,
-    },
-    #[error(
-        "{path} has operators of version {opset}, and this {} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime",
-        .by.name()
-    )]
-    Opset {
-        /// The model's file.
-        path: PathBuf,
-        /// The version of its operators.
-        opset: i64,
-        by: Backend,
-        /// The newest version that the backend supports.
-        known: String,
-    },
-    #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
-    Interface {
-        /// The model's file.
-        path: PathBuf,
-        has: String,
-        expected: String,
-    },
+    /// A model or an execution provider that cannot be used.
+    #[error("{0}")]
+    Model(String),
     #[error("the learned mask cannot be computed: {0}")]
     Run(String),
 }
 
-/// A network that computes masks from rasters.
+impl NetworkError {
+    fn load(by: Backend, model: &Model, reason: &str) -> Self {
+        let (by, path) = (by.name(), model.file.display());
+        Self::Model(format!("{by} cannot load {path}: {reason}"))
+    }
+
+    /// A model with operators of a version newer than the newest that a backend supports.
+    fn opset(by: Backend, model: &Model, opset: i64, known: &str) -> Self {
+        let (by, path) = (by.name(), model.file.display());
+        Self::Model(format!(
+            "{path} has operators of version {opset}, and this {by} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime"
+        ))
+    }
+}
+
 #[derive(Debug)]
 pub struct Network {
     engine: Engine,
@@ -138,7 +104,6 @@ impl Network {
         Ok(self.masks.view())
     }
 
-    /// Returns the masks of the last [`Network::run`], scans x n x n.
     pub fn masks(&self) -> ArrayView3<'_, f32> {
         self.masks.view()
     }
@@ -157,7 +122,6 @@ fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), Network
     Ok((engine, inputs, outputs))
 }
 
-/// Copies computed factors, clamped to 0 to 1.
 fn fill(mut masks: ArrayViewMut3<'_, f32>, computed: &[f32]) -> Result<(), NetworkError> {
     let cells = masks.len();
     let Some(masks) = masks.as_slice_mut().filter(|_| cells == computed.len()) else {
@@ -186,7 +150,6 @@ fn clamp(values: &[f32], clamped: &mut [f32]) -> u32 {
     broken
 }
 
-/// Checks that the inputs or outputs of a network are exactly the expected tensor.
 fn check(
     verb: &str,
     name: &str,
@@ -197,10 +160,10 @@ fn check(
     let expected = format!("`{name}` Float32 {shape:?}");
     match tensors {
         [tensor] if *tensor == expected => Ok(()),
-        _ => Err(NetworkError::Interface {
-            path: model.file.clone(),
-            has: format!("{verb} {}", tensors.join(" and ")),
-            expected,
-        }),
+        _ => Err(NetworkError::Model(format!(
+            "{} {verb} {}, but by its card it must have only {expected}: export it again",
+            model.file.display(),
+            tensors.join(" and ")
+        ))),
     }
 }

@@ -1,7 +1,4 @@
 //! Networks, computed by ONNX Runtime or rten.
-//!
-//! - [`runtime`]: the search for ONNX Runtime;
-//! - [`PlanesNetwork`]: a network in the program that is shown planes of cells.
 
 mod planes;
 pub mod runtime;

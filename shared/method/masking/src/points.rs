@@ -7,11 +7,8 @@ use ndarray::ArrayView2;
 /// The properties of a raster that determine a point's cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterFrame {
-    /// Cells per side.
     pub n: usize,
-    /// Size of a cell, m.
     pub cell_m: f32,
-    /// The velocity of motion compensation.
     pub twist: Option<Twist>,
     /// True if the Doppler shift is compensated with the same velocity.
     pub doppler_compensated: bool,
@@ -38,7 +35,6 @@ impl RasterFrame {
         self.cell_seen_from(self.sensor_at(point), point)
     }
 
-    /// Returns the pose of the sensor in the raster's frame at the time of the point's azimuth.
     fn sensor_at(&self, point: &SparsePoint) -> Option<Pose> {
         self.twist.map(|twist| twist.pose_at(point.time_s.into()))
     }
@@ -78,124 +74,20 @@ impl RasterFrame {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::tests::{AZIMUTHS, empty};
     use gyre_radar::{
-        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
-        raster::Rasteriser, scan::flag,
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, Sense, raster::Rasteriser,
     };
     use ndarray::Array2;
 
-    const FRAME: RasterFrame = RasterFrame {
-        n: 5,
-        cell_m: 2.0,
-        twist: None,
-        doppler_compensated: false,
-    };
-
-    /// Returns the factor of a point's weight if the mask is 0.5 in cell (row, column) and 1
-    /// elsewhere.
-    fn factor(
-        frame: RasterFrame,
-        (row, column): (usize, usize),
-        [x_m, y_m, time_s, doppler_s]: [f32; 4],
-    ) -> f32 {
-        let mut mask = Array2::ones((5, 5));
-        mask[[row, column]] = 0.5;
-        let mut points = [SparsePoint {
-            x_m,
-            y_m,
-            time_s,
-            weight: 1.0,
-            doppler_s,
-        }];
-        frame.weight(mask.view(), 1.0, &mut points);
-        points[0].weight
-    }
-
-    #[test]
-    fn a_point_has_the_mask_of_its_cell() {
-        assert_eq!(factor(FRAME, (0, 2), [4.9, 0.9, 0.0, 0.0]), 0.5);
-        assert_eq!(factor(FRAME, (2, 0), [-0.9, 3.1, 0.0, 0.0]), 0.5);
-        assert_eq!(factor(FRAME, (2, 0), [-1.1, 3.1, 0.0, 0.0]), 1.0);
-    }
-
-    #[test]
-    fn a_point_outside_of_the_raster_keeps_its_weight() {
-        for place in [
-            [5.1, 0.0],
-            [-5.1, 0.0],
-            [0.0, 5.1],
-            [0.0, -5.1],
-            [f32::NAN, 0.0],
-        ] {
-            let mut points = [SparsePoint {
-                x_m: place[0],
-                y_m: place[1],
-                weight: 0.7,
-                ..SparsePoint::default()
-            }];
-            FRAME.weight(Array2::zeros((5, 5)).view(), 1.0, &mut points);
-            assert_eq!(points[0].weight, 0.7, "{place:?}");
-        }
-    }
-
-    #[test]
-    fn the_exponent_compresses_the_mask() {
-        let mut points = [SparsePoint {
-            weight: 0.8,
-            ..SparsePoint::default()
-        }];
-        FRAME.weight(Array2::from_elem((5, 5), 0.25).view(), 0.5, &mut points);
-        assert_eq!(points[0].weight, 0.4);
-    }
-
-    #[test]
-    fn a_point_is_motion_compensated_like_its_raster() {
-        let twist = Some(Twist {
-            vx_mps: 10.0,
-            vy_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        });
-        let moving = RasterFrame { twist, ..FRAME };
-        assert_eq!(factor(moving, (1, 2), [0.0, 0.0, 0.2, 0.0]), 0.5);
-        assert_eq!(factor(moving, (3, 2), [0.0, 0.0, -0.2, 0.0]), 0.5);
-        let quarter = std::f64::consts::FRAC_PI_2 / 0.1;
-        let turning = RasterFrame {
-            twist: Some(Twist {
-                vx_mps: 0.0,
-                vy_mps: 0.0,
-                yaw_rate_radps: quarter,
-            }),
-            ..FRAME
-        };
-        assert_eq!(factor(turning, (2, 0), [4.0, 0.0, 0.1, 0.0]), 0.5);
-    }
-
-    const AZIMUTHS: usize = 400;
     const BINS: usize = 500;
 
     /// A return in every twentieth azimuth, at ranges from 15 to 80 m, seen within 0.25 s.
     fn spots(sense: Sense) -> OwnedScan {
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: AZIMUTHS * BINS,
-            azimuths: AZIMUTHS,
-        });
-        let sizes = SweepGeometry {
-            azimuths: AZIMUTHS,
-            bins: BINS,
-            stride: BINS,
-            ..scan.geometry
-        };
-        scan.geometry = SweepGeometry {
-            range_resolution_m: 0.175,
-            doppler_s: 0.05,
-            sense,
-            ..sizes
-        };
-        for azimuth in 0..AZIMUTHS {
-            scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
-            scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
-            scan.flags[azimuth] = flag::MEASURED;
-        }
+        let mut scan = empty(BINS);
+        let geometry = &mut scan.geometry;
+        (geometry.range_resolution_m, geometry.doppler_s) = (0.175, 0.05);
+        geometry.sense = sense;
         for azimuth in (5..AZIMUTHS).step_by(20) {
             scan.bytes[azimuth * BINS + 90 + azimuth * 7 % 360..][..6].fill(200);
         }
@@ -262,21 +154,5 @@ mod tests {
                 assert!(share < 0.8, "{share} for {other:?}");
             }
         }
-    }
-
-    #[test]
-    fn the_doppler_shift_is_compensated_if_the_raster_is() {
-        let twist = Some(Twist {
-            vx_mps: 20.0,
-            vy_mps: 0.0,
-            yaw_rate_radps: 0.0,
-        });
-        let [kept, compensated] = [false, true].map(|doppler_compensated| RasterFrame {
-            twist,
-            doppler_compensated,
-            ..FRAME
-        });
-        assert_eq!(factor(kept, (1, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
-        assert_eq!(factor(compensated, (0, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
     }
 }

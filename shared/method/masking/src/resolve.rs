@@ -20,7 +20,6 @@ impl MaskingConfig {
         Ok(())
     }
 
-    /// Resolves the library alone: its absolute path, and the backend.
     pub fn resolve_library(&mut self) -> Result<(), RuntimeError> {
         let library = Library::find(self)?;
         self.backend = library.backend();

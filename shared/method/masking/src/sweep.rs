@@ -3,7 +3,6 @@
 use gyre_geometry::Twist;
 use gyre_radar::PolarScan;
 
-/// A scan and the velocity for its motion compensation.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep<'a> {
     /// The number that identifies the scan in later calls.

@@ -1,32 +1,40 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
 use ndarray::Array2;
 
-const AZIMUTHS: usize = 400;
+pub(crate) const AZIMUTHS: usize = 400;
 const BINS: usize = 300;
 
-/// A scan of a circular wall, 4 m deep, with its middle at 40 m.
-fn wall() -> OwnedScan {
+/// An empty scan of a sweep of 0.25 s.
+pub(crate) fn empty(bins: usize) -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * BINS,
+        bytes: AZIMUTHS * bins,
         azimuths: AZIMUTHS,
     });
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
-        bins: BINS,
-        stride: BINS,
+        bins,
+        stride: bins,
         range_resolution_m: 0.2,
         doppler_s: 0.04,
-        sense: Sense::Clockwise,
-        ..scan.geometry
+        ..SweepGeometry::default()
     };
     for azimuth in 0..AZIMUTHS {
-        scan.bytes[azimuth * BINS + 190..][..20].fill(100);
         scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
+        scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
         scan.flags[azimuth] = flag::MEASURED;
     }
+    scan
+}
+
+/// A scan of a circular wall, 4 m deep, with its middle at 40 m. All rows have one time.
+fn wall() -> OwnedScan {
+    let mut scan = empty(BINS);
+    scan.stamp_ns.fill(0);
+    let rows = scan.bytes.chunks_mut(BINS);
+    rows.for_each(|row| row[190..210].fill(100));
     scan
 }
 
@@ -83,23 +91,16 @@ fn points_start_above_the_threshold() {
         let count = masker.points(&wall().view(), None, &mut out).unwrap();
         (count, out[0].weight)
     };
-    assert_eq!(
-        count(&MaskingConfig::default()),
-        (20 * AZIMUTHS, 40.0 / 60.0)
-    );
-    assert_eq!(
-        count(&MaskingConfig {
-            threshold: 100,
-            ..MaskingConfig::default()
-        })
-        .0,
-        0
-    );
-    assert_eq!(
-        count(&MaskingConfig {
-            kind: MaskKind::None,
-            ..MaskingConfig::default()
-        }),
-        (20 * AZIMUTHS, 1.0)
-    );
+    let default = count(&MaskingConfig::default());
+    assert_eq!(default, (20 * AZIMUTHS, 40.0 / 60.0));
+    let high = MaskingConfig {
+        threshold: 100,
+        ..MaskingConfig::default()
+    };
+    assert_eq!(count(&high).0, 0);
+    let none = MaskingConfig {
+        kind: MaskKind::None,
+        ..MaskingConfig::default()
+    };
+    assert_eq!(count(&none), (20 * AZIMUTHS, 1.0));
 }

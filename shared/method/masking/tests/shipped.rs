@@ -19,15 +19,10 @@ use ndarray::Array3;
 
 fn cards() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../models");
-    let files = fs::read_dir(folder)
-        .unwrap()
-        .map(|file| file.unwrap().path());
-    files
-        .filter(|file| {
-            file.extension()
-                .is_some_and(|extension| extension == "toml")
-        })
-        .collect()
+    let files = fs::read_dir(folder).unwrap();
+    let files = files.map(|file| file.unwrap().path());
+    let is_card = |file: &PathBuf| file.extension().is_some_and(|it| it == "toml");
+    files.filter(is_card).collect()
 }
 
 fn trained_raster(card: &Card) -> RasterConfig {
@@ -73,17 +68,14 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
             masks
         };
         let apart = (masks(Backend::Rten) - masks(Backend::OnnxRuntime)).mapv(f32::abs);
-        let (most, mean) = (
-            apart.iter().copied().fold(0.0, f32::max),
-            apart.mean().unwrap(),
-        );
+        let most = apart.iter().copied().fold(0.0, f32::max);
+        let mean = apart.mean().unwrap();
         // An 8-bit network rounds the values of each layer to 256 steps. Where the libraries differ
         // in the last digit, that may be a step.
         let limits = match fs::metadata(path.with_extension("onnx")).unwrap().len() {
             ..4_000_000 => (16.0 / 255.0, 0.5 / 255.0),
             _ => (1e-5, 1e-6),
         };
-        println!("{}: at most {most}, in the mean {mean}", path.display());
         assert!(
             most <= limits.0 && mean <= limits.1,
             "{}: at most {most}, in the mean {mean}",

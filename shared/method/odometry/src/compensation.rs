@@ -22,7 +22,6 @@ impl LaggedTwists {
         }
     }
 
-    /// Returns the velocity for the next scan.
     pub fn next(&self) -> Option<Twist> {
         match self.last.len() == self.lag {
             true => self.last.front().copied().flatten(),
@@ -30,7 +29,6 @@ impl LaggedTwists {
         }
     }
 
-    /// Adds the velocity of the scan that was registered.
     pub fn push(&mut self, found: Option<Twist>) {
         self.last.push_back(found);
         if self.last.len() > self.lag {

@@ -4,11 +4,12 @@ use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The settings of the method, by section of a run's configuration. A run's file can be read as
 /// this: other sections are ignored.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct OdometryConfig {
     /// The Cartesian rasters.
@@ -36,16 +37,13 @@ pub struct OdometryConfig {
 }
 
 impl OdometryConfig {
-    /// Returns whether samples of other sensors come with the scans.
     pub fn has_samples(&self) -> bool {
         self.gyro.is_used() || self.wheels.is_used()
     }
 }
 
 /// The section `[search]`.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SearchConfig {
     /// `decoupled`: rotation, then translation. `exhaustive`: both together, every angle.
@@ -53,9 +51,7 @@ pub struct SearchConfig {
 }
 
 /// The kind of a search.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SearchKind {
     /// Rotation first, from the Fourier magnitudes, then translation (Weston et al., Sec. III-C).

@@ -1,23 +1,24 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
+use gyre_masking::Masker;
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, NoDoppler, PlacedRows, PolarScan,
 };
 use gyre_samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate};
-use gyre_scan_matching::{JointMatch, Refined};
+use gyre_scan_matching::{JointMatch, Refined, Refiner};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    Mask, OdometryConfig, OdometryError, Outcome, Pair, Parts, Refine, Registered, Search,
-    SetupError, compensation::LaggedTwists,
+    OdometryConfig, OdometryError, Outcome, Pair, Parts, Registered, Search, SetupError,
+    compensation::LaggedTwists,
 };
 
 /// Radar odometry. Registers scan after scan against the previous ones.
 pub struct Odometry {
-    masker: Box<dyn Mask>,
+    masker: Masker,
     search: Box<dyn Search>,
-    refiner: Option<Box<dyn Refine>>,
+    refiner: Option<Refiner>,
     twists: LaggedTwists,
     gyro: Gyro,
     wheels: Wheels,
@@ -27,7 +28,6 @@ pub struct Odometry {
     finder: LostAzimuthFinder,
     lost: LostAzimuths,
     rows: PlacedRows,
-    /// The scan that is being registered and the one before it.
     pair: Pair,
     driven: ComposedMotion,
 }
@@ -81,8 +81,8 @@ impl Odometry {
         let (stamp_ns, span_ns) = (scan.geometry.stamp_ns, scan.span_ns());
         self.gyro.push(samples, stamp_ns, span_ns);
         self.wheels.push(samples, stamp_ns, span_ns);
-        self.pair.expect_turn(self.gyro.turn());
-        self.pair.expect_distance(self.wheels.distance());
+        self.pair.turn = self.gyro.turn();
+        self.pair.distance = self.wheels.distance();
         let [_, rate] = self.gyro.sweep_rates_radps();
         let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {
@@ -108,13 +108,13 @@ impl Odometry {
         scan.check()?;
         self.lost = self.finder.find(scan, twist);
         let placed = self.rows.place(scan, &self.lost);
-        self.pair.mask(self.masker.as_mut(), &placed, twist)?;
+        self.pair.mask(&mut self.masker, &placed, twist)?;
         let doppler = self.doppler.as_mut();
         self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
         let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
-        self.pair.set_velocity(velocity.copied());
+        self.pair.later.velocity = velocity.copied();
         let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
-        self.pair.expect_azimuth_errors(variance_rad2);
+        self.pair.later.azimuth_variance_rad2 = variance_rad2;
         Ok(())
     }
 
@@ -130,7 +130,12 @@ impl Odometry {
     /// is configured.
     pub fn refine(&mut self, searched: &JointMatch) -> Option<Refined> {
         let refiner = self.refiner.as_mut()?;
-        Some(refiner.refine(&self.pair, &searched.motion.pose()))
+        let pair = &self.pair;
+        refiner.aiding = pair.aiding();
+        let (later, earlier) = (pair.later_points(), pair.earlier_points());
+        let searched = searched.motion.pose();
+        let interval_s = pair.interval_ns() as f64 * 1e-9;
+        Some(refiner.refine(pair.seq(), later, earlier, &searched, interval_s))
     }
 
     /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2; see [`ComposedMotion`]).
@@ -162,7 +167,7 @@ impl Odometry {
 
     /// Starts a new chain with the next scan; the pose stays.
     pub fn restart(&mut self) {
-        self.pair.restart();
+        self.pair.seq = 0;
         self.twists.clear();
         self.gyro.clear();
         self.wheels.clear();
@@ -180,21 +185,20 @@ impl Odometry {
 
     /// Returns the raster of [`Odometry::mask`] before the search: n x n, row 0 far ahead.
     pub fn masked_mut(&mut self) -> ArrayViewMut2<'_, f32> {
-        self.pair.later_mut()
+        self.pair.later.raster.view_mut()
     }
 
     /// Returns the masked raster of the last registered scan, n x n, row 0 far ahead.
     pub fn raster(&self) -> ArrayView2<'_, f32> {
-        self.pair.earlier_alone()
+        self.pair.earlier.raster.view()
     }
 
     /// Returns the raster of the scan before the last one, masked for this pair, if the mask takes
     /// two scans.
     pub fn previous_raster(&self) -> Option<ArrayView2<'_, f32>> {
-        self.pair.earlier_for_pair()
+        self.pair.earlier_for_pair.as_ref().map(|it| it.view())
     }
 
-    /// Returns the points of the last registered scan.
     pub fn points(&self) -> &[SparsePoint] {
         self.pair.earlier_points()
     }
@@ -211,13 +215,11 @@ impl Odometry {
         self.lost
     }
 
-    /// Returns the velocity for the motion compensation of the last registered scan.
     pub fn twist(&self) -> Option<Twist> {
-        self.pair.earlier_twist()
+        self.pair.earlier.twist
     }
 }
 
-/// Returns the refined motion, else the searched one, and its origin.
 fn estimate(searched: Option<&JointMatch>, refined: Option<&Refined>) -> (OdometryMotion, Outcome) {
     match (searched, refined) {
         (_, Some(refined)) => (refined.motion, refined.outcome.into()),

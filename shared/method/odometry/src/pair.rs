@@ -1,34 +1,34 @@
 //! The scan that is being registered and the one before it.
 
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_masking::Sweep;
+use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
 use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
-use ndarray::{Array2, ArrayView2, ArrayViewMut2};
+use gyre_scan_matching::Aiding;
+use ndarray::{Array2, ArrayView2};
 
-use crate::{Mask, OdometryError, Rasters};
+use crate::OdometryError;
 
 /// Two consecutive scans: their masked rasters (n x n, row 0 far ahead) and their points.
 pub struct Pair {
-    later: Frame,
-    earlier: Frame,
+    pub(crate) later: Frame,
+    pub(crate) earlier: Frame,
     /// The raster of the earlier scan, masked for this pair, if the mask takes two scans.
-    earlier_for_pair: Option<Array2<f32>>,
-    seq: u64,
-    /// From the earlier scan to the later one.
-    turn: Option<GyroTurn>,
-    distance: Option<WheelDistance>,
+    pub(crate) earlier_for_pair: Option<Array2<f32>>,
+    pub(crate) seq: u64,
+    /// The turn and the distance from the earlier scan to the later one, by gyro and wheels.
+    pub(crate) turn: Option<GyroTurn>,
+    pub(crate) distance: Option<WheelDistance>,
 }
 
-/// The products of a scan.
-struct Frame {
+pub(crate) struct Frame {
     stamp_ns: i64,
-    twist: Option<Twist>,
-    azimuth_variance_rad2: f32,
-    velocity: Option<DopplerVelocity>,
-    raster: Array2<f32>,
+    pub twist: Option<Twist>,
+    /// Variance of the mean azimuth of the rows: not zero if azimuths were lost at unknown places.
+    pub azimuth_variance_rad2: f32,
+    pub velocity: Option<DopplerVelocity>,
+    pub raster: Array2<f32>,
     points: Vec<SparsePoint>,
-    /// Number of points in use.
     count: usize,
 }
 
@@ -39,7 +39,6 @@ impl Pair {
         self.seq
     }
 
-    /// Returns the raster of the later scan.
     pub fn later(&self) -> ArrayView2<'_, f32> {
         self.later.raster.view()
     }
@@ -57,12 +56,10 @@ impl Pair {
         self.earlier_for_pair.is_some()
     }
 
-    /// Returns the points of the later scan.
     pub fn later_points(&self) -> &[SparsePoint] {
         self.later.points()
     }
 
-    /// Returns the points of the earlier scan.
     pub fn earlier_points(&self) -> &[SparsePoint] {
         self.earlier.points()
     }
@@ -77,47 +74,20 @@ impl Pair {
         }
     }
 
-    /// Returns the time between the two scans, ns.
     pub fn interval_ns(&self) -> i64 {
         let [earlier, later] = self.stamps_ns();
         later.saturating_sub(earlier)
     }
 
-    /// Returns the variance of the turn from the earlier scan to the later one due to the mean
-    /// azimuths of both, rad²: not zero if azimuths were lost at unknown places.
-    pub fn azimuth_variance_rad2(&self) -> f32 {
-        self.earlier.azimuth_variance_rad2 + self.later.azimuth_variance_rad2
-    }
-
-    /// Returns the turn from the earlier scan to the later one, as the gyro has measured it.
-    pub fn turn(&self) -> Option<GyroTurn> {
-        self.turn
-    }
-
-    /// Sets the turn from the earlier scan to the one that comes.
-    pub(crate) fn expect_turn(&mut self, turn: Option<GyroTurn>) {
-        self.turn = turn;
-    }
-
-    /// Returns the distance from the earlier scan to the later one, as the wheels have measured it.
-    pub fn distance(&self) -> Option<WheelDistance> {
-        self.distance
-    }
-
-    /// Returns the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
-    /// does not determine it.
-    pub fn velocities(&self) -> [Option<DopplerVelocity>; 2] {
-        [self.earlier.velocity, self.later.velocity]
-    }
-
-    /// Sets the velocity by Doppler of the later scan.
-    pub(crate) fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
-        self.later.velocity = velocity;
-    }
-
-    /// Sets the distance from the earlier scan to the one that comes.
-    pub(crate) fn expect_distance(&mut self, distance: Option<WheelDistance>) {
-        self.distance = distance;
+    /// Returns what is known about the motion beside the rasters and the points.
+    pub(crate) fn aiding(&self) -> Aiding {
+        let [earlier, later] = [&self.earlier, &self.later];
+        Aiding {
+            azimuth_variance_rad2: earlier.azimuth_variance_rad2 + later.azimuth_variance_rad2,
+            turn: self.turn,
+            distance: self.distance,
+            velocities: [earlier.velocity, later.velocity],
+        }
     }
 
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {
@@ -134,7 +104,7 @@ impl Pair {
     /// Makes the scan the later one: masks it with motion compensation, and extracts its points.
     pub(crate) fn mask(
         &mut self,
-        masker: &mut dyn Mask,
+        masker: &mut Masker,
         scan: &PolarScan<'_>,
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
@@ -144,20 +114,12 @@ impl Pair {
             twist,
         };
         let frame = &mut self.later;
-        let mut rasters = Rasters {
-            later: frame.raster.view_mut(),
-            earlier: self.earlier_for_pair.as_mut().map(|r| r.view_mut()),
-            follows: self.seq.checked_sub(1),
-        };
-        frame.twist = masker.mask(&sweep, &mut rasters)?;
+        let follows = self.seq.checked_sub(1);
+        let earlier = self.earlier_for_pair.as_mut().map(|r| r.view_mut());
+        frame.twist = masker.mask(&sweep, follows, frame.raster.view_mut(), earlier)?;
         frame.count = masker.points(scan, frame.twist, &mut frame.points)?;
         frame.stamp_ns = scan.geometry.stamp_ns;
         Ok(())
-    }
-
-    /// Sets the variance of the mean azimuth of the later scan's rows, rad².
-    pub(crate) fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
-        self.later.azimuth_variance_rad2 = variance_rad2;
     }
 
     /// Returns whether a scan at this time continues the chain of motions.
@@ -165,35 +127,9 @@ impl Pair {
         self.seq == 0 || continues(self.earlier.stamp_ns, stamp_ns)
     }
 
-    /// Makes the later scan the earlier one.
     pub(crate) fn advance(&mut self) {
         std::mem::swap(&mut self.later, &mut self.earlier);
         self.seq += 1;
-    }
-
-    /// Makes the next scan the first of a chain of motions.
-    pub(crate) fn restart(&mut self) {
-        self.seq = 0;
-    }
-
-    pub(crate) fn later_mut(&mut self) -> ArrayViewMut2<'_, f32> {
-        self.later.raster.view_mut()
-    }
-
-    /// Returns the raster of the earlier scan as it was masked when it was the later one.
-    pub(crate) fn earlier_alone(&self) -> ArrayView2<'_, f32> {
-        self.earlier.raster.view()
-    }
-
-    /// Returns the raster of the earlier scan that was masked for the pair, if the mask takes two
-    /// scans.
-    pub(crate) fn earlier_for_pair(&self) -> Option<ArrayView2<'_, f32>> {
-        self.earlier_for_pair.as_ref().map(|raster| raster.view())
-    }
-
-    /// Returns the velocity for the motion compensation of the earlier scan.
-    pub(crate) fn earlier_twist(&self) -> Option<Twist> {
-        self.earlier.twist
     }
 }
 

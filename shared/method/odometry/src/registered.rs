@@ -10,20 +10,15 @@ use thiserror::Error;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
-    /// Sequence number in the chain of motions, from 0.
     pub seq: u64,
     /// The pose of this scan's frame in the previous scan's frame, with its covariance. The
     /// identity where the chain starts.
     pub motion: OdometryMotion,
     /// The pose in the frame of the first scan, with its covariance.
     pub pose: UncertainMotion,
-    /// The origin of the motion.
     pub outcome: Outcome,
-    /// Time between the two scans, ns.
     pub interval_ns: i64,
-    /// The result of the search; `None` where the chain starts.
     pub searched: Option<JointMatch>,
-    /// The result of the refinement; `None` without one.
     pub refined: Option<Refined>,
 }
 
@@ -37,7 +32,6 @@ impl Registered {
     }
 }
 
-/// The origin of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// No previous scan: the chain of motions starts here.
@@ -65,12 +59,10 @@ pub enum SetupError {
     Search(#[from] ConfigError),
 }
 
-/// An error in registering a scan.
 #[derive(Debug, Error)]
 pub enum OdometryError {
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// The scan is inconsistent, or its times do not form one sweep.
     #[error(transparent)]
     Scan(#[from] ScanError),
     #[error(transparent)]

@@ -3,9 +3,5 @@
 #![allow(clippy::unwrap_used)]
 
 mod covariances;
-mod doppler;
 mod examples;
-mod lost_azimuths;
 mod sample_faults;
-mod standing_pair;
-mod stop_and_go;

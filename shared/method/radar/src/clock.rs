@@ -16,7 +16,6 @@ const SECOND_NS: i64 = 1_000_000_000;
 /// Steps of the offsets, ns: first over the range, then around the best.
 const COARSE_NS: i64 = 250_000_000;
 const STEP_NS: i64 = 50_000_000;
-/// Motions that are compared at most; of more, every so manieth.
 const MAX_MOTIONS: usize = 2000;
 /// Duration of the motions that are compared, ns: longer than a scan, to average the noise of
 /// positions.
@@ -25,33 +24,27 @@ const BASELINE_NS: i64 = 1_000_000_000;
 /// Among hundreds of offsets one of a dozen motions at constant speed agrees by chance.
 const MIN_MOTIONS: usize = 36;
 const MIN_SHARE: f64 = 0.6;
-/// Maximum offset of clocks that agree, s.
 const MAX_AGREEING_S: f64 = 0.15;
 /// Minimum correlation of speeds or yaw rates for a reliable offset.
 const MIN_CORRELATION: f64 = 0.6;
 
-/// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
     /// Delay, s: the motion of the reference at `t` equals the motion of the other trajectory at `t
     /// + delay_s`.
     pub delay_s: f64,
-    /// Correlation of the speeds at that offset.
     pub speed_correlation: f64,
     /// Correlation of the yaw rates at that offset; `None` if a trajectory has no headings.
     pub turn_correlation: Option<f64>,
-    /// True if the trajectories turn in opposite directions.
     pub mirrored: bool,
 }
 
 impl ClockOffset {
-    /// Returns whether the correlation is high enough for the offset to be reliable.
     pub fn is_reliable(&self) -> bool {
         let turns = self.turn_correlation.map(f64::abs);
         turns.map_or(self.speed_correlation, |t| t.max(self.speed_correlation)) >= MIN_CORRELATION
     }
 
-    /// Returns whether the clocks agree.
     pub fn agrees(&self) -> bool {
         self.is_reliable() && self.delay_s.abs() <= MAX_AGREEING_S
     }
@@ -64,7 +57,6 @@ impl fmt::Display for ClockOffset {
     }
 }
 
-/// A motion of the reference.
 struct Motion {
     from_ns: i64,
     to_ns: i64,
@@ -188,7 +180,6 @@ fn fit(motions: &[Motion], other: &Trajectory, late_ns: i64, turns: bool) -> Opt
     })
 }
 
-/// Pearson correlation, from running sums.
 #[derive(Default)]
 struct Correlation {
     n: f64,
@@ -205,7 +196,6 @@ impl Correlation {
         self.products += a * b;
     }
 
-    /// The coefficient; 0 if a variable is constant.
     fn value(&self) -> f64 {
         let variance = |sum: f64, squares: f64| squares / self.n - (sum / self.n).powi(2);
         let (a, b) = (

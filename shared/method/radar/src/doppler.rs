@@ -7,9 +7,6 @@
 //!
 //! A rotation of the radar about itself shifts no range. If the radar is ahead of the centre of the
 //! rotation, the velocity is the radar's, which moves to the side there.
-//!
-//! Steps: `rows` sums bins to cells, `shifts` correlates each row with its neighbours, `fit` finds
-//! the velocity on which most bearings agree.
 
 mod fit;
 mod rows;
@@ -132,6 +129,6 @@ impl DopplerEstimator {
         check_chirps(scan)?;
         self.rows.update(scan, min_range_m);
         self.shifts.update(scan, &self.rows);
-        self.fit.velocity(self.shifts.rows())
+        self.fit.velocity(&self.shifts.rows)
     }
 }

@@ -1,12 +1,4 @@
 //! Polar radar scans: their grid, lost azimuths, rasters and sparse points.
-//!
-//! Reading order:
-//! - [`scan`]: one sweep in the sensor's polar grid, borrowed for reading or for filling;
-//! - [`lost`]: where azimuths of a turn were lost that has no measured angles;
-//! - [`raster`]: from a scan to a Cartesian raster, with motion compensation;
-//! - [`points`]: from a scan to sparse points, its strongest returns;
-//! - [`doppler`]: from one scan to the velocity of the radar, if its chirps alternate;
-//! - [`trajectory`]: poses with times; [`clock_offset`]: how far the clocks of two are apart.
 
 mod chain;
 mod clock;
@@ -22,9 +14,10 @@ pub mod trajectory;
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use doppler::{DopplerEstimator, NoDoppler, check_chirps};
+pub use gyre_samples::SettingError;
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;
-pub use points::{PointExtractor, PointsConfig, PointsError};
+pub use points::{PointExtractor, PointsConfig};
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 pub use scan::{
     MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,

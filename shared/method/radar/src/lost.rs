@@ -3,10 +3,6 @@
 //! The rows behind a lost azimuth have moved up by one. The last rows of the image are *stale*:
 //! they hold the powers of the turn before ([`flag::STALE`]). So it is known how many azimuths were
 //! lost, but not where. [`LostAzimuthFinder`] finds that by aligning a scan with the one before it.
-//!
-//! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (the data for alignment);
-//! `prediction` (the scan before as the sensor would see it now); `alignment` (how likely each
-//! place is); [`repair`].
 
 mod alignment;
 mod echoes;
@@ -125,7 +121,6 @@ impl LostAzimuths {
     }
 }
 
-/// Finds where azimuths of scans were lost.
 #[derive(Clone, Debug, Default)]
 pub struct LostAzimuthFinder {
     /// The echoes of the rows as they follow each other.

@@ -5,9 +5,6 @@
 //! azimuths within the antenna's beam: a scatterer appears in several azimuths, and the strongest
 //! gives its bearing. There is no suppression along range, so that a wall at a grazing angle is
 //! kept as a whole.
-//!
-//! Steps: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths,
-//! and [`PointExtractor`] converts the strongest of them to points.
 
 mod peaks;
 mod range_cells;
@@ -17,8 +14,10 @@ mod tests;
 
 use crate::scan::{PolarScan, ScanError, Sense};
 use gyre_geometry::SparsePoint;
+use gyre_samples::{SettingError, check, check_bounds};
 use peaks::{Beam, Peak};
 use range_cells::RangeCells;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The weight of a point is 1 from this power above the floor on.
@@ -27,7 +26,7 @@ pub const WEIGHT_CAP: f32 = 60.0;
 pub const MAX_POINTS: usize = 65_536;
 
 /// Selection of points: the section `[points]` of a configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointsConfig {
     /// Half width of the non-maximum suppression, degrees, rounded to whole azimuths: a point is
@@ -57,37 +56,18 @@ impl Default for PointsConfig {
     }
 }
 
-/// A setting that is out of bounds.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("points.{key} is {value}, but must be {bounds}")]
-pub struct PointsError {
-    pub key: &'static str,
-    pub value: f64,
-    pub bounds: &'static str,
-}
-
 impl PointsConfig {
-    /// Checks the bounds of all settings.
-    pub fn validate(&self) -> Result<(), PointsError> {
-        let setting = |fits: bool, key, value: f32, bounds| match fits {
-            true => Ok(()),
-            false => Err(PointsError {
-                key,
-                value: value.into(),
-                bounds,
-            }),
-        };
-        let fits = (0.0..=45.0).contains(&self.beam_deg);
-        setting(fits, "beam_deg", self.beam_deg, "0 to 45")?;
-        let fits = (1e-3..=10.0).contains(&self.range_cell_m);
-        setting(fits, "range_cell_m", self.range_cell_m, "0.001 to 10")?;
-        let fits = (0.0..=1e4).contains(&self.min_range_m);
-        setting(fits, "min_range_m", self.min_range_m, "0 to 10000")?;
-        let fits = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
-        let bounds = "more than min_range_m, at most 10000";
-        setting(fits, "max_range_m", self.max_range_m, bounds)?;
-        let fits = self.capacity <= MAX_POINTS;
-        setting(fits, "capacity", self.capacity as f32, "at most 65536")
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check_bounds! { self, "points":
+            beam_deg in ([0.0, 45.0], "0 to 45"),
+            range_cell_m in ([1e-3, 10.0], "0.001 to 10"),
+            min_range_m in ([0.0, 1e4], "0 to 10000"),
+        }
+        let above_min_m = f64::from(self.min_range_m).next_up();
+        let bounds = ([above_min_m, 1e4], "more than min_range_m, at most 10000");
+        check("points", "max_range_m", self.max_range_m.into(), bounds)?;
+        let bounds = ([0.0, MAX_POINTS as f64], "at most 65536");
+        check("points", "capacity", self.capacity as f64, bounds)
     }
 }
 
@@ -102,7 +82,7 @@ pub struct PointExtractor {
 }
 
 impl PointExtractor {
-    pub fn new(config: &PointsConfig) -> Result<Self, PointsError> {
+    pub fn new(config: &PointsConfig) -> Result<Self, SettingError> {
         config.validate()?;
         Ok(Self {
             config: config.clone(),
@@ -132,7 +112,7 @@ impl PointExtractor {
         self.cells.update(scan, floor, &self.config);
         let peaks = self.beam.peaks(scan, &self.cells);
         let weakest = weakest_that_fits(peaks, room, &mut self.counts);
-        let cap = WEIGHT_CAP * self.cells.bins_per_cell() as f32;
+        let cap = WEIGHT_CAP * self.cells.layout.bins_per_cell as f32;
         let mut count = 0;
         for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
             let view = View::of(scan, usize::from(peaks[0].azimuth));
@@ -167,7 +147,6 @@ fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 
     weakest as i16 + 1
 }
 
-/// The common properties of the points of one azimuth.
 struct View {
     /// Unit vector of the azimuth, x forward and y left.
     direction: [f32; 2],

@@ -4,14 +4,6 @@
 //! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor is at the
 //! centre of the middle cell (between the middle cells where `n` is even). Its frame is the
 //! sensor's at the scan's stamp, x forward and y left. A value is the power above a floor.
-//!
-//! Steps:
-//! 1. `bearing_table`: maps a bearing to the fractional azimuth measured there, and to the time of
-//!    the measurement;
-//! 2. `polar_image`: the powers above the floor, averaged along range over the depth of a cell,
-//!    with the Doppler shift compensated;
-//! 3. `kernels::locate`: the position of each cell in the polar image, seen from where the
-//!    [`Twist`] places the sensor, and bilinear interpolation there.
 
 mod bearing_table;
 mod cells;
@@ -26,9 +18,11 @@ use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 use bearing_table::BearingTable;
 use cells::Cells;
 use gyre_geometry::Twist;
+use gyre_samples::{SettingError, check, check_bounds};
 use kernels::locate::{self, Lookup, Taps};
 use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use sweep_motion::SweepMotion;
@@ -38,9 +32,7 @@ pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
 /// The rule that computes the value of a cell from the range bins.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where
@@ -56,15 +48,12 @@ pub enum Sampling {
 
 impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Averaged => "averaged",
-            Self::Bilinear => "bilinear",
-        })
+        self.serialize(f)
     }
 }
 
 /// Size and sampling of the rasters: the section `[raster]` of a configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RasterConfig {
     /// Cells per side. With an odd number the sensor is at the centre of a cell.
@@ -93,20 +82,13 @@ impl Default for RasterConfig {
 }
 
 impl RasterConfig {
-    /// Checks the bounds of all settings.
-    pub fn validate(&self) -> Result<(), RasterError> {
-        let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
-        if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
-            return setting("n", self.n as f64, "1 to 4096");
-        }
-        if !(1e-3..=100.0).contains(&self.cell_m) {
-            return setting("cell_m", self.cell_m.into(), "0.001 to 100");
-        }
-        if !(self.min_range_m >= 0.0 && self.min_range_m.is_finite()) {
-            return setting("min_range_m", self.min_range_m.into(), "0 or more");
-        }
-        if !(0.1..=10.0).contains(&self.averaged_cells) {
-            return setting("averaged_cells", self.averaged_cells.into(), "0.1 to 10");
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let cells = ([1.0, MAX_CELLS_PER_SIDE as f64], "1 to 4096");
+        check("raster", "n", self.n as f64, cells)?;
+        check_bounds! { self, "raster":
+            cell_m in ([1e-3, 100.0], "0.001 to 100"),
+            min_range_m in ([0.0, f64::MAX], "0 or more"),
+            averaged_cells in ([0.1, 10.0], "0.1 to 10"),
         }
         Ok(())
     }
@@ -115,12 +97,8 @@ impl RasterConfig {
 /// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
-    #[error("raster.{key} is {value}, but must be {bounds}")]
-    Setting {
-        key: &'static str,
-        value: f64,
-        bounds: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// The array for the raster is not `n x n`, or not contiguous and row-major.
     #[error("the raster needs a contiguous array of {n} x {n} cells, but got {} x {}", actual[0], actual[1])]
     Shape {
@@ -156,7 +134,6 @@ pub struct Rasteriser {
 }
 
 impl Rasteriser {
-    /// Allocates memory and computes the positions of the cells.
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {
@@ -231,7 +208,7 @@ impl Rasteriser {
                 None => locate::locate(&cells, &lookup, &mut self.taps),
                 Some(motion) => locate::locate_moving(&cells, motion, &lookup, &mut self.taps),
             }
-            locate::blend(&self.taps, self.polar.samples(), stride, row);
+            locate::blend(&self.taps, &self.polar.samples, stride, row);
         }
     }
 

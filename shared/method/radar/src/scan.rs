@@ -13,9 +13,10 @@ use ndarray::{ArrayView2, ShapeBuilder};
 pub const MAX_AZIMUTHS: usize = 1024;
 
 /// The direction of increasing azimuths, seen from above.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sense {
     /// Ahead, right, behind, left: Navtech sensors.
+    #[default]
     Clockwise,
     /// Ahead, left, behind, right.
     CounterClockwise,
@@ -41,17 +42,12 @@ pub mod flag {
 /// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the
 /// metadata bytes that a file stores before each row (Oxford: 11), so that an image decodes in
 /// place.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SweepGeometry {
-    /// Number of azimuths (rows).
     pub azimuths: usize,
-    /// Number of range bins per azimuth (columns).
     pub bins: usize,
-    /// Bytes between the first bins of consecutive azimuths.
     pub stride: usize,
-    /// Index of the first azimuth's first bin.
     pub first_byte: usize,
-    /// Depth of a range bin, m.
     pub range_resolution_m: f32,
     /// Offset of the ranges, m: the centre of bin `b` is at
     /// `(b + 0.5) * range_resolution_m + range_offset_m`.
@@ -61,7 +57,6 @@ pub struct SweepGeometry {
     /// positive, and with a falling chirp negative. Where the chirp of an azimuth is known, it
     /// determines the sign.
     pub doppler_s: f32,
-    /// The direction of increasing azimuths.
     pub sense: Sense,
     /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the
     /// reader documents otherwise.
@@ -71,21 +66,17 @@ pub struct SweepGeometry {
 /// A borrowed scan: `azimuths x bins` powers, with the angle and time of each azimuth.
 #[derive(Clone, Copy, Debug)]
 pub struct PolarScan<'a> {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
-    /// All bytes of the scan.
     pub bytes: &'a [u8],
     /// Measured angle of each azimuth from straight ahead, rad in `[0, 2 pi)`, increasing in the
     /// direction of `geometry.sense`.
     pub azimuth_rad: &'a [f32],
     /// Time of each azimuth, ns since 1970, on the sensor's clock.
     pub stamp_ns: &'a [i64],
-    /// Flags of each azimuth; see [`flag`].
     pub flags: &'a [u8],
 }
 
 impl<'a> PolarScan<'a> {
-    /// Returns the powers of one azimuth, nearest bin first.
     pub fn row(&self, azimuth: usize) -> &'a [u8] {
         let first = self.geometry.first_byte + azimuth * self.geometry.stride;
         &self.bytes[first..first + self.geometry.bins]
@@ -143,37 +134,26 @@ impl<'a> PolarScan<'a> {
 /// [`ScanLimits`].
 #[derive(Debug)]
 pub struct ScanSlot<'a> {
-    /// Bytes of the image.
     pub bytes: &'a mut [u8],
-    /// See [`PolarScan::azimuth_rad`].
     pub azimuth_rad: &'a mut [f32],
-    /// See [`PolarScan::stamp_ns`].
     pub stamp_ns: &'a mut [i64],
-    /// See [`PolarScan::flags`].
     pub flags: &'a mut [u8],
 }
 
 /// The size of the largest scan of a dataset, for allocation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanLimits {
-    /// Bytes of the image.
     pub bytes: usize,
-    /// Number of azimuths, at most [`MAX_AZIMUTHS`].
     pub azimuths: usize,
 }
 
 /// A scan that owns its memory: for tests, tools and generators.
 #[derive(Clone, Debug)]
 pub struct OwnedScan {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
-    /// All bytes of the scan.
     pub bytes: Vec<u8>,
-    /// See [`PolarScan::azimuth_rad`].
     pub azimuth_rad: Vec<f32>,
-    /// See [`PolarScan::stamp_ns`].
     pub stamp_ns: Vec<i64>,
-    /// See [`PolarScan::flags`].
     pub flags: Vec<u8>,
 }
 
@@ -182,17 +162,7 @@ impl OwnedScan {
     /// and assign the geometry that the reader returns.
     pub fn with_limits(limits: ScanLimits) -> Self {
         Self {
-            geometry: SweepGeometry {
-                azimuths: 0,
-                bins: 0,
-                stride: 0,
-                first_byte: 0,
-                range_resolution_m: 0.0,
-                range_offset_m: 0.0,
-                doppler_s: 0.0,
-                sense: Sense::Clockwise,
-                stamp_ns: 0,
-            },
+            geometry: SweepGeometry::default(),
             bytes: vec![0; limits.bytes],
             azimuth_rad: vec![0.0; limits.azimuths],
             stamp_ns: vec![0; limits.azimuths],
@@ -200,7 +170,6 @@ impl OwnedScan {
         }
     }
 
-    /// Returns the memory to fill.
     pub fn slot(&mut self) -> ScanSlot<'_> {
         ScanSlot {
             bytes: &mut self.bytes,

@@ -8,7 +8,6 @@ pub struct Trajectory {
     /// Time of each pose, ns (since 1970 in recordings), non-decreasing; `None` if the source has
     /// no times.
     pub stamp_ns: Option<Vec<i64>>,
-    /// Pose of the sensor in the world frame, one per stamp.
     pub poses: Vec<Pose>,
 }
 
@@ -20,12 +19,10 @@ impl Trajectory {
         self.poses.len()
     }
 
-    /// Returns whether there is no pose.
     pub fn is_empty(&self) -> bool {
         self.poses.is_empty()
     }
 
-    /// Length of the path, m: the sum of the distances between consecutive poses.
     pub fn path_length_m(&self) -> f64 {
         self.poses
             .windows(2)
@@ -40,13 +37,11 @@ impl Trajectory {
             .any(|w| w[0].rotation != w[1].rotation)
     }
 
-    /// First and last time, ns.
     pub fn span_ns(&self) -> Option<(i64, i64)> {
         let stamps = self.stamp_ns.as_ref()?;
         Some((*stamps.first()?, *stamps.last()?))
     }
 
-    /// Returns the trajectory with all its times earlier by `ns`.
     pub fn earlier_by(mut self, ns: i64) -> Self {
         for stamp in self.stamp_ns.iter_mut().flatten() {
             *stamp = stamp.saturating_sub(ns);
@@ -93,25 +88,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
-    use std::f64::consts::PI;
-
-    #[test]
-    fn interpolation_turns_the_shorter_way() {
-        let trajectory = Trajectory {
-            stamp_ns: Some(vec![0, 100]),
-            poses: vec![pose(0.0, 0.0, PI - 0.1), pose(2.0, 0.0, -PI + 0.1)],
-        };
-        let middle = trajectory.at(50).unwrap();
-        assert!((middle.translation.x - 1.0).abs() < 1e-12);
-        assert!(
-            (middle.rotation.angle().abs() - PI).abs() < 1e-9,
-            "{}",
-            middle.rotation.angle()
-        );
-        assert_eq!(trajectory.at(100).unwrap(), trajectory.poses[1]);
-        assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
-        assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
-    }
 
     #[test]
     fn times_within_the_tolerance_are_clamped_and_gaps_are_measured() {

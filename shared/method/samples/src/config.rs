@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Sample,
-    bounds::{Bounds, SampleConfigError},
+    bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
+    check_bounds,
 };
 
 /// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
@@ -15,7 +17,7 @@ const LEANING: f64 = 0.01;
 /// Configuration of the gyro: section `[gyro]`.
 ///
 /// The noise is as in a data sheet. The defaults suit a gyro of a car.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GyroConfig {
     /// Whose yaw rate is used.
@@ -56,10 +58,8 @@ pub struct GyroConfig {
     pub max_gap_s: f64,
 }
 
-/// Whose yaw rate is used.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+/// Whose yaw rate, or speed of wheels, is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GyroKind {
     /// None: by the radar alone.
@@ -76,9 +76,7 @@ pub enum GyroKind {
 }
 
 /// The axis of a gyro that points up.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum UpAxis {
     /// x points up.
     #[serde(rename = "x")]
@@ -116,7 +114,6 @@ impl UpAxis {
         }
     }
 
-    /// Returns the name in configurations.
     pub fn name(self) -> &'static str {
         match self {
             Self::X => "x",
@@ -152,7 +149,6 @@ impl Default for GyroConfig {
 }
 
 impl GyroConfig {
-    /// Returns whether a gyro is used.
     pub fn is_used(&self) -> bool {
         self.kind != GyroKind::None
     }
@@ -182,25 +178,19 @@ impl GyroConfig {
         (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
     }
 
-    pub fn validate(&self) -> Result<(), SampleConfigError> {
-        let bounds = Bounds("gyro");
-        let rate = "a rate in rad/s, at most 1";
-        bounds.delay_s(self.delay_s)?;
-        bounds.max_wait_ms(self.max_wait_ms)?;
-        bounds.scale([self.scale, self.scale_sigma])?;
-        bounds.within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;
-        bounds.within("bias_sigma_radps", self.bias_sigma_radps, [0.0, 1.0], rate)?;
-        bounds.noise("noise_rad_per_sqrt_s", self.noise_rad_per_sqrt_s)?;
-        bounds.noise(
-            "bias_walk_radps_per_sqrt_s",
-            self.bias_walk_radps_per_sqrt_s,
-        )?;
-        bounds.within(
-            "time_sigma_s",
-            self.time_sigma_s,
-            [0.0, 1.0],
-            "seconds, 0 to 1",
-        )?;
-        bounds.max_gap_s(self.max_gap_s)
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check_bounds! { self, "gyro":
+            delay_s in DELAY,
+            max_wait_ms in WAIT,
+            scale in SCALE,
+            scale_sigma in SHARE,
+            bias_radps in ([-1.0, 1.0], "a rate in rad/s, at most 1"),
+            bias_sigma_radps in ([0.0, 1.0], "a rate in rad/s, at most 1"),
+            noise_rad_per_sqrt_s in NOISE,
+            bias_walk_radps_per_sqrt_s in NOISE,
+            time_sigma_s in ([0.0, 1.0], "seconds, 0 to 1"),
+            max_gap_s in GAP,
+        }
+        Ok(())
     }
 }

@@ -4,11 +4,12 @@
 use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     WheelDistance, WheelsConfig,
-    bounds::{Bounds, SampleConfigError},
+    bounds::{SHARE, SettingError, check},
 };
 
 /// The velocity of the radar by the Doppler shift of one scan, at the middle of its sweep: along
@@ -37,7 +38,7 @@ pub struct DopplerDisplacement {
 
 /// Configuration of the velocity by Doppler: section `[doppler]`. Of radars whose rising and
 /// falling chirps alternate from azimuth to azimuth.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DopplerConfig {
     /// Use of the velocity.
@@ -48,9 +49,7 @@ pub struct DopplerConfig {
 }
 
 /// Use of the velocity by Doppler.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DopplerKind {
     /// None: only the matches determine the motion.
@@ -75,7 +74,6 @@ impl DopplerConfig {
     /// m/s.
     pub const NOISE_MPS: f64 = 0.02;
 
-    /// Returns whether the velocity is measured and used.
     pub fn is_used(&self) -> bool {
         self.kind != DopplerKind::None
     }
@@ -119,14 +117,8 @@ impl DopplerConfig {
         }
     }
 
-    pub fn validate(&self) -> Result<(), SampleConfigError> {
-        let bounds = Bounds("doppler");
-        bounds.within(
-            "scale_sigma",
-            self.scale_sigma,
-            [0.0, 1.0],
-            "a share, 0 to 1",
-        )
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check("doppler", "scale_sigma", self.scale_sigma, SHARE)
     }
 }
 

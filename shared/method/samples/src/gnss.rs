@@ -2,15 +2,20 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Geographic, SampleConfigError, bounds::Bounds};
+use crate::{
+    Geographic,
+    bounds::{DELAY, SettingError, check},
+    check_bounds,
+};
 
 /// Configuration of GNSS: section `[gnss]`.
 ///
 /// Fixes are constraints of the pose graph of `[slam]`, and of nothing else: odometry is the same
 /// with and without them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GnssConfig {
     /// Whose fixes are used.
@@ -38,9 +43,7 @@ pub struct GnssConfig {
 }
 
 /// Whose fixes are used.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum GnssKind {
     /// None.
@@ -75,26 +78,29 @@ impl Default for GnssConfig {
 }
 
 impl GnssConfig {
-    /// Returns whether fixes are used.
     pub fn is_used(&self) -> bool {
         self.kind != GnssKind::None
     }
 
-    /// Returns whether fixes arrive during the run.
     pub fn is_live(&self) -> bool {
         matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
     }
 
-    pub fn validate(&self) -> Result<(), SampleConfigError> {
-        let bounds = Bounds("gnss");
-        bounds.delay_s(self.delay_s)?;
+    pub fn validate(&self) -> Result<(), SettingError> {
         for metres in self.lever_m {
-            bounds.within("lever_m", metres, [-100.0, 100.0], "metres, at most 100")?;
+            check(
+                "gnss",
+                "lever_m",
+                metres,
+                ([-100.0, 100.0], "metres, at most 100"),
+            )?;
         }
-        let expected = "metres, 0.001 to 1000";
-        bounds.within("sigma_m", self.sigma_m, [1e-3, 1e3], expected)?;
-        let expected = "seconds, 0 to 10000";
-        bounds.within("correlation_s", self.correlation_s, [0.0, 1e4], expected)
+        check_bounds! { self, "gnss":
+            delay_s in DELAY,
+            sigma_m in ([1e-3, 1e3], "metres, 0.001 to 1000"),
+            correlation_s in ([0.0, 1e4], "seconds, 0 to 10000"),
+        }
+        Ok(())
     }
 }
 
@@ -103,11 +109,8 @@ impl GnssConfig {
 pub struct GnssFix {
     /// Time on the radar's clock, ns since 1970.
     pub stamp_ns: i64,
-    /// Place, m east of the origin of the plane.
     pub east_m: f64,
-    /// Place, m north.
     pub north_m: f64,
-    /// Standard deviation along each of both axes, m.
     pub sigma_m: f64,
 }
 
@@ -127,7 +130,6 @@ pub struct RawFix {
 }
 
 impl RawFix {
-    /// Returns the place, of a fix in degrees.
     pub fn geographic(&self) -> Geographic {
         Geographic {
             latitude_deg: self.at[0],
@@ -148,10 +150,7 @@ impl RawFix {
 /// The fixes in a bag of ROS 2, in degrees.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BagFixes {
-    /// The topic of their messages.
     pub topic: String,
-    /// The fixes in the order of the bag.
     pub fixes: Vec<RawFix>,
-    /// Messages without a fix.
     pub without_fix: usize,
 }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::Twist;
 
-use crate::{GyroConfig, Sample, SampleKind, integral::Integrator};
+use crate::{GyroConfig, SampleKind, integral::Integrator};
 
 /// The turn of the sensor from one scan to the next by the gyro, counter-clockwise.
 #[repr(C)]
@@ -13,51 +13,23 @@ pub struct GyroTurn {
     pub yaw_rad: f64,
     /// Variance but for the bias and the scale, rad².
     pub variance_rad2: f64,
-    /// The time between both, s.
     pub interval_s: f64,
     /// Mean rate during the sweep of the scan, rad/s, with the bias.
     pub sweep_rate_radps: f64,
 }
 
-/// Integrates the yaw rate between scans.
-///
-/// The result for a scan depends only on the samples that came with it and with the scan before, so
-/// a process that is restarted at the scan before returns the same result.
-#[derive(Clone, Debug)]
-pub struct Gyro {
-    config: GyroConfig,
-    yaw: Integrator,
-}
+pub type Gyro = Integrator<GyroConfig>;
 
 impl Gyro {
-    /// Creates an integrator without samples.
     pub fn new(config: &GyroConfig) -> Self {
-        Self {
-            yaw: Integrator::new(SampleKind::Gyro, 2, config.max_gap_s),
-            config: config.clone(),
-        }
-    }
-
-    /// Takes the samples that come with the next scan, in the order of their stamps, and the times
-    /// of its stamp and of its first and last azimuth.
-    pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
-        self.yaw.push(samples, stamp_ns, span_ns);
-    }
-
-    /// Takes the samples of a dropped scan: they count as samples of the next scan.
-    pub fn drop_scan(&mut self, samples: &[Sample]) {
-        self.yaw.drop_scan(samples);
-    }
-
-    pub fn clear(&mut self) {
-        self.yaw.clear();
+        Self::of(config.clone(), SampleKind::Gyro, 2, config.max_gap_s)
     }
 
     /// Returns the turn from the stamp of the scan before to the stamp of the scan; `None` where
     /// samples are missing.
     pub fn turn(&self) -> Option<GyroTurn> {
-        let integral = self.yaw.integral()?;
-        let [_, sweep] = self.yaw.means();
+        let integral = self.integral?;
+        let [_, sweep] = self.means();
         let by_time = self.config.time_sigma_s * integral.change;
         let walk = self.config.noise_rad_per_sqrt_s.powi(2) * integral.interval_s;
         Some(GyroTurn {
@@ -71,7 +43,7 @@ impl Gyro {
     /// Returns the mean rates during the sweeps of the scan before and of the scan, rad/s; `None`
     /// where samples are missing.
     pub fn sweep_rates_radps(&self) -> [Option<f64>; 2] {
-        self.yaw.means()
+        self.means()
     }
 }
 
@@ -86,6 +58,7 @@ pub fn with_yaw_rate(twist: Option<Twist>, rate_radps: Option<f64>) -> Option<Tw
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Sample;
     use proptest::prelude::*;
 
     /// A stamp, ms, and the yaw rate, rad/s.

@@ -10,9 +10,9 @@ const MIN_TURN_NS: i64 = 250_000_000;
 /// The result for a scan depends only on the samples that came with it and with the scan before, so
 /// a process that is restarted at the scan before returns the same result.
 #[derive(Clone, Debug)]
-pub(crate) struct Integrator {
+pub struct Integrator<C> {
+    pub(crate) config: C,
     kind: SampleKind,
-    /// Which of the values of a sample.
     value: usize,
     /// Longest time between two samples over which the rate is interpolated.
     max_gap_ns: i64,
@@ -20,7 +20,8 @@ pub(crate) struct Integrator {
     later: Option<Sweep>,
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
-    integral: Option<Integral>,
+    /// From the stamp of the scan before to the stamp of the scan; `None` where samples are missing.
+    pub(crate) integral: Option<Integral>,
 }
 
 /// The integral of a rate from the stamp of one scan to the stamp of the next.
@@ -29,28 +30,26 @@ pub(crate) struct Integral {
     pub sum: f64,
     /// From the rate at the first stamp to that at the second.
     pub change: f64,
-    /// The time between both, s.
     pub interval_s: f64,
 }
 
 /// A stamp, ns, and the rate.
 type Rate = (i64, f64);
 
-/// A scan with its samples.
 #[derive(Clone, Debug, Default)]
 struct Sweep {
     stamp_ns: i64,
     /// Times of the first and of the last azimuth.
     span_ns: [i64; 2],
-    /// In the order of their stamps.
     rates: Vec<Rate>,
     /// Mean rate during the sweep; `None` where samples are missing.
     mean: Option<f64>,
 }
 
-impl Integrator {
-    pub fn new(kind: SampleKind, value: usize, max_gap_s: f64) -> Self {
+impl<C> Integrator<C> {
+    pub(crate) fn of(config: C, kind: SampleKind, value: usize, max_gap_s: f64) -> Self {
         Self {
+            config,
             kind,
             value,
             max_gap_ns: (max_gap_s * 1e9) as i64,
@@ -66,7 +65,7 @@ impl Integrator {
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
         let mut sweep = self.earlier.take().unwrap_or_default();
         sweep.rates.clear();
-        sweep.rates.extend(self.rates(samples));
+        sweep.rates.extend(rates(samples, self.kind, self.value));
         (sweep.stamp_ns, sweep.span_ns) = (stamp_ns, span_ns);
         sweep.mean = sweep.mean(self.max_gap_ns);
         self.earlier = self.later.replace(sweep);
@@ -76,9 +75,8 @@ impl Integrator {
 
     /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
-        let mut dropped = std::mem::take(&mut self.dropped);
-        dropped.extend(self.rates(samples));
-        self.dropped = dropped;
+        let rates = rates(samples, self.kind, self.value);
+        self.dropped.extend(rates);
     }
 
     pub fn clear(&mut self) {
@@ -86,15 +84,9 @@ impl Integrator {
         (self.earlier, self.later, self.integral) = (None, None, None);
     }
 
-    /// Returns the integral from the stamp of the scan before to the stamp of the scan; `None`
-    /// where samples are missing.
-    pub fn integral(&self) -> Option<Integral> {
-        self.integral
-    }
-
     /// Returns the mean rates during the sweeps of the scan before and of the scan; `None` where
     /// samples are missing.
-    pub fn means(&self) -> [Option<f64>; 2] {
+    pub(crate) fn means(&self) -> [Option<f64>; 2] {
         [&self.earlier, &self.later].map(|sweep| sweep.as_ref()?.mean)
     }
 
@@ -115,12 +107,6 @@ impl Integrator {
             change: rate_at(&rates, scan.stamp_ns)? - rate_at(&rates, before.stamp_ns)?,
             interval_s: seconds(scan.stamp_ns - before.stamp_ns),
         })
-    }
-
-    fn rates<'a>(&self, samples: &'a [Sample]) -> impl Iterator<Item = Rate> + use<'a> {
-        let (kind, value) = (self.kind, self.value);
-        let of_kind = samples.iter().filter(move |sample| sample.is(kind));
-        of_kind.map(move |sample| (sample.stamp_ns, sample.values[value]))
     }
 }
 
@@ -174,6 +160,11 @@ fn integral(rates: &[Rate], [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Opti
         .all(|pair| pair[1].0 - pair[0].0 <= max_gap_ns);
     let covers = is_near(around.first(), from_ns) && is_near(around.last(), to_ns);
     (is_dense && covers).then_some(sum)
+}
+
+fn rates(samples: &[Sample], kind: SampleKind, value: usize) -> impl Iterator<Item = Rate> {
+    let of_kind = samples.iter().filter(move |sample| sample.is(kind));
+    of_kind.map(move |sample| (sample.stamp_ns, sample.values[value]))
 }
 
 /// The rate at a time, interpolated linearly; before the first sample and after the last, the

@@ -10,7 +10,6 @@ pub struct Sample {
     pub stamp_ns: i64,
     /// The quantity: a number of [`SampleKind`].
     pub kind: u32,
-    /// Zero.
     pub reserved: u32,
     /// The values that [`SampleKind`] names; unused ones are zero.
     pub values: [f64; 6],
@@ -37,7 +36,6 @@ pub enum SampleKind {
 }
 
 impl SampleKind {
-    /// Returns the name of its section in configurations.
     pub const fn section(self) -> &'static str {
         match self {
             Self::Gyro => "gyro",
@@ -57,7 +55,6 @@ impl Sample {
         }
     }
 
-    /// Creates a sample of the wheels, m/s.
     pub fn speed(stamp_ns: i64, speed_mps: f64) -> Self {
         Self {
             stamp_ns,
@@ -83,7 +80,6 @@ impl Sample {
         (self.stamp_ns, self.kind)
     }
 
-    /// Returns whether it is of this kind.
     pub fn is(&self, kind: SampleKind) -> bool {
         self.kind == kind as u32
     }

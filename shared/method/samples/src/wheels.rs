@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
+use crate::{SampleKind, WheelsConfig, integral::Integrator};
 
 /// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
@@ -17,48 +17,20 @@ pub struct WheelDistance {
     pub variance_m2: f64,
     /// Variance of the place across the path, m².
     pub side_variance_m2: f64,
-    /// The time between both, s.
     pub interval_s: f64,
 }
 
-/// Integrates the speed of the wheels between scans.
-///
-/// The result for a scan depends only on the samples that came with it and with the scan before, so
-/// a process that is restarted at the scan before returns the same result.
-#[derive(Clone, Debug)]
-pub struct Wheels {
-    config: WheelsConfig,
-    speed: Integrator,
-}
+pub type Wheels = Integrator<WheelsConfig>;
 
 impl Wheels {
-    /// Creates an integrator without samples.
     pub fn new(config: &WheelsConfig) -> Self {
-        Self {
-            speed: Integrator::new(SampleKind::Wheels, 0, config.max_gap_s),
-            config: config.clone(),
-        }
-    }
-
-    /// Takes the samples that come with the next scan, in the order of their stamps, and the times
-    /// of its stamp and of its first and last azimuth.
-    pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
-        self.speed.push(samples, stamp_ns, span_ns);
-    }
-
-    /// Takes the samples of a dropped scan: they count as samples of the next scan.
-    pub fn drop_scan(&mut self, samples: &[Sample]) {
-        self.speed.drop_scan(samples);
-    }
-
-    pub fn clear(&mut self) {
-        self.speed.clear();
+        Self::of(config.clone(), SampleKind::Wheels, 0, config.max_gap_s)
     }
 
     /// Returns the distance from the stamp of the scan before to the stamp of the scan; `None`
     /// where samples are missing.
     pub fn distance(&self) -> Option<WheelDistance> {
-        let integral = self.speed.integral()?;
+        let integral = self.integral?;
         let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
         // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
@@ -77,6 +49,7 @@ impl Wheels {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Sample;
     use proptest::prelude::*;
 
     const MS: i64 = 1_000_000;
@@ -109,19 +82,5 @@ mod tests {
             let least = config.noise_m_per_sqrt_m.powi(2) * distance.distance_m.abs();
             prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
         }
-    }
-
-    #[test]
-    fn nothing_is_made_up_where_samples_are_missing() {
-        let sample = |ms: i64| Sample::speed(ms * MS, 5.0);
-        let without = |lost: std::ops::Range<i64>| {
-            let kept = (0..=500).step_by(20).filter(|ms| !lost.contains(ms));
-            let all: Vec<Sample> = kept.map(sample).collect();
-            let (before, after) = all.split_at(all.partition_point(|it| it.stamp_ns <= 250 * MS));
-            wheels([before, after]).distance()
-        };
-        assert!(without(0..0).is_some() && without(150..300).is_some());
-        assert_eq!(without(0..500), None);
-        assert_eq!(without(100..400), None);
     }
 }

@@ -2,17 +2,19 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Sample,
-    bounds::{Bounds, SampleConfigError},
+    Sample, WheelsKind,
+    bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT, check},
+    check_bounds,
 };
 
 /// Configuration of the wheels' speed: section `[wheels]`.
 ///
 /// The defaults suit a car whose speed comes from its own bus.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WheelsConfig {
     /// Whose speed is used.
@@ -48,25 +50,6 @@ pub struct WheelsConfig {
     pub max_gap_s: f64,
 }
 
-/// Whose speed is used.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum WheelsKind {
-    /// No wheels: only the radar determines the distance.
-    #[default]
-    None,
-    /// The log beside the scans, or the samples that come with them; without either it is an error.
-    Auto,
-    /// The log that `file` names.
-    Log,
-    /// Of a live radar: what arrives in datagrams at `listen`.
-    Udp,
-    /// Of a live radar behind its driver in ROS 2: `topic`.
-    Ros2,
-}
-
 impl Default for WheelsConfig {
     fn default() -> Self {
         Self {
@@ -88,12 +71,10 @@ impl Default for WheelsConfig {
 }
 
 impl WheelsConfig {
-    /// Returns whether the wheels are used.
     pub fn is_used(&self) -> bool {
         self.kind != WheelsKind::None
     }
 
-    /// Returns whether the wheels are live: their samples arrive while the radar is received.
     pub fn is_live(&self) -> bool {
         matches!(self.kind, WheelsKind::Udp | WheelsKind::Ros2)
     }
@@ -106,19 +87,19 @@ impl WheelsConfig {
         Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
     }
 
-    pub fn validate(&self) -> Result<(), SampleConfigError> {
-        let bounds = Bounds("wheels");
-        bounds.delay_s(self.delay_s)?;
-        bounds.max_wait_ms(self.max_wait_ms)?;
-        let expected = "metres, -10 to 10";
-        bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;
-        if let Some(m_per_tick) = self.m_per_tick {
-            let expected = "metres, 0.000001 to 10";
-            bounds.within("m_per_tick", m_per_tick, [1e-6, 10.0], expected)?;
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check_bounds! { self, "wheels":
+            delay_s in DELAY,
+            max_wait_ms in WAIT,
+            radar_ahead_m in ([-10.0, 10.0], "metres, -10 to 10"),
+            scale in SCALE,
+            scale_sigma in SHARE,
+            noise_m_per_sqrt_m in NOISE,
+            time_sigma_s in NOISE,
+            max_gap_s in GAP,
         }
-        bounds.scale([self.scale, self.scale_sigma])?;
-        bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;
-        bounds.noise("time_sigma_s", self.time_sigma_s)?;
-        bounds.max_gap_s(self.max_gap_s)
+        let step_m = self.m_per_tick.unwrap_or(1.0);
+        let bounds = ([1e-6, 10.0], "metres, 0.000001 to 10");
+        check("wheels", "m_per_tick", step_m, bounds)
     }
 }

@@ -3,14 +3,12 @@
 
 use std::ops::RangeInclusive;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An invalid value of a search.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
-    /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or
-    /// `raster`.
     pub section: &'static str,
     pub key: &'static str,
     pub actual: String,
@@ -18,9 +16,7 @@ pub struct ConfigError {
 }
 
 /// The comparison of two polar spectra.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub enum RotationForm {
     /// Circular correlation along the angle, summed over radii (Weston et al., Eq. 7).
     #[default]
@@ -45,9 +41,7 @@ pub enum Magnitude {
 }
 
 /// The weight of the raster before the Fourier transform of the rotation search.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Taper {
     /// No weight, for rasters that already end in zeros.
@@ -61,7 +55,7 @@ pub enum Taper {
 }
 
 /// The interpolation of a peak between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Peak {
     /// A Gaussian over a pedestal, the lowest of the neighbouring samples: errors up to 0.02 of a
@@ -81,9 +75,7 @@ pub enum Peak {
 }
 
 /// The normalisation for an overlap that shrinks as the shift grows.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Overlap {
     /// None: the plain correlation, biased towards zero shift.
@@ -97,7 +89,7 @@ pub enum Overlap {
 }
 
 /// Configuration of [`RotationSearch`](crate::RotationSearch): section `[rotation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RotationConfig {
     /// Comparison of the polar spectra: `eq7` (Weston et al., Eq. 7) or `line14` (their Algorithm
@@ -146,7 +138,7 @@ impl Default for RotationConfig {
 }
 
 /// Configuration of [`TranslationSearch`](crate::TranslationSearch): section `[translation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TranslationConfig {
     /// Largest shift searched along each axis, m.
@@ -172,30 +164,6 @@ impl Default for TranslationConfig {
 }
 
 impl RotationConfig {
-    /// The search of Weston et al., Algorithm 1, with its misprints corrected.
-    pub fn weston() -> Self {
-        Self {
-            form: RotationForm::ProfileMean,
-            magnitude: Magnitude::Linear,
-            window: Taper::Hann,
-            angles: 733,
-            band_low: 0.01,
-            band_high: 0.35,
-            peak: Peak::Parabola,
-            ..Self::default()
-        }
-    }
-
-    /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6
-    /// to 8).
-    pub fn checchin() -> Self {
-        Self {
-            magnitude: Magnitude::Linear,
-            phase_only: true,
-            ..Self::default()
-        }
-    }
-
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("rotation");
         section.require(
@@ -217,23 +185,6 @@ impl RotationConfig {
 }
 
 impl TranslationConfig {
-    /// The search of Weston et al., Algorithm 1: no normalisation of the overlap.
-    pub fn weston() -> Self {
-        Self {
-            overlap: Overlap::None,
-            peak: Peak::Parabola,
-            ..Self::default()
-        }
-    }
-
-    /// Phase correlation in (x, y) (Checchin et al., Algorithm 1, lines 10 to 13).
-    pub fn checchin() -> Self {
-        Self {
-            phase_only: true,
-            ..Self::default()
-        }
-    }
-
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("translation");
         let fits = positive(self.reach_m);
@@ -243,7 +194,6 @@ impl TranslationConfig {
 }
 
 impl Peak {
-    /// The temperature of a soft-argmax; 1 otherwise.
     fn temperature(&self) -> f64 {
         match *self {
             Peak::SoftArgmax { temperature } => temperature,
@@ -256,12 +206,10 @@ pub(crate) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
-/// A section of a configuration, whose keys are checked.
 #[derive(Clone, Copy)]
 pub(crate) struct Section(pub &'static str);
 
 impl Section {
-    /// Rejects `actual` unless it `fits`.
     pub fn require(
         self,
         fits: bool,
@@ -280,7 +228,6 @@ impl Section {
         }
     }
 
-    /// Rejects a value that is not within bounds, which `expected` names.
     pub fn within<T: PartialOrd + ToString>(
         self,
         key: &'static str,
@@ -291,7 +238,6 @@ impl Section {
         self.require(bounds.contains(&value), key, &value, expected)
     }
 
-    /// Rejects a number that is not positive.
     pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
         self.require(positive(value), key, &value, "a positive number")
     }
@@ -321,38 +267,11 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_rejected() {
-        assert!(
-            toml::from_str::<RotationConfig>("angels = 720")
-                .unwrap_err()
-                .to_string()
-                .contains("angels")
-        );
-        assert!(
-            toml::from_str::<TranslationConfig>("reach = 3.0")
-                .unwrap_err()
-                .to_string()
-                .contains("reach")
-        );
-        assert!(
-            toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err()
-        );
-    }
-
-    #[test]
-    fn defaults_and_both_papers_are_valid() {
-        for config in [
-            RotationConfig::default(),
-            RotationConfig::weston(),
-            RotationConfig::checchin(),
-        ] {
-            config.validate().unwrap();
-        }
-        for config in [
-            TranslationConfig::default(),
-            TranslationConfig::weston(),
-            TranslationConfig::checchin(),
-        ] {
-            config.validate().unwrap();
-        }
+        let wrong = toml::from_str::<RotationConfig>("angels = 720").unwrap_err();
+        assert!(wrong.to_string().contains("angels"));
+        let wrong = toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err();
+        assert!(wrong.to_string().contains("reach"));
+        let text = "peak = { soft_argmax = { t = 1.0 } }";
+        assert!(toml::from_str::<TranslationConfig>(text).is_err());
     }
 }

@@ -15,7 +15,6 @@ use crate::kernels;
 pub(crate) struct KeptCorrelation {
     n: usize,
     size: usize,
-    /// The wanted shifts down, as rows of the transform.
     shifts: Arc<[usize]>,
     rows: RowPass,
     columns: Transform,
@@ -50,12 +49,10 @@ impl KeptCorrelation {
         }
     }
 
-    /// The factor that scales the correlations: one over the cells of the transform.
     pub fn scale(&self) -> f64 {
         1.0 / (self.size * self.size) as f64
     }
 
-    /// Computes and keeps the spectrum of the image f.
     pub fn keep(&mut self, f: &[f32]) {
         let n = self.n;
         self.rows.forward(&mut self.kept, n, |r, out| {

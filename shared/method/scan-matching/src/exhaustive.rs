@@ -5,7 +5,7 @@ mod config;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use gyre_geometry::wrap_angle;
-use nalgebra::{Matrix3, Rotation2, Vector2};
+use nalgebra::{Rotation2, Vector2};
 use ndarray::ArrayView2;
 
 use crate::config::{ConfigError, Overlap, Peak};
@@ -37,7 +37,6 @@ const OFFSET: f64 = 0.211_324_865_405_187_1;
 /// unknowns.
 const VARIANCE_SCALE: f64 = 0.015;
 
-/// The motion between two scans, and its angle alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointMatch {
     /// The angle; its runner-up is the next highest local maximum over the angles.
@@ -70,13 +69,10 @@ pub struct ExhaustiveSearch {
     later: Vec<f32>,
     earlier: Vec<f32>,
     later_energy: OverlapEnergy,
-    /// Two angles at a time.
     turned: [Turned; 2],
-    /// The best of each angle.
     candidates: Vec<Candidate>,
 }
 
-/// The earlier raster at one angle, and the scores of its shifts.
 struct Turned {
     raster: Vec<f32>,
     energy: OverlapEnergy,
@@ -91,10 +87,8 @@ struct Candidate {
     place: Vector2<f64>,
 }
 
-/// The peak in all three unknowns.
 struct JointPeak {
     prior_rad: f64,
-    /// The nearest angle of the grid.
     best: usize,
     angle_rad: f64,
     over_angles: LinePeak,
@@ -123,7 +117,7 @@ impl ExhaustiveSearch {
             cell_m,
             config: config.clone(),
             angles,
-            correlation: KeptCorrelation::new(n, size, turned[0].scores.wrapped()),
+            correlation: KeptCorrelation::new(n, size, turned[0].scores.wrapped.clone()),
             later: vec![0.0; n * n],
             earlier: vec![0.0; n * n],
             later_energy: energy(),
@@ -132,16 +126,10 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// Returns the number of angles tried for each pair, without the final one at the peak.
-    pub fn candidates(&self) -> usize {
-        self.angles.count
-    }
-
     /// Finds the motion between two rasters.
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -164,7 +152,7 @@ impl ExhaustiveSearch {
         kernels::finite_copy(earlier, &mut self.earlier);
         self.later_energy.measure(&self.later);
         self.turned[0].energy.measure(&self.earlier);
-        let energy = (self.later_energy.total() * self.turned[0].energy.total()).sqrt();
+        let energy = (self.later_energy.total * self.turned[0].energy.total).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
             return Ok(self.no_match(prior_rad));
         }
@@ -175,7 +163,6 @@ impl ExhaustiveSearch {
             .map_or(self.no_match(prior_rad), |found| self.joint_match(&found)))
     }
 
-    /// The best match at every angle of the grid.
     fn score_angles(&mut self, prior_rad: f64, energy: f64) {
         for first in (0..self.angles.count).step_by(2) {
             let count = (self.angles.count - first).min(2);
@@ -222,7 +209,6 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Interpolates the peak over the angles, then finds the peak over the shifts there.
     fn joint_peak(&mut self, prior_rad: f64, energy: f64) -> Option<JointPeak> {
         let best = self.best()?;
         let over_angles = self.angle_peak(best);
@@ -243,7 +229,6 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// The angle with the highest score.
     fn best(&self) -> Option<usize> {
         let best = (0..self.angles.count)
             .reduce(|best, k| if self.at(k) > self.at(best) { k } else { best })?;
@@ -266,7 +251,6 @@ impl ExhaustiveSearch {
         line_peak(self.config.peak, |by| self.at(self.angles.beside(best, by)))
     }
 
-    /// The next highest local maximum over the angles.
     fn angle_runner_up(&self, best: usize) -> Option<usize> {
         let summit = |k: usize| (-1..=1).all(|by| self.at(self.angles.beside(k, by)) <= self.at(k));
         let others =
@@ -325,8 +309,7 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad, from the best
-    /// shifts at the neighbouring angles.
+    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad.
     fn ridge_slope(&self, found: &JointPeak) -> Vector2<f64> {
         let beside = [-1, 1].map(|by| self.angles.beside(found.best, by));
         if !self.angles.is_inner(found.best) || beside.iter().any(|&k| self.at(k) <= 0.0) {
@@ -349,56 +332,25 @@ impl ExhaustiveSearch {
             y_m: place.y,
             score,
         };
-        let here = self.turned[0]
-            .scores
-            .runner_up(found.highest)
-            .map(|((i, j), score)| {
-                at(
-                    translation(
-                        found.angle_rad,
-                        Vector2::new(i as f64, j as f64),
-                        self.cell_m,
-                    ),
-                    score,
-                )
-            });
+        let here = self.turned[0].scores.runner_up(found.highest);
+        let here = here.map(|((i, j), score)| {
+            let shift = Vector2::new(i as f64, j as f64);
+            at(translation(found.angle_rad, shift, self.cell_m), score)
+        });
         let there = other_angle.map(|k| at(self.candidates[k].place, self.at(k)));
-        match (here, there) {
-            (Some(here), Some(there)) => Some(if there.score > here.score {
-                there
-            } else {
-                here
-            }),
-            (one, other) => one.or(other),
-        }
+        let higher = |a: MotionRunnerUp, b: MotionRunnerUp| if b.score > a.score { b } else { a };
+        [here, there].into_iter().flatten().reduce(higher)
     }
 
-    /// The k-th angle, in (-pi, pi].
     fn angle(&self, found: &JointPeak, k: usize) -> f64 {
         wrap_angle(found.prior_rad + self.angles.angle(k as f64))
     }
 
     fn no_match(&self, prior_rad: f64) -> JointMatch {
-        let (guess, angle_rad, variance_rad2) = (
-            guess(self.config.reach_m),
-            wrap_angle(prior_rad),
-            self.angles.guess(),
-        );
+        let (angle_rad, variance_rad2) = (wrap_angle(prior_rad), self.angles.guess());
         JointMatch {
-            rotation: RotationMatch {
-                angle_rad,
-                variance_rad2,
-                score: 0.0,
-                runner_up: None,
-            },
-            motion: MotionMatch {
-                x_m: 0.0,
-                y_m: 0.0,
-                yaw_rad: angle_rad,
-                covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
-                score: 0.0,
-                runner_up: None,
-            },
+            rotation: RotationMatch::none(angle_rad, variance_rad2),
+            motion: MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2),
         }
     }
 }

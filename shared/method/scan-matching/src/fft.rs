@@ -63,7 +63,6 @@ impl Columns {
         &mut self.data[c * self.stride..][..self.len]
     }
 
-    /// The first `count` columns, gaps between them included.
     fn first_mut(&mut self, count: usize) -> &mut [Complex32] {
         &mut self.data[..count * self.stride]
     }
@@ -96,7 +95,6 @@ impl Columns {
         }
     }
 
-    /// Sets rows `first..` of every column to zero.
     pub fn clear_from(&mut self, first: usize) {
         for column in self.data.chunks_exact_mut(self.stride) {
             column[first..].fill(Complex32::default());
@@ -104,7 +102,6 @@ impl Columns {
     }
 }
 
-/// One-dimensional complex transform with its scratch.
 pub(crate) struct Transform {
     fft: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
@@ -122,7 +119,6 @@ impl Transform {
         }
     }
 
-    /// Transforms a line into a second line.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
         self.fft
             .process_immutable_with_scratch(line, out, &mut self.scratch);
@@ -133,7 +129,6 @@ impl Transform {
         self.fft.process_with_scratch(lines, &mut self.scratch);
     }
 
-    /// Transforms the first `count` columns.
     fn columns(&mut self, plane: &mut Columns, count: usize) {
         for c in 0..count {
             self.lines(plane.column_mut(c));
@@ -141,7 +136,6 @@ impl Transform {
     }
 }
 
-/// First pass of a complex transform: along the rows that are not zero.
 pub(crate) struct RowPass {
     row: Transform,
     block: Vec<Complex32>,
@@ -259,7 +253,7 @@ impl RealSpectrum {
 
 /// Spectra of two real square images by one complex transform, and the inverse for some rows.
 pub(crate) struct PairSpectrum {
-    size: usize,
+    pub size: usize,
     rows: RowPass,
     columns: Transform,
     inverse_columns: Transform,
@@ -293,11 +287,6 @@ impl PairSpectrum {
         }
     }
 
-    /// Cells a side.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Transforms `rows` rows; `fill(r, row)` writes first + i second to the start of row r, the
     /// rest is zero.
     pub fn forward(&mut self, rows: usize, fill: impl FnMut(usize, &mut [Complex32])) {
@@ -320,7 +309,6 @@ impl PairSpectrum {
         }
     }
 
-    /// The cross-spectrum, as [`cross`](Self::cross) left it.
     pub fn cross_spectrum_mut(&mut self) -> &mut [Complex32] {
         self.plane.first_mut(self.size / 2 + 1)
     }
@@ -361,21 +349,12 @@ mod tests {
     fn fast_sizes_have_small_factors_and_waste_little() {
         for min in 2..3000 {
             let size = fast_size(min);
-            assert!(
-                size >= min && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]),
-                "{min}: {size}"
-            );
+            let is_fast = size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]);
+            assert!(size >= min && is_fast, "{min}: {size}");
             assert!(size * 3 <= min * 4 || min < 16, "{min}: {size}");
         }
-        assert_eq!(
-            [
-                fast_size(255),
-                fast_size(288),
-                fast_size(511),
-                fast_size(544)
-            ],
-            [256, 288, 512, 576]
-        );
+        let sizes = [255, 288, 511, 544].map(fast_size);
+        assert_eq!(sizes, [256, 288, 512, 576]);
     }
 
     #[test]
@@ -412,7 +391,7 @@ mod tests {
             let (f, g) = values.split_at(14 * 14);
             let reach = (n / 2) as isize;
             let mut pair = PairSpectrum::new(fast_size(n + reach as usize));
-            let size = pair.size() as isize;
+            let size = pair.size as isize;
             let rows: Vec<usize> = (-reach..=reach).map(|s| s.rem_euclid(size) as usize).collect();
             pair.forward(n, |r, out| {
                 (0..n).for_each(|k| out[k] = Complex32::new(f[r * n + k], g[r * n + k]));

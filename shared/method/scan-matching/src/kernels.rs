@@ -26,7 +26,6 @@ pub(crate) struct Bilinear {
     pub across: f32,
 }
 
-/// Samples that are looked up together.
 const CHUNK: usize = 64;
 
 /// The four neighbours of a chunk of samples, pair by pair: first in the first row, then a row

@@ -4,53 +4,11 @@
 //! is the pose of the later scan's frame in the earlier one's. The search finds R from the
 //! magnitude spectra, which a shift does not change, and then t by one correlation.
 //!
-//! # Layout, in the order of the data
-//! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
-//! - `spectrum`: [`PolarSpectrum`], the kept part of a scan; `rotation`: [`RotationSearch`], the
-//!   angle; `sequential`: [`SequentialRotation`], the angles along a stream of scans;
-//! - `warp`: the earlier raster turned by that angle;
-//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a
-//!   shift; `overlap` normalises them;
-//! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`:
-//!   its transforms;
-//! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last
-//!   keyframes;
-//! - [`Submap`], the points around a keyframe, for places that are visited again;
-//!   [`KeyframeAligner`] and `masked_correlation`, [`MaskedCorrelation`], register two of them;
-//! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`:
-//!   phase-only correlation; `kernels`: inner loops.
-//!
 //! # Frames and shapes
 //! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32` in
 //! standard (row-major, contiguous) layout: row 0 is far ahead, column 0 far left, and the sensor
 //! is in the middle, which is the centre of the middle cell if n is odd. A motion is the pose of
 //! the later scan's frame in the earlier scan's frame.
-//!
-//! ```
-//! use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch};
-//! use ndarray::Array2;
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let (n, cell_m) = (127, 0.8);
-//! let mut rotation = RotationSearch::new(n, &RotationConfig::default())?;
-//! let mut translation = TranslationSearch::new(n, cell_m, &TranslationConfig::default())?;
-//! let (mut earlier_spectrum, mut later_spectrum) = (rotation.new_spectrum(), rotation.new_spectrum());
-//!
-//! // All scatterers come nearer by two cells: the sensor drove 1.6 m ahead.
-//! let (mut earlier, mut later) = (Array2::zeros((n, n)), Array2::zeros((n, n)));
-//! for (row, col) in [(30, 40), (41, 75), (48, 52), (70, 90), (85, 33), (92, 61)] {
-//!     earlier[[row, col]] = 1.0_f32;
-//!     later[[row + 2, col]] = 1.0_f32;
-//! }
-//!
-//! rotation.spectrum(earlier.view(), &mut earlier_spectrum)?;
-//! rotation.spectrum(later.view(), &mut later_spectrum)?;
-//! let angle = rotation.search(&later_spectrum, &earlier_spectrum, None)?;
-//! let motion = translation.search(later.view(), earlier.view(), &angle)?;
-//! assert!((motion.x_m - 1.6).abs() < 0.01 && motion.y_m.abs() < 0.01);
-//! # Ok(())
-//! # }
-//! ```
 
 mod config;
 mod correlate;
@@ -82,7 +40,7 @@ pub use fft::fast_size;
 pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
-    Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
+    Aiding, Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
     RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState, Verdict,
     WheelScale, WheelState,
 };
@@ -92,59 +50,43 @@ pub use spectrum::PolarSpectrum;
 pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 
 /// A raster or a spectrum that does not fit the search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum ShapeError {
-    #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
-    Shape {
-        what: &'static str,
-        /// Rows and columns of the input.
-        actual: [usize; 2],
-        /// The rows and columns that the search was planned for.
-        expected: [usize; 2],
-    },
-    #[error("{what} is not in row-major, contiguous layout")]
-    Layout { what: &'static str },
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ShapeError(String);
+
+impl ShapeError {
+    /// Not row-major and contiguous.
+    fn layout(what: &str) -> Self {
+        Self(format!("{what} is not in row-major, contiguous layout"))
+    }
 }
 
-fn by([rows, columns]: &[usize; 2]) -> String {
-    format!("{rows} x {columns}")
-}
-
-fn expect_shape(
-    what: &'static str,
-    actual: [usize; 2],
-    expected: [usize; 2],
-) -> Result<(), ShapeError> {
-    if actual == expected {
-        Ok(())
-    } else {
-        Err(ShapeError::Shape {
-            what,
-            actual,
-            expected,
-        })
+fn expect_shape(what: &str, actual: [usize; 2], expected: [usize; 2]) -> Result<(), ShapeError> {
+    let by = |[rows, columns]: [usize; 2]| format!("{rows} x {columns}");
+    match actual == expected {
+        true => Ok(()),
+        false => {
+            let (actual, expected) = (by(actual), by(expected));
+            Err(ShapeError(format!(
+                "{what} is {actual}: expected {expected}"
+            )))
+        }
     }
 }
 
 /// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
 pub fn square<'a>(
-    what: &'static str,
+    what: &str,
     cells: &'a [f32],
     n: usize,
 ) -> Result<ArrayView2<'a, f32>, ShapeError> {
-    ArrayView2::from_shape((n, n), cells).map_err(|_| ShapeError::Shape {
-        what,
-        actual: [1, cells.len()],
-        expected: [n, n],
-    })
+    let count = cells.len();
+    ArrayView2::from_shape((n, n), cells)
+        .map_err(|_| ShapeError(format!("{what} is 1 x {count}: expected {n} x {n}")))
 }
 
 /// The cells of an `n` x `n` raster, row after row.
-fn cells<'a>(
-    what: &'static str,
-    raster: &ArrayView2<'a, f32>,
-    n: usize,
-) -> Result<&'a [f32], ShapeError> {
+fn cells<'a>(what: &str, raster: &ArrayView2<'a, f32>, n: usize) -> Result<&'a [f32], ShapeError> {
     expect_shape(what, [raster.nrows(), raster.ncols()], [n, n])?;
-    raster.to_slice().ok_or(ShapeError::Layout { what })
+    raster.to_slice().ok_or_else(|| ShapeError::layout(what))
 }

@@ -49,31 +49,9 @@ impl MaskedCorrelation {
 
     /// Returns the sum of f(x) g(R x + t) over the root of the product of the sums of the squares,
     /// where (R, t) is the `motion` from the earlier raster g to the later one f, and both x and R
-    /// x + t are within range; 0 without energy there.
-    /// Rasters must be n x n in standard layout.
+    /// x + t are within range; 0 without energy there. Of the later raster only those cells count
+    /// that its sensor could see: `seen` is 1 there, and 0 elsewhere.
     pub fn at(
-        &mut self,
-        later: ArrayView2<'_, f32>,
-        earlier: ArrayView2<'_, f32>,
-        motion: &Pose,
-    ) -> Result<f64, ShapeError> {
-        self.correlate(later, earlier, None, motion)
-    }
-
-    /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see:
-    /// `seen` is 1 there, and 0 elsewhere.
-    /// Rasters must be n x n in standard layout.
-    pub fn at_seen(
-        &mut self,
-        later: ArrayView2<'_, f32>,
-        earlier: ArrayView2<'_, f32>,
-        seen: ArrayView2<'_, f32>,
-        motion: &Pose,
-    ) -> Result<f64, ShapeError> {
-        self.correlate(later, earlier, Some(seen), motion)
-    }
-
-    fn correlate(
         &mut self,
         later: ArrayView2<'_, f32>,
         earlier: ArrayView2<'_, f32>,
@@ -205,7 +183,7 @@ mod tests {
             let raster = |cells| Array2::from_shape_vec((N, N), cells).unwrap();
             let (f, g, motion) = (raster(f), raster(g), pose(x, y, yaw));
             let mut correlation = MaskedCorrelation::new(N, CELL_M, 4.61).unwrap();
-            let got = correlation.at(f.view(), g.view(), &motion).unwrap();
+            let got = correlation.at(f.view(), g.view(), None, &motion).unwrap();
             prop_assert!((got - direct(&f, &g, &motion, 4.61)).abs() < 2e-3, "{got}");
         }
     }
@@ -218,20 +196,12 @@ mod tests {
         let half = &whole * &seen;
         let mut correlation = MaskedCorrelation::new(N, CELL_M, 100.0).unwrap();
         let (half, still) = (half.view(), Pose::identity());
-        let unmasked = correlation.at(half, whole.view(), &still).unwrap();
+        let unmasked = correlation.at(half, whole.view(), None, &still).unwrap();
         assert!(unmasked < 0.9, "{unmasked}");
-        let masked = correlation.at_seen(half, whole.view(), seen.view(), &still);
+        let masked = correlation.at(half, whole.view(), Some(seen.view()), &still);
         assert!((masked.unwrap() - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_raster_correlates_fully_with_itself_and_not_with_nothing() {
-        let mut numbers = (0..N * N).map(|k| ((k * 7919) % 101) as f32);
-        let f = Array2::from_shape_simple_fn((N, N), || numbers.next().unwrap());
-        let mut correlation = MaskedCorrelation::new(N, CELL_M, 100.0).unwrap();
-        let mut at = |g: &Array2<f32>| correlation.at(f.view(), g.view(), &Pose::identity());
-        assert!((at(&f).unwrap() - 1.0).abs() < 1e-6);
-        assert_eq!(at(&Array2::zeros((N, N))).unwrap(), 0.0);
-        assert!(at(&Array2::zeros((N, N - 1))).is_err());
+        let mut with = |g: Array2<f32>| correlation.at(half, g.view(), None, &still);
+        assert_eq!(with(Array2::zeros((N, N))).unwrap(), 0.0);
+        assert!(with(Array2::zeros((N, N - 1))).is_err());
     }
 }

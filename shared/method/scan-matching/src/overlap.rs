@@ -16,9 +16,11 @@ pub(crate) struct OverlapEnergy {
     edges: [Vec<f64>; 4],
     /// Sums over b columns of the rows of one corner so far.
     corner: Vec<f64>,
-    /// Energy left after each shift (down, right), row after row from the most negative on.
-    left: Vec<f64>,
-    total: f64,
+    /// Energy left after each shift (down, right), row after row from the most negative on: `down`
+    /// rows are dropped at the top (at the bottom if negative), `right` columns at the left (at the
+    /// right).
+    pub left: Vec<f64>,
+    pub total: f64,
 }
 
 const TOP: usize = 0;
@@ -39,11 +41,6 @@ impl OverlapEnergy {
             left: vec![0.0; (2 * reach + 1).pow(2)],
             total: 0.0,
         }
-    }
-
-    /// Energy of the whole raster.
-    pub fn total(&self) -> f64 {
-        self.total
     }
 
     /// Centre of the energy, cells down and right of the middle; zero without energy.
@@ -114,13 +111,6 @@ impl OverlapEnergy {
             }
         }
     }
-
-    /// Energy left after each shift (down, right) of up to `reach` cells, row after row from the
-    /// most negative on: `down` rows are dropped at the top (at the bottom if negative), `right`
-    /// columns at the left (at the right).
-    pub fn left(&self) -> &[f64] {
-        &self.left
-    }
 }
 
 #[cfg(test)]
@@ -148,7 +138,7 @@ mod tests {
                     .filter(|k| kept(k / n, down) && kept(k % n, right))
                     .map(|k| f64::from(raster[k]).powi(2))
                     .sum();
-                let got = energy.left()[((down + 5) * 11 + right + 5) as usize];
+                let got = energy.left[((down + 5) * 11 + right + 5) as usize];
                 assert!(
                     (got - direct).abs() <= 1e-6 * direct,
                     "{down} {right}: {got} {direct}"

@@ -57,7 +57,6 @@ impl PolarGrid {
         ((bins_high * size as f64).floor() as usize + 2).min(size / 2 + 1)
     }
 
-    /// Loads the magnitudes of the band from a spectrum.
     pub fn load(&mut self, spectrum: &Columns) {
         let stride = 2 * self.bins + 1;
         for (c, out) in self.magnitude.chunks_exact_mut(stride).enumerate() {
@@ -70,7 +69,6 @@ impl PolarGrid {
         }
     }
 
-    /// Writes the samples of radius `r` over half a turn.
     pub fn ring(&self, r: usize, out: &mut [f32]) {
         let stride = 2 * self.bins + 1;
         kernels::bilinear_table(

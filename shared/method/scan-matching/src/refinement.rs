@@ -3,32 +3,12 @@
 //! The map is the mean of the last keyframes, each drawn once from its own points at its own pose,
 //! blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map
 //! and then on the fine one, and is deskewed with the very motion that is sought.
-//!
-//! Reading order:
-//! - [`Refiner::refine`]: the method;
-//! - `registration`: the best match of a scan with the map, from several initial guesses;
-//! - `points`: a scan's points, deskewed;
-//! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
-//! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
-//! - `tracker`: the last poses, predictions from them, and the poses that a vehicle can have
-//!   reached;
-//! - `aiding`: the motion by gyro, wheels and Doppler, against the radar's;
-//! - `heading`: with a gyro, the heading and the gyro's bias;
-//! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
-//! - `along_walls`: the displacement where only other sensors determine the distance; `structure`:
-//!   where that is so;
-//! - `uncertainty`: covariances, and the shares of them that accumulate;
-//! - `standstill`: the pose of a standing vehicle is held;
-//! - [`Submap`]: the points of a keyframe and of those around it;
-//! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in
-//!   time.
 
 mod aiding;
 mod alignment;
 mod along_walls;
 mod config;
 mod heading;
-mod initial_guess;
 mod keyframe_aligner;
 mod local_map;
 mod map_level;
@@ -49,7 +29,6 @@ use gyre_samples::{
     WheelsConfig,
 };
 pub use heading::{GyroBias, Heading, Verdict};
-pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
 use nalgebra::{UnitVector2, Vector2};
@@ -62,6 +41,7 @@ use crate::ConfigError;
 use alignment::Alignment;
 use local_map::LocalMap;
 use points::DeskewedPoints;
+pub use registration::InitialGuess;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
 use tracker::Step;
@@ -77,7 +57,6 @@ const MIN_SUPPORT: f64 = 0.6;
 const SEARCH_AGREES_M: f64 = 2.0;
 const SEARCH_AGREES_DEG: f64 = 6.0;
 
-/// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     Refined,
@@ -95,29 +74,36 @@ pub struct Refined {
     pub overlap: f64,
     /// Weight of the points as a share of its running mean; 1 without a mean yet.
     pub support: f64,
-    /// The reliability of the motion.
     pub outcome: Outcome,
     /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
-    /// The vehicle stands: the motion is zero.
     pub stationary: bool,
-    /// The bias of the gyro; `None` where it has not measured the turn.
     pub gyro: Option<GyroBias>,
-    /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
-    /// The scale of the velocity by Doppler; `None` if one of both scans does not determine it.
     pub doppler: Option<WheelScale>,
 }
 
-/// An estimated pose, with the covariance of the motion to it.
 struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
     guess: InitialGuess,
-    /// Displacement by the search beyond a predicted place, m.
     ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
     leaves_map: bool,
+}
+
+/// Measurements about the motion between the next two scans, beside their points.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Aiding {
+    /// Variance of the turn by the mean azimuths of both scans, rad². Where azimuths were lost, all
+    /// points of a sector err alike, and the mean azimuth by its share of the turn; the motion
+    /// takes back the error of the earlier scan.
+    pub azimuth_variance_rad2: f32,
+    /// The turn by the gyro and the distance by the wheels; `None` where samples are missing.
+    pub turn: Option<GyroTurn>,
+    pub distance: Option<WheelDistance>,
+    /// The velocities by Doppler of the earlier scan and of the later one, if a scan determines it.
+    pub velocities: [Option<DopplerVelocity>; 2],
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -129,17 +115,12 @@ pub struct Refiner {
     gyro: GyroConfig,
     wheels: WheelsConfig,
     doppler: DopplerConfig,
-    /// [`DopplerConfig::as_wheels`].
     doppler_as_wheels: WheelsConfig,
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
-    /// The points of an alternative match.
     other_points: DeskewedPoints,
-    azimuth_variance_rad2: f64,
-    turn: Option<GyroTurn>,
-    distance: Option<WheelDistance>,
-    velocities: [Option<DopplerVelocity>; 2],
+    pub aiding: Aiding,
     displacement: Option<DopplerDisplacement>,
 }
 
@@ -157,59 +138,22 @@ impl Refiner {
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             other_points: DeskewedPoints::with_capacity(capacity),
-            azimuth_variance_rad2: 0.0,
-            turn: None,
-            distance: None,
-            velocities: [None; 2],
+            aiding: Aiding::default(),
             displacement: None,
         })
     }
 
-    /// Uses the turns of a gyro of this kind: [`Refiner::expect_turn`].
+    /// Uses aiding sensors of these kinds: the measurements are in [`Refiner::aiding`].
     #[must_use]
-    pub fn with_gyro(mut self, gyro: &GyroConfig) -> Self {
-        self.gyro = gyro.clone();
+    pub fn with_sensors(
+        mut self,
+        gyro: &GyroConfig,
+        wheels: &WheelsConfig,
+        doppler: &DopplerConfig,
+    ) -> Self {
+        (self.gyro, self.wheels) = (gyro.clone(), wheels.clone());
+        (self.doppler, self.doppler_as_wheels) = (doppler.clone(), doppler.as_wheels());
         self
-    }
-
-    /// Uses the distances of wheels of this kind: [`Refiner::expect_distance`].
-    #[must_use]
-    pub fn with_wheels(mut self, wheels: &WheelsConfig) -> Self {
-        self.wheels = wheels.clone();
-        self
-    }
-
-    /// Uses the velocities by Doppler, if `doppler` enables them: [`Refiner::expect_velocities`].
-    #[must_use]
-    pub fn with_doppler(mut self, doppler: &DopplerConfig) -> Self {
-        self.doppler = doppler.clone();
-        self.doppler_as_wheels = doppler.as_wheels();
-        self
-    }
-
-    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
-    /// does not determine it.
-    pub fn expect_velocities(&mut self, velocities: [Option<DopplerVelocity>; 2]) {
-        self.velocities = velocities;
-    }
-
-    /// Sets the distance from the earlier scan to the later one that the wheels have measured;
-    /// `None` where they have not.
-    pub fn expect_distance(&mut self, distance: Option<WheelDistance>) {
-        self.distance = distance;
-    }
-
-    /// Sets the turn from the earlier scan to the later one that the gyro has measured; `None`
-    /// where it has not.
-    pub fn expect_turn(&mut self, turn: Option<GyroTurn>) {
-        self.turn = turn;
-    }
-
-    /// Sets the variance of the turn between the next two scans by the mean azimuths of both, rad²;
-    /// 0 at first. Where azimuths were lost, all points of a sector err alike, and the mean azimuth
-    /// by its share of the turn; the motion takes back the error of the earlier scan.
-    pub fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
-        self.azimuth_variance_rad2 = f64::from(variance_rad2);
     }
 
     /// Refines the motion from the `earlier` scan to the `later` one, which has number `scan`.
@@ -243,8 +187,8 @@ impl Refiner {
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
         let outcome = accepted.outcome;
-        let gyro = self.turn.and(self.state.heading);
-        let wheels = self.distance.and(self.state.wheels);
+        let gyro = self.aiding.turn.and(self.state.heading);
+        let wheels = self.aiding.distance.and(self.state.wheels);
         let doppler = self.displacement.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, &accepted);
@@ -286,17 +230,14 @@ impl Refiner {
         self.state = state;
     }
 
-    /// Returns the state that the next motion depends on, apart from the keyframes.
     pub fn state(&self) -> &TrackerState {
         &self.state
     }
 
-    /// Returns the keyframes of the map, oldest first.
     pub fn keyframes(&self) -> impl Iterator<Item = &Keyframe> {
         self.map.keyframes()
     }
 
-    /// Returns the number of cells of both images of a keyframe.
     pub fn keyframe_cells(&self) -> usize {
         self.map.keyframe_cells()
     }
@@ -380,14 +321,13 @@ impl Refiner {
         Some(UncertainMotion {
             motion: alignment.pose,
             covariance: covariance
-                + uncertainty::by_azimuths(alignment, self.azimuth_variance_rad2),
+                + uncertainty::by_azimuths(alignment, self.aiding.azimuth_variance_rad2.into()),
         })
     }
 
-    /// Returns the predicted pose and the covariance of its motion.
     fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
-        let covariance = uncertainty.of_prediction();
+        let covariance = uncertainty.of_prediction;
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
             heading.inflate(covariance[(2, 2)]);
         }
@@ -420,7 +360,6 @@ impl Refiner {
         self.fits_firmly(best) && self.agrees_with_search(scan, best, undetermined)
     }
 
-    /// Returns whether the scan overlaps the map well and has enough points.
     fn fits_firmly(&self, best: &Candidate) -> bool {
         best.overlap >= self.config.firm_overlap * self.state.mean_overlap
             && best.support >= MIN_SUPPORT
@@ -464,7 +403,6 @@ impl Refiner {
         }
     }
 
-    /// Updates the tracker state and the map with the accepted or predicted pose.
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
         let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);

@@ -9,6 +9,7 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Peak, RotationConfig, RotationForm};
+use crate::covariance::guess;
 use crate::fft::{RealLines, RealSpectrum, fast_size};
 use crate::peak::{line_peak, soft_argmax};
 use crate::polar::PolarGrid;
@@ -27,15 +28,12 @@ const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 /// on real scans with known motions.
 const VARIANCE_SCALE: f64 = 0.12;
 
-/// The second-best angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationRunnerUp {
-    /// Angle, radians.
     pub angle_rad: f64,
     pub score: f64,
 }
 
-/// The rotation between two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationMatch {
     /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the
@@ -47,8 +45,19 @@ pub struct RotationMatch {
     /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no
     /// match.
     pub score: f64,
-    /// The highest other local maximum within reach.
     pub runner_up: Option<RotationRunnerUp>,
+}
+
+impl RotationMatch {
+    /// No match: the angle may be anywhere about this one.
+    pub(crate) fn none(angle_rad: f64, variance_rad2: f64) -> Self {
+        Self {
+            angle_rad,
+            variance_rad2,
+            score: 0.0,
+            runner_up: None,
+        }
+    }
 }
 
 /// Finds the angle between two scans (Weston et al., Algorithm 1, lines 5 to 15).
@@ -109,8 +118,6 @@ impl RotationSearch {
         })
     }
 
-    /// Returns an empty spectrum of this search's shape, to be filled by
-    /// [`spectrum`](Self::spectrum).
     pub fn new_spectrum(&self) -> PolarSpectrum {
         PolarSpectrum::new(self.grid.angles, self.profiles())
     }
@@ -119,7 +126,6 @@ impl RotationSearch {
     ///
     /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// `raster` must be n x n in standard layout, and `out` from this search.
     pub fn spectrum(
         &mut self,
         raster: ArrayView2<'_, f32>,
@@ -159,7 +165,6 @@ impl RotationSearch {
         Ok(self.best_match(self.shifts_near(turn_rad)))
     }
 
-    /// Number of profiles along the angle that are compared: one per radius, or one in all.
     fn profiles(&self) -> usize {
         if self.config.form == RotationForm::Eq7 {
             self.grid.radii
@@ -235,7 +240,6 @@ impl RotationSearch {
         self.correlation.iter_mut().for_each(|c| *c *= scale);
     }
 
-    /// The correlation at a shift of `k` samples, on the circle.
     fn at(&self, k: isize) -> f64 {
         f64::from(self.correlation[k.rem_euclid(self.grid.angles as isize) as usize])
     }
@@ -285,7 +289,7 @@ impl RotationSearch {
     /// distribution over the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = VARIANCE_SCALE * (1.0 - score).max(1e-6) / -curvature;
-        let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;
+        let guess = guess(self.config.reach_deg.to_radians());
         if variance > 0.0 && variance < guess {
             variance
         } else {
@@ -306,13 +310,7 @@ impl RotationSearch {
     }
 
     fn no_match(&self) -> RotationMatch {
-        let variance_rad2 = self.config.reach_deg.to_radians().powi(2) / 3.0;
-        RotationMatch {
-            angle_rad: 0.0,
-            variance_rad2,
-            score: 0.0,
-            runner_up: None,
-        }
+        RotationMatch::none(0.0, guess(self.config.reach_deg.to_radians()))
     }
 }
 

@@ -12,7 +12,6 @@ use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
 /// Half width of the neighbourhood where a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
 
-/// A shift (down, right), cells.
 pub(crate) type Shift = (isize, isize);
 
 /// Scores of all shifts of up to `reach + SUPPORT` cells; maxima are looked for within `reach`.
@@ -20,8 +19,7 @@ pub(crate) struct Scores {
     n: usize,
     reach: isize,
     /// Row (and column) of the transform for each shift.
-    wrapped: Arc<[usize]>,
-    /// Row after row.
+    pub wrapped: Arc<[usize]>,
     values: Vec<f32>,
 }
 
@@ -32,7 +30,6 @@ impl Scores {
         n + Self::around(reach)
     }
 
-    /// Largest shift that has a score.
     pub fn around(reach: usize) -> usize {
         reach + SUPPORT
     }
@@ -51,12 +48,6 @@ impl Scores {
         }
     }
 
-    /// The transform's row (and column) of each shift, from the most negative one on.
-    pub fn wrapped(&self) -> Arc<[usize]> {
-        self.wrapped.clone()
-    }
-
-    /// Fills row `r` of the scores from the same row of the transform.
     pub fn fill<T: Copy>(&mut self, r: usize, row: &[T], score: impl Fn(T) -> f32) {
         let side = self.wrapped.len();
         for (value, &column) in self.values[r * side..][..side]
@@ -81,7 +72,7 @@ impl Scores {
             Overlap::Area => self.normalise_area(),
             // A shift by s drops the first s rows of g' and the last s rows of f.
             Overlap::Energy => {
-                kernels::divide_by_share(&mut self.values, later.left(), turned.left(), energy)
+                kernels::divide_by_share(&mut self.values, &later.left, &turned.left, energy)
             }
         }
     }
@@ -107,13 +98,11 @@ impl Scores {
         f64::from(self.values[((down + around) * side + right + around) as usize])
     }
 
-    /// All shifts within reach with their scores.
     fn scored(&self) -> impl Iterator<Item = (Shift, f64)> + Clone {
         let reach = self.reach;
         (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| ((i, j), self.at(i, j))))
     }
 
-    /// The shift of the highest score, if any is above zero.
     pub fn highest(&self) -> Option<Shift> {
         let finite = self.scored().filter(|(_, score)| score.is_finite());
         let best = finite.fold(None, |best: Option<(Shift, f64)>, new| match best {
@@ -123,12 +112,10 @@ impl Scores {
         (best.1 > 0.0).then_some(best.0)
     }
 
-    /// The peak next to the highest score.
     pub fn peak(&self, kind: Peak, best: Shift) -> PlanePeak {
         plane_peak(kind, |i, j| self.at(best.0 + i, best.1 + j))
     }
 
-    /// The peak's place in cells (down, right).
     pub fn place(&self, kind: Peak, best: Shift, peak: &PlanePeak) -> Vector2<f64> {
         match kind {
             Peak::SoftArgmax { temperature } => {
@@ -141,7 +128,6 @@ impl Scores {
         }
     }
 
-    /// The highest local maximum outside the best peak.
     pub fn runner_up(&self, best: Shift) -> Option<(Shift, f64)> {
         let apart = |(i, j): Shift| (i - best.0).abs().max((j - best.1).abs()) > SAME_PEAK_CELLS;
         let summit = |(i, j): Shift, score: f64| {
@@ -157,12 +143,10 @@ impl Scores {
     }
 }
 
-/// Checks the side of rasters of `n` x `n` cells.
 pub(crate) fn check_side(n: usize) -> Result<(), ConfigError> {
     Section("raster").within("n", n, 16..=8192, "16 to 8192 cells a side")
 }
 
-/// Checks the size of rasters of `n` x `n` cells of `cell_m` metres.
 pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), ConfigError> {
     check_side(n)?;
     Section("raster").require(positive(cell_m), "cell_m", &cell_m, "metres, above 0")

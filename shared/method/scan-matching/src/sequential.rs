@@ -17,7 +17,6 @@ pub struct SequentialRotation {
 }
 
 impl SequentialRotation {
-    /// Plans the search for rasters of `n` x `n` cells.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         let search = RotationSearch::new(n, config)?;
         let (later, earlier) = (search.new_spectrum(), search.new_spectrum());
@@ -34,7 +33,6 @@ impl SequentialRotation {
     /// `earlier_changed`: the earlier raster is not the one that was given as the later one last
     /// time, as with a mask that looks at both scans of a pair. `turn_rad`: the rotation as a gyro
     /// has measured it, near which it is searched.
-    /// Rasters must be n x n in standard layout.
     pub fn next(
         &mut self,
         seq: u64,

@@ -27,7 +27,6 @@ impl PolarSpectrum {
         }
     }
 
-    /// Refuses a spectrum of another number of radii or angles.
     pub(crate) fn expect(&self, radii: usize, angles: usize) -> Result<(), ShapeError> {
         let actual = [self.radii(), self.angles];
         expect_shape("polar spectrum (radii x angles)", actual, [radii, angles])
@@ -43,7 +42,6 @@ impl PolarSpectrum {
         self.angles / 2 + 1
     }
 
-    /// Returns the spectrum, radius x harmonic.
     pub fn view(&self) -> ArrayView2<'_, Complex32> {
         ArrayView2::from_shape((self.radii(), self.harmonics()), &self.data)
             .expect("the data are planned as radii x harmonics")

@@ -16,7 +16,6 @@ use crate::scores::{Scores, Shift, reach_cells};
 use crate::warp::Rotation;
 use crate::{ShapeError, cells, kernels, whiten};
 
-/// The second-best shift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionRunnerUp {
     /// Forward, m, in the earlier scan's frame.
@@ -29,25 +28,33 @@ pub struct MotionRunnerUp {
 /// The motion between two scans: the pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionMatch {
-    /// Forward, m.
     pub x_m: f64,
-    /// Left, m.
     pub y_m: f64,
-    /// Counter-clockwise, radians.
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw), m^2, m rad and rad^2: from the shapes of the peaks, and the
     /// shift's dependence on the angle.
     pub covariance: Matrix3<f64>,
     /// Correlation coefficient at the peak, at most 1; 0 if there is no match.
     pub score: f64,
-    /// The highest other local maximum within reach.
     pub runner_up: Option<MotionRunnerUp>,
 }
 
 impl MotionMatch {
-    /// Returns the motion as the pose of the later scan's frame in the earlier scan's frame.
     pub fn pose(&self) -> Pose {
         pose(self.x_m, self.y_m, self.yaw_rad)
+    }
+
+    /// No match: the shift may be anywhere within reach.
+    pub(crate) fn none(reach_m: f64, yaw_rad: f64, variance_rad2: f64) -> Self {
+        let guess = guess(reach_m);
+        Self {
+            x_m: 0.0,
+            y_m: 0.0,
+            yaw_rad,
+            covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
+            score: 0.0,
+            runner_up: None,
+        }
     }
 }
 
@@ -97,31 +104,19 @@ impl TranslationSearch {
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    /// Rasters must be n x n in standard layout.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
         earlier: ArrayView2<'_, f32>,
         rotation: &RotationMatch,
     ) -> Result<MotionMatch, ShapeError> {
-        self.search_in(later, earlier, None, rotation)
+        self.search_seen(later, earlier, None, rotation)
     }
 
     /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`,
     /// in the directions of the later raster, is 1 where it could, and 0 elsewhere. The earlier
     /// raster counts only there, as seen from its own sensor.
-    /// Rasters must be n x n in standard layout.
     pub fn search_seen(
-        &mut self,
-        later: ArrayView2<'_, f32>,
-        earlier: ArrayView2<'_, f32>,
-        seen: ArrayView2<'_, f32>,
-        rotation: &RotationMatch,
-    ) -> Result<MotionMatch, ShapeError> {
-        self.search_in(later, earlier, Some(seen), rotation)
-    }
-
-    fn search_in(
         &mut self,
         later: ArrayView2<'_, f32>,
         earlier: ArrayView2<'_, f32>,
@@ -138,7 +133,6 @@ impl TranslationSearch {
         Ok(self.at_angle(earlier, seen, angle_rad, variance_rad2))
     }
 
-    /// The motion if the angle is `angle_rad`.
     fn at_angle(
         &mut self,
         earlier: &[f32],
@@ -151,13 +145,13 @@ impl TranslationSearch {
             keep_seen(&mut self.turned, seen);
         }
         self.turned_energy.measure(&self.turned);
-        let energy = (self.later_energy.total() * self.turned_energy.total()).sqrt();
+        let energy = (self.later_energy.total * self.turned_energy.total).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
-            return self.no_match(angle_rad, variance_rad2);
+            return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         }
         self.correlate(energy); // lines 17 and 18
         let Some(best) = self.scores.highest() else {
-            return self.no_match(angle_rad, variance_rad2);
+            return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         };
         let peak = self.scores.peak(self.config.peak, best);
         let shift = self.scores.place(self.config.peak, best, &peak); // line 19
@@ -197,14 +191,14 @@ impl TranslationSearch {
     }
 
     fn read_scores(&mut self, energy: f64) {
-        let size = self.transform.size();
+        let size = self.transform.size;
         let cells = (size * size) as f64;
         let scale = if self.config.phase_only {
             1.0 / cells
         } else {
             1.0 / (cells * energy)
         };
-        let rows = self.scores.wrapped();
+        let rows = self.scores.wrapped.clone();
         self.transform.inverse(&rows, |r, row| {
             self.scores.fill(r, row, |value: f32| value * scale as f32)
         });
@@ -255,17 +249,5 @@ impl TranslationSearch {
     fn lever(&self, turn: &Rotation2<f64>) -> Vector2<f64> {
         let centre = self.later_energy.centre() * -self.cell_m;
         turn * Vector2::new(centre.y, -centre.x)
-    }
-
-    fn no_match(&self, angle_rad: f64, variance_rad2: f64) -> MotionMatch {
-        let guess = guess(self.config.reach_m);
-        MotionMatch {
-            x_m: 0.0,
-            y_m: 0.0,
-            yaw_rad: angle_rad,
-            covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
-            score: 0.0,
-            runner_up: None,
-        }
     }
 }

@@ -36,14 +36,11 @@ fn searches_allocate_nothing_after_construction() {
     let (n, cell_m) = (127, 0.8);
     let (earlier, later) = pair(n, cell_m, Motion::degrees(2.0, 1.0, 5.0), 1);
     for phase_only in [false, true] {
-        let mut rotation = RotationSearch::new(
-            n,
-            &RotationConfig {
-                phase_only,
-                ..RotationConfig::default()
-            },
-        )
-        .unwrap();
+        let config = RotationConfig {
+            phase_only,
+            ..RotationConfig::default()
+        };
+        let mut rotation = RotationSearch::new(n, &config).unwrap();
         let config = TranslationConfig {
             phase_only,
             ..TranslationConfig::default()
@@ -57,11 +54,8 @@ fn searches_allocate_nothing_after_construction() {
         translation
             .search(later.view(), earlier.view(), &angle)
             .unwrap();
-        assert_eq!(
-            ALLOCATIONS.with(Cell::get),
-            before,
-            "phase_only {phase_only}"
-        );
+        let after = ALLOCATIONS.with(Cell::get);
+        assert_eq!(after, before, "phase_only {phase_only}");
     }
     let mut exhaustive = ExhaustiveSearch::new(n, cell_m, &ExhaustiveConfig::default()).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
@@ -80,22 +74,13 @@ fn the_refinement_allocates_nothing_after_construction() {
     scans[20..30].iter_mut().for_each(Vec::clear); // a new map starts
     let mut refiner = scenes::refiner();
     let before = ALLOCATIONS.with(Cell::get);
-    for k in 0..scans.len() - 1 {
-        refiner.refine(
-            k as u64 + 1,
-            &scans[k + 1],
-            &scans[k],
-            &scenes::searched(&drive, k),
-            scenes::SWEEP_S,
-        );
+    for k in (1..scans.len()).chain([1]) {
+        if k == 1 {
+            refiner.reset();
+        }
+        let searched = scenes::searched(&drive, k - 1);
+        let (later, earlier) = (&scans[k], &scans[k - 1]);
+        refiner.refine(k as u64, later, earlier, &searched, scenes::SWEEP_S);
     }
-    refiner.reset();
-    refiner.refine(
-        1,
-        &scans[1],
-        &scans[0],
-        &scenes::searched(&drive, 0),
-        scenes::SWEEP_S,
-    );
     assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }

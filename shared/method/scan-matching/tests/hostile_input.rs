@@ -13,14 +13,10 @@ const CELL_M: f64 = 0.8;
 fn empty_rasters_give_no_motion_and_a_wide_covariance() {
     let empty = Array2::zeros((N, N));
     let (angle, motion) = search(N, CELL_M, &Default::default(), &empty, &empty);
-    assert_eq!(
-        (angle.angle_rad, angle.score, angle.runner_up),
-        (0.0, 0.0, None)
-    );
-    assert_eq!(
-        (motion.x_m, motion.y_m, motion.yaw_rad, motion.score),
-        (0.0, 0.0, 0.0, 0.0)
-    );
+    assert_eq!([angle.angle_rad, angle.score], [0.0; 2]);
+    assert!(angle.runner_up.is_none());
+    let found = [motion.x_m, motion.y_m, motion.yaw_rad, motion.score];
+    assert_eq!(found, [0.0; 4]);
     assert!(angle.variance_rad2.sqrt().to_degrees() > 5.0 && motion.covariance[(0, 0)] > 10.0);
 }
 
@@ -45,10 +41,8 @@ fn rasters_of_another_shape_or_layout_are_rejected() {
     assert_eq!(error.to_string(), "raster is 7 x 65: expected 65 x 65");
     let raster = Array2::zeros((N, N));
     let error = rotation.spectrum(raster.t(), &mut spectrum).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "raster is not in row-major, contiguous layout"
-    );
+    let words = "raster is not in row-major, contiguous layout";
+    assert_eq!(error.to_string(), words);
     let line14 = RotationConfig {
         form: RotationForm::ProfileMean,
         ..RotationConfig::default()
@@ -75,13 +69,8 @@ fn impossible_configurations_name_the_key() {
         reach_m: 30.0,
         ..TranslationConfig::default()
     };
-    assert!(
-        TranslationSearch::new(N, CELL_M, &far)
-            .err()
-            .unwrap()
-            .to_string()
-            .contains("reach_m = 30")
-    );
+    let far = TranslationSearch::new(N, CELL_M, &far).err().unwrap();
+    assert!(far.to_string().contains("reach_m = 30"));
     assert!(TranslationSearch::new(N, f64::NAN, &TranslationConfig::default()).is_err());
     assert!(RotationSearch::new(3, &RotationConfig::default()).is_err());
 }
@@ -97,12 +86,8 @@ fn results_repeat_to_the_last_bit() {
         rotation.spectrum(later.view(), &mut f).unwrap();
         rotation.spectrum(earlier.view(), &mut g).unwrap();
         let angle = rotation.search(&f, &g, None).unwrap();
-        (
-            angle,
-            translation
-                .search(later.view(), earlier.view(), &angle)
-                .unwrap(),
-        )
+        let motion = translation.search(later.view(), earlier.view(), &angle);
+        (angle, motion.unwrap())
     };
     assert_eq!(once(&Array2::from_elem((127, 127), 5.0)), once(&earlier));
 }

@@ -1,11 +1,9 @@
 //! The velocity by Doppler, as a witness of the way.
 
-use std::ops::Range;
-
 use crate::common::{Numbers, scenes::*};
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
-use gyre_samples::{DopplerConfig, DopplerKind, DopplerVelocity};
-use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
+use gyre_geometry::{SparsePoint, pose};
+use gyre_samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig};
+use gyre_scan_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
 /// From there on there is nothing but walls, or nothing that matches.
@@ -22,23 +20,12 @@ fn slower() -> Drive {
     }
 }
 
-/// Makes the scans of a vehicle that leaves a town for a tunnel.
-fn into_a_tunnel(drive: &Drive) -> Vec<Vec<SparsePoint>> {
-    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
-    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
-    scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500)));
-    let sensor = Sensor {
-        noise_m: 0.05,
-        ..NOISY
-    };
-    scans(&scene, drive, &sensor)
-}
-
 fn witnessed() -> Refiner {
-    refiner().with_doppler(&DopplerConfig {
+    let doppler = DopplerConfig {
         kind: DopplerKind::Auto,
         ..DopplerConfig::default()
-    })
+    };
+    refiner().with_sensors(&GyroConfig::default(), &WheelsConfig::default(), &doppler)
 }
 
 /// Refines the motions to these scans. Each scan measures the true velocity times a factor, with
@@ -59,34 +46,21 @@ fn refine_with(
         })
     };
     let mut numbers = Numbers(7);
-    let mut refine = |k: usize| {
-        refiner.expect_velocities([velocity(k - 1), velocity(k)]);
-        let searched = match k < INSIDE {
-            true => searched(drive, k - 1),
-            false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
-        };
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let search = |k: usize| match k < INSIDE {
+        true => searched(drive, k - 1),
+        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
     };
-    (1..scans.len()).map(&mut refine).collect()
-}
-
-/// The displacement over scans by the motions against the true one, and its standard deviation
-/// ahead.
-fn off(drive: &Drive, refined: &[Refined], over: Range<usize>) -> (Pose, f64) {
-    let mut composed = ComposedMotion::of(&refined[over.start].motion);
-    for refined in &refined[over.start + 1..over.end] {
-        composed = composed.then(&refined.motion);
-    }
-    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
-    let motion = composed.motion();
-    let sigma_m = motion.covariance[(0, 0)].sqrt();
-    (truth.inv_mul(&motion.motion), sigma_m)
+    let aiding = |k: usize| Aiding {
+        velocities: [velocity(k - 1), velocity(k)],
+        ..Aiding::default()
+    };
+    refine_aided(refiner, scans, aiding, search)
 }
 
 #[test]
 fn in_a_tunnel_doppler_says_how_far() {
     let drive = slower();
-    let scans = into_a_tunnel(&drive);
+    let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut witnessed(), (&drive, &scans), |_| Some(SCALE));
     for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
         let slid = refined.guess == InitialGuess::AlongWalls;
@@ -94,7 +68,6 @@ fn in_a_tunnel_doppler_says_how_far() {
         assert!(refined.motion.covariance.cholesky().is_some());
     }
     let (off, sigma_m) = off(&drive, &refined, INSIDE..SCANS - 1);
-    println!("{off}, sigma {sigma_m:.2} m");
     // Two percent of 140 m; the scale was estimated before.
     assert!(off.translation.x.abs() < 2.8, "{off}");
     assert!(off.translation.x.abs() < 3.0 * sigma_m && sigma_m < 3.0);
@@ -118,7 +91,6 @@ fn scans_that_match_nothing_are_bridged_by_doppler_alone() {
             .all(|it| it.outcome == Outcome::Predicted)
     );
     let (away, sigma_m) = off(&drive, &refined, blind.clone());
-    println!("{away}, sigma {sigma_m:.2} m");
     // Two percent of 50 m.
     assert!(away.translation.x.abs() < 1.0, "{away}");
     assert!(away.translation.x.abs() < 3.0 * sigma_m && sigma_m < 1.5);
@@ -157,7 +129,7 @@ fn a_velocity_that_a_certain_match_contradicts_is_refused_and_changes_no_motion(
 #[test]
 fn without_the_section_velocities_change_no_bit() {
     let drive = slower();
-    let scans = &into_a_tunnel(&drive)[..INSIDE + 20];
+    let scans = &into_a_tunnel(&drive, Vec::new())[..INSIDE + 20];
     let poses = |refined: &[Refined]| -> Vec<_> {
         refined
             .iter()

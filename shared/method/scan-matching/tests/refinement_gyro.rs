@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use crate::common::scenes::*;
-use gyre_geometry::{Pose, SparsePoint, pose};
-use gyre_samples::{GyroConfig, GyroTurn};
-use gyre_scan_matching::{Outcome, Refined, Verdict};
+use gyre_geometry::{SparsePoint, pose};
+use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
+use gyre_scan_matching::{Aiding, Outcome, Refined, Verdict};
 
 const SCANS: usize = 60;
 /// Scans with a wrong gyro.
@@ -26,30 +26,18 @@ fn refine_with(
     off_radps: impl Fn(usize) -> f64,
 ) -> Vec<Refined> {
     const REACH_RAD: f64 = 0.07;
-    let mut refiner = refiner().with_gyro(gyro);
-    let refine = |k: usize| {
-        let off_radps = off_radps(k);
-        let rate_radps = drive.yaw_rate_radps + off_radps;
-        refiner.expect_turn(Some(GyroTurn {
-            yaw_rad: rate_radps * SWEEP_S,
-            variance_rad2: 1e-9,
-            interval_s: SWEEP_S,
-            sweep_rate_radps: rate_radps,
-        }));
-        let misled_rad = off_radps * SWEEP_S;
-        let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
-        let searched = drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad);
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let (wheels, doppler) = (WheelsConfig::default(), DopplerConfig::default());
+    let mut refiner = refiner().with_sensors(gyro, &wheels, &doppler);
+    let aiding = |k: usize| Aiding {
+        turn: Some(by_gyro(drive, off_radps(k))),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(refine).collect()
-}
-
-/// The error of the displacement over all scans: m, m, rad.
-fn off(drive: &Drive, refined: &[Refined]) -> Pose {
-    let driven = refined
-        .iter()
-        .fold(Pose::identity(), |at, it| at * it.motion.motion);
-    drive.pose(SCANS - 1).inv_mul(&driven)
+    let search = |k: usize| {
+        let misled_rad = off_radps(k) * SWEEP_S;
+        let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
+        drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad)
+    };
+    refine_aided(&mut refiner, scans, aiding, search)
 }
 
 /// The scans of this verdict.
@@ -63,7 +51,7 @@ fn a_gyro_is_refused_exactly_where_it_is_wrong_and_the_path_is_that_of_the_radar
     let (drive, scans) = bend();
     let good = refine_with(&GyroConfig::default(), (&drive, &scans), |_| 0.0);
     assert_eq!(judged(&good, Verdict::Agrees).len(), SCANS - 1);
-    let undisturbed = off(&drive, &good);
+    let (undisturbed, _) = off(&drive, &good, 0..SCANS - 1);
     for off_radps in [-3.0, -0.5, 0.5, 1.0, 3.0] {
         let wrong = |k: usize| if WRONG.contains(&k) { off_radps } else { 0.0 };
         let refined = refine_with(&GyroConfig::default(), (&drive, &scans), wrong);
@@ -72,7 +60,8 @@ fn a_gyro_is_refused_exactly_where_it_is_wrong_and_the_path_is_that_of_the_radar
             WRONG.collect::<Vec<_>>(),
             "{off_radps} rad/s"
         );
-        let apart = undisturbed.inv_mul(&off(&drive, &refined));
+        let (displacement, _) = off(&drive, &refined, 0..SCANS - 1);
+        let apart = undisturbed.inv_mul(&displacement);
         assert!(
             apart.translation.vector.norm() < 0.15,
             "{off_radps} rad/s: {apart}"

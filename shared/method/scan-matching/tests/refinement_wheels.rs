@@ -3,9 +3,8 @@
 use std::ops::Range;
 
 use crate::common::scenes::*;
-use gyre_geometry::{Pose, SparsePoint, pose};
-use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
-use gyre_scan_matching::{Outcome, Refined, Refiner};
+use gyre_geometry::{SparsePoint, pose};
+use gyre_scan_matching::{Aiding, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
 /// Six seconds.
@@ -25,11 +24,6 @@ fn faster() -> (Drive, Vec<Vec<SparsePoint>>) {
     (drive, scans(&town, &drive, &NOISY))
 }
 
-fn witnessed() -> Refiner {
-    let refiner = refiner().with_gyro(&GyroConfig::default());
-    refiner.with_wheels(&WheelsConfig::default())
-}
-
 /// Refines the motions to these scans, while the wheels measure the true distance times a factor.
 fn refine_with(
     refiner: &mut Refiner,
@@ -37,40 +31,17 @@ fn refine_with(
     measured: impl Fn(usize) -> Option<f64>,
     turns: bool,
 ) -> Vec<Refined> {
-    let refine = |k: usize| {
-        let yaw_rad = drive.yaw_rate_radps * SWEEP_S;
-        let turn = GyroTurn {
-            yaw_rad: yaw_rad + BIAS_RADPS * SWEEP_S,
-            variance_rad2: 1e-9,
-            interval_s: SWEEP_S,
-            sweep_rate_radps: drive.yaw_rate_radps + BIAS_RADPS,
-        };
-        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
-        let distance = |factor: f64| WheelDistance {
-            distance_m: factor * (to_m - from_m),
-            variance_m2: 1e-4,
-            side_variance_m2: 1e-4,
-            interval_s: SWEEP_S,
-        };
-        refiner.expect_turn(turns.then_some(turn));
-        refiner.expect_distance(measured(k).map(distance));
-        // The search finds nothing where there is nothing.
-        let searched = match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
-            true => pose(-3.0, 4.0, 0.5),
-            false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
-        };
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    let aiding = |k: usize| Aiding {
+        turn: turns.then(|| by_gyro(drive, BIAS_RADPS)),
+        distance: measured(k).map(|factor| by_wheels(drive, k, factor)),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(refine).collect()
-}
-
-/// The displacement over scans by the motions, against the true one: m along and across, rad.
-fn off(drive: &Drive, refined: &[Refined], over: Range<usize>) -> Pose {
-    let driven = refined[over.clone()]
-        .iter()
-        .fold(Pose::identity(), |at, it| at * it.motion.motion);
-    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
-    truth.inv_mul(&driven)
+    // The search finds nothing where there is nothing.
+    let search = |k: usize| match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
+        true => pose(-3.0, 4.0, 0.5),
+        false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
+    };
+    refine_aided(refiner, scans, aiding, search)
 }
 
 #[test]
@@ -84,10 +55,9 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
                 _ => noise(k as u64),
             };
         }
-        let both = refine_with(&mut witnessed(), (&drive, &scans), |_| Some(SCALE), true);
+        let both = refine_with(&mut refiner(), (&drive, &scans), |_| Some(SCALE), true);
         let around = BLIND.start - 2..BLIND.end + 2;
-        let off_by = off(&drive, &both, around.clone());
-        println!("{fault}: {off_by}");
+        let (off_by, _) = off(&drive, &both, around.clone());
         // 80 m: half a percent.
         assert!(off_by.translation.vector.norm() < 0.4, "{fault}: {off_by}");
         for (k, refined) in (1..).zip(&both) {
@@ -100,7 +70,7 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
             assert!(refined.motion.covariance.cholesky().is_some());
         }
         // No jump where the radar sees again.
-        let seen = off(&drive, &both, BLIND.end..BLIND.end + 3);
+        let (seen, _) = off(&drive, &both, BLIND.end..BLIND.end + 3);
         assert!(seen.translation.vector.norm() < 0.15, "{fault}: {seen}");
         let scale = both[SCANS - 2].wheels.unwrap();
         let apart = scale.scale - 1.0 / SCALE;
@@ -108,8 +78,8 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
             apart.abs() < 3.0 * scale.sigma && scale.sigma < 3e-3,
             "{scale:?}"
         );
-        let alone = refine_with(&mut witnessed(), (&drive, &scans), |_| None, false);
-        let alone = off(&drive, &alone, around);
+        let alone = refine_with(&mut refiner(), (&drive, &scans), |_| None, false);
+        let (alone, _) = off(&drive, &alone, around);
         assert!(alone.translation.vector.norm() > 1.0, "{fault}: {alone}");
     }
 }
@@ -118,14 +88,14 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
 fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
     let (drive, scans) = faster();
     let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
-    let slipping = refine_with(&mut witnessed(), (&drive, &scans), slip, true);
+    let slipping = refine_with(&mut refiner(), (&drive, &scans), slip, true);
     let slips: Vec<usize> = (1..)
         .zip(&slipping)
         .filter(|(_, it)| it.wheels.is_some_and(|wheels| wheels.slip))
         .map(|(k, _)| k)
         .collect();
     assert_eq!(slips, (40..46).collect::<Vec<_>>());
-    let whole = off(&drive, &slipping, 0..SCANS - 1);
+    let (whole, _) = off(&drive, &slipping, 0..SCANS - 1);
     assert!(whole.translation.vector.norm() < 0.5, "{whole}");
     // Where the search finds nothing they are weak.
     assert!(slipping.iter().all(|it| it.outcome != Outcome::Predicted));
@@ -139,7 +109,7 @@ fn a_vehicle_that_stands_drives_off_while_the_radar_is_blind() {
     scans[BLIND.start..].fill(Vec::new());
     let moving = Drive::steady(4.0, 0.0, SCANS);
     let measured = |k: usize| Some(if k < BLIND.start { 0.0 } else { 1.0 });
-    let refined = refine_with(&mut witnessed(), (&moving, &scans), measured, false);
+    let refined = refine_with(&mut refiner(), (&moving, &scans), measured, false);
     let (stood, drove) = refined.split_at(BLIND.start - 1);
     assert!(stood.iter().skip(8).all(|it| it.stationary));
     assert!(drove.iter().all(|it| !it.stationary));

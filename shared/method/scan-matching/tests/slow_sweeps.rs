@@ -82,25 +82,17 @@ fn refined(seed: u64) -> Vec<Refined> {
 /// degrees off at once.
 #[test]
 fn a_bend_that_starts_between_two_scans_is_followed() {
-    for seed in 1..=6 {
+    for seed in 1..=3 {
         let mut end = Pose::identity();
         for (k, refined) in (1..).zip(refined(seed)) {
             let off = true_motion(k).inv_mul(&refined.motion.motion);
             let turned = off.rotation.angle().to_degrees();
             assert_ne!(refined.outcome, Outcome::Predicted, "seed {seed}, scan {k}");
-            assert!(
-                turned.abs() < 2.6,
-                "seed {seed}, scan {k}: {turned:.2} degrees off, from {:?}",
-                refined.guess
-            );
+            assert!(turned.abs() < 2.6, "seed {seed}, scan {k}: {turned} deg");
             end *= refined.motion.motion;
         }
-        let shift_m = pose((SCANS - 1) as f64 * SWEEP_S)
-            .inv_mul(&end)
-            .translation
-            .vector
-            .norm();
-        println!("seed {seed}: {shift_m:.2} m off at the end");
+        let off = pose((SCANS - 1) as f64 * SWEEP_S).inv_mul(&end);
+        let shift_m = off.translation.vector.norm();
         assert!(shift_m < 1.2, "seed {seed}: {shift_m:.2} m off at the end");
     }
 }

@@ -1,38 +1,21 @@
 //! A tunnel, whose walls look the same everywhere: displacement along it is unobservable.
 
 use crate::common::{Numbers, scenes::*};
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
-use gyre_samples::{WheelDistance, WheelsConfig};
-use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
+use gyre_geometry::{Pose, SparsePoint, pose};
+use gyre_scan_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
 
-const LITTLE_NOISE: Sensor = Sensor {
-    noise_m: 0.05,
-    ..NOISY
-};
 const SCANS: usize = 100;
 /// The last houses are out of sight.
 const INSIDE: usize = 40;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-/// A vehicle that leaves a town for a tunnel and slows down there, and its scans.
-fn into_a_tunnel() -> (Drive, Vec<Vec<SparsePoint>>) {
-    between_walls_and(Vec::new())
-}
-
-/// As in a tunnel, but with something beside the walls.
-fn between_walls_and(more: Vec<Reflector>) -> (Drive, Vec<Vec<SparsePoint>>) {
-    let drive = Drive {
+/// A vehicle that slows down in the tunnel.
+fn slower() -> Drive {
+    Drive {
         acceleration_mps2: -0.2,
         ..Drive::steady(10.0, 0.0, SCANS)
-    };
-    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
-    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
-    // At every place of a wall another point in each scan: speckle.
-    let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
-    scene.extend(walls);
-    scene.extend(more);
-    (drive, scans(&scene, &drive, &LITTLE_NOISE))
+    }
 }
 
 fn refine_with(
@@ -53,34 +36,17 @@ fn refine_searched(
     refiner: &mut Refiner,
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),
     wheels: impl Fn(usize) -> Option<f64>,
-    mut search: impl FnMut(usize) -> Pose,
+    search: impl FnMut(usize) -> Pose,
 ) -> Vec<Refined> {
-    let mut refine = |k: usize| {
-        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
-        let distance = |factor: f64| WheelDistance {
-            distance_m: factor * (to_m - from_m),
-            variance_m2: 1e-4,
-            side_variance_m2: 1e-4,
-            interval_s: SWEEP_S,
-        };
-        refiner.expect_distance(wheels(k).map(distance));
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
+    let aiding = |k: usize| Aiding {
+        distance: wheels(k).map(|factor| by_wheels(drive, k, factor)),
+        ..Aiding::default()
     };
-    (1..scans.len()).map(&mut refine).collect()
+    refine_aided(refiner, scans, aiding, search)
 }
 
-/// The displacement inside by the motions against the true one, and its standard deviation ahead.
 fn inside(drive: &Drive, refined: &[Refined]) -> (Pose, f64) {
-    let mut composed = ComposedMotion::of(&refined[INSIDE].motion);
-    for refined in &refined[INSIDE + 1..] {
-        composed = composed.then(&refined.motion);
-    }
-    let truth = drive.pose(INSIDE).inv_mul(&drive.pose(SCANS - 1));
-    let motion = composed.motion();
-    (
-        truth.inv_mul(&motion.motion),
-        motion.covariance[(0, 0)].sqrt(),
-    )
+    off(drive, refined, INSIDE..SCANS - 1)
 }
 
 fn slid(refined: &Refined) -> bool {
@@ -89,8 +55,9 @@ fn slid(refined: &Refined) -> bool {
 
 #[test]
 fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
-    let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
+    let mut refiner = refiner();
     let refined = refine_with(&mut refiner, (&drive, &scans), |_| Some(SCALE));
     assert!(!refined[..6].iter().any(slid), "houses tell the way");
     for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
@@ -101,7 +68,6 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
         assert!(refined.motion.covariance.cholesky().is_some());
     }
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     // One percent of 140 m; the scale was estimated before.
     assert!(
         off.translation.x.abs() < 1.4 && off.translation.y.abs() < 0.5,
@@ -116,11 +82,11 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
 
 #[test]
 fn radar_alone_says_that_it_does_not_know_how_far() {
-    let (drive, scans) = into_a_tunnel();
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut refiner(), (&drive, &scans), |_| None);
     assert!(refined[INSIDE..].iter().all(slid));
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     // The estimate keeps its speed, while the vehicle slows down.
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
@@ -132,12 +98,12 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
 
 #[test]
 fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
-    let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
+    let mut refiner = refiner();
     let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
     let refined = refine_with(&mut refiner, (&drive, &scans), measured);
     let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
     assert!(
         off.translation.x.abs() < 3.0 && sigma_m > 2.0,
         "{off}, {sigma_m} m"
@@ -147,8 +113,9 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
 
 #[test]
 fn one_scan_without_wheels_inside_does_not_ask_the_search() {
-    let (drive, scans) = into_a_tunnel();
-    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, Vec::new());
+    let mut refiner = refiner();
     let measured = |k: usize| (!k.is_multiple_of(5)).then_some(SCALE);
     // It is wrong, but not by so much as to contradict the wheels.
     let search = |k: usize| match k < INSIDE {
@@ -156,8 +123,7 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
         false => searched(&drive, k - 1) * pose(0.3, 0.0, 0.0),
     };
     let refined = refine_searched(&mut refiner, (&drive, &scans), measured, search);
-    let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
+    let (off, _) = inside(&drive, &refined);
     assert!(refined[INSIDE..].iter().all(slid));
     assert!(off.translation.x.abs() < 1.4, "{off}");
 }
@@ -166,13 +132,13 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
-    let (drive, scans) = between_walls_and(posts);
+    let drive = slower();
+    let scans = into_a_tunnel(&drive, posts);
     let search = |k: usize| searched(&drive, k - 1);
     for wheels in [None, Some(SCALE)] {
-        let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+        let mut refiner = refiner();
         let refined = refine_searched(&mut refiner, (&drive, &scans), |_| wheels, search);
         let (off, sigma_m) = inside(&drive, &refined);
-        println!("{wheels:?}: {off}, sigma {sigma_m:.2} m");
         assert!(!refined.iter().any(slid));
         assert!(
             off.translation.vector.norm() < 1.0 && sigma_m < 2.0,
@@ -201,15 +167,7 @@ fn behind_a_tunnel_the_way_is_seen_again() {
     let refined = refine_searched(&mut refiner(), (&drive, &scans), |_| None, search);
     let last = refined.iter().rposition(slid).unwrap();
     let from = drive.pose(last + 1);
-    println!("until {:.1} m", from.translation.x);
     assert!((155.0..260.0).contains(&from.translation.x), "{from}");
-    let mut composed = ComposedMotion::of(&refined[last + 1].motion);
-    for refined in &refined[last + 2..] {
-        composed = composed.then(&refined.motion);
-    }
-    let off = from
-        .inv_mul(&drive.pose(refined.len()))
-        .inv_mul(&composed.motion().motion);
-    println!("{off}");
+    let (off, _) = off(&drive, &refined, last + 1..refined.len());
     assert!(off.translation.vector.norm() < 0.5, "{off}");
 }

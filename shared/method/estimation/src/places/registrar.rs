@@ -64,23 +64,17 @@ impl Registrar {
             runner_up: None,
         };
         let (later, earlier) = (self.later.view(), self.earlier.view());
-        let found = match seen {
-            Some(seen) => self
-                .translation
-                .search_seen(later, earlier, seen, &rotation),
-            None => self.translation.search(later, earlier, &rotation),
-        };
-        found.expect(PLANNED)
+        self.translation
+            .search_seen(later, earlier, seen, &rotation)
+            .expect(PLANNED)
     }
 
     /// The masked correlation at a motion.
     pub fn correlation(&mut self, motion: &Pose, seen: Option<ArrayView2<'_, f32>>) -> f64 {
         let (later, earlier) = (self.later.view(), self.earlier.view());
-        let correlation = match seen {
-            Some(seen) => self.correlation.at_seen(later, earlier, seen, motion),
-            None => self.correlation.at(later, earlier, motion),
-        };
-        correlation.expect(PLANNED)
+        self.correlation
+            .at(later, earlier, seen, motion)
+            .expect(PLANNED)
     }
 }
 

@@ -4,9 +4,6 @@
 //! Each value is an integer from 0 to 255 and each weight one from -128 to 127, and every sum is
 //! below 2^24. So 32-bit floating-point numbers hold all of them exactly: no sum is rounded, and
 //! each vector unit gives the same bits, whether it adds products in one step or in two.
-//!
-//! Reading order: [`Integers`]; `graph` (the steps of a network in ONNX); `image` (the values of a
-//! layer); `kernels` (the steps on them).
 
 mod graph;
 mod image;

@@ -10,11 +10,10 @@ use ort::{
     value::{Outlet, TensorRef, ValueType},
 };
 
-use super::{NetworkError, fill, fold};
+use super::{NetworkError, fill};
 use crate::networks::{one_line, runtime};
 use crate::{Backend, MaskingConfig, Provider, model::Model};
 
-/// A session of ONNX Runtime.
 #[derive(Debug)]
 pub(super) struct OnnxRuntime {
     session: Session,
@@ -24,24 +23,20 @@ impl OnnxRuntime {
     /// Opens the library at `path` and loads a model.
     pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
         let environment = runtime::open(path)?;
-        let folded = fold::folded(&model.bytes);
         let session = builder(&environment, config)?
-            .commit_from_memory(folded.as_ref().unwrap_or(&model.bytes))
+            .commit_from_memory(&model.bytes)
             .map_err(|error| rejected(model, error.message()))?;
         Ok(Self { session })
     }
 
-    /// Returns the name, type and shape of each input.
     pub fn inputs(&self) -> Vec<String> {
         self.session.inputs().iter().map(describe).collect()
     }
 
-    /// Returns the name, type and shape of each output.
     pub fn outputs(&self) -> Vec<String> {
         self.session.outputs().iter().map(describe).collect()
     }
 
-    /// Computes the masks of rasters, both scans x n x n.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
@@ -55,7 +50,6 @@ impl OnnxRuntime {
     }
 }
 
-/// Returns a session builder with the configured threads and provider.
 fn builder(
     environment: &Environment,
     config: &MaskingConfig,
@@ -65,9 +59,9 @@ fn builder(
         .map_err(|error| NetworkError::Run(one_line(error.message())))?;
     builder
         .with_execution_providers(providers)
-        .map_err(|error| NetworkError::Provider {
-            provider: config.provider,
-            reason: one_line(error.message()),
+        .map_err(|error| {
+            let (provider, reason) = (config.provider, one_line(error.message()));
+            NetworkError::Model(format!("masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"))
         })
 }
 
@@ -88,7 +82,9 @@ fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispat
             unreachable_patterns,
             reason = "unreachable if all providers are built in"
         )]
-        other => Err(NetworkError::NotBuiltIn(other)),
+        other => Err(NetworkError::Model(format!(
+            "masking.provider is `{other}`, which this build does not have: build Gyre with --features {other}, or set it to `cpu`"
+        ))),
     }
 }
 
@@ -99,23 +95,17 @@ fn describe(tensor: &Outlet) -> String {
     }
 }
 
-/// Converts the error of a model that ONNX Runtime does not load.
 fn rejected(model: &Model, message: &str) -> NetworkError {
-    let path = model.file.clone();
     match message.split_once("ai.onnx is till opset ") {
         Some((_, known)) => {
-            let known = known.trim_end().trim_end_matches('.').to_owned();
-            NetworkError::Opset {
-                path,
-                opset: model.card.model.opset.into(),
-                by: Backend::OnnxRuntime,
+            let known = known.trim_end().trim_end_matches('.');
+            NetworkError::opset(
+                Backend::OnnxRuntime,
+                model,
+                model.card.model.opset.into(),
                 known,
-            }
+            )
         }
-        None => NetworkError::Load {
-            by: Backend::OnnxRuntime,
-            path,
-            reason: one_line(message),
-        },
+        None => NetworkError::load(Backend::OnnxRuntime, model, &one_line(message)),
     }
 }

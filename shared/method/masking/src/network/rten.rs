@@ -26,33 +26,28 @@ pub(super) struct Rten {
     thread: Arc<ThreadPool>,
 }
 
-/// Reads the file of a model.
 pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
         let reason = format!("it is not a model in ONNX, or is damaged: {error}");
-        rejected(model, reason)
+        rejected(model, &reason)
     })?;
     let opset = newest_operators(&file);
     if opset > OPSET {
-        return Err(NetworkError::Opset {
-            path: model.file.clone(),
+        return Err(NetworkError::opset(
+            Backend::Rten,
+            model,
             opset,
-            by: Backend::Rten,
-            known: OPSET.to_string(),
-        });
+            &OPSET.to_string(),
+        ));
     }
     match file.graph {
         Some(_) => Ok(file),
-        None => Err(rejected(model, "it has no graph".to_owned())),
+        None => Err(rejected(model, "it has no graph")),
     }
 }
 
-fn rejected(model: &Model, reason: String) -> NetworkError {
-    NetworkError::Load {
-        by: Backend::Rten,
-        path: model.file.clone(),
-        reason,
-    }
+fn rejected(model: &Model, reason: &str) -> NetworkError {
+    NetworkError::load(Backend::Rten, model, reason)
 }
 
 impl Rten {
@@ -61,7 +56,7 @@ impl Rten {
         if let Some(graph) = &mut file.graph {
             state_kernel_sizes(graph);
         }
-        let rejected = |reason| rejected(model, reason);
+        let rejected = |reason: String| rejected(model, &reason);
         let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
         let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
         Ok(Self {
@@ -74,16 +69,11 @@ impl Rten {
     /// other.
     pub fn rehearse(&mut self, model: &Model, empty: Array3<f32>) -> Result<(), NetworkError> {
         match self.run(empty.view(), empty.clone().view_mut()) {
-            Err(NetworkError::Run(reason)) => Err(NetworkError::Load {
-                by: Backend::Rten,
-                path: model.file.clone(),
-                reason,
-            }),
+            Err(NetworkError::Run(reason)) => Err(rejected(model, &reason)),
             computed => computed,
         }
     }
 
-    /// Computes the masks of rasters, both scans x n x n.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
@@ -114,7 +104,6 @@ pub(super) fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Res
     }
 }
 
-/// Returns the version of ONNX's own operators.
 fn newest_operators(file: &ModelProto) -> i64 {
     let own = file
         .opset_import
@@ -161,7 +150,6 @@ pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
     inputs.map(describe).collect()
 }
 
-/// Returns the name, type and shape of each output.
 pub(super) fn outputs(file: &ModelProto) -> Vec<String> {
     let outputs = file.graph.iter().flat_map(|graph| &graph.output);
     outputs.map(describe).collect()

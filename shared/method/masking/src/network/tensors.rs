@@ -6,7 +6,6 @@ use rten_onnx::onnx::{
     AttributeProto, DataType, GraphProto, NodeProto, TensorProto, ValueInfoProto,
 };
 
-/// The constants of a network, by name.
 pub struct Constants<'a>(HashMap<&'a str, &'a TensorProto>);
 
 /// Quantised weights with their scales, one for each output. All their zeros are 0.
@@ -23,7 +22,6 @@ impl<'a> Constants<'a> {
         Self(graph.initializer.iter().filter_map(named).collect())
     }
 
-    /// Returns a constant of one value.
     pub fn number(&self, name: &str) -> Option<f32> {
         match self.values(name)?[..] {
             [number] => Some(number as f32),
@@ -31,14 +29,12 @@ impl<'a> Constants<'a> {
         }
     }
 
-    /// Returns a constant of sizes or indices.
     pub fn sizes(&self, name: &str) -> Option<Vec<usize>> {
         let values = self.values(name)?.into_iter();
         let size = |value: f64| (value >= 0.0).then_some(value as usize);
         values.map(size).collect()
     }
 
-    /// Returns the weights that `DequantizeLinear` makes.
     pub fn weights(&self, node: &NodeProto) -> Option<Weights> {
         let [weights, scales, zeros] = &node.input[..] else {
             return None;
@@ -98,14 +94,12 @@ fn dims(tensor: &TensorProto) -> Option<Vec<usize>> {
         .collect()
 }
 
-/// Returns the shape of an input, if it is stated.
 pub fn shape_of(input: &ValueInfoProto) -> Option<Vec<usize>> {
     let tensor = input.r#type.as_ref()?.tensor_type.as_ref()?;
     let sizes = tensor.shape.as_ref()?.dim.iter();
     sizes.map(|size| size.dim_value?.try_into().ok()).collect()
 }
 
-/// The attributes of an operator.
 pub struct Attributes<'a>(pub &'a [AttributeProto]);
 
 impl<'a> Attributes<'a> {
@@ -144,7 +138,6 @@ impl<'a> Attributes<'a> {
             && self.sizes("pads") == Some(vec![1; 4])
     }
 
-    /// Returns whether they are of maxima of 2 x 2.
     pub fn are_of_plain_pool(&self) -> bool {
         self.is("auto_pad", "NOTSET")
             && self.are("dilations", &[1, 1])
@@ -154,14 +147,12 @@ impl<'a> Attributes<'a> {
             && self.sizes("strides") == Some(vec![2; 2])
     }
 
-    /// Returns whether they are of a linear resize between the centres of values.
     pub fn are_of_linear_resize(&self) -> bool {
         self.text("mode") == Some("linear")
             && self.is("coordinate_transformation_mode", "half_pixel")
             && self.integer("antialias").unwrap_or(0) == 0
     }
 
-    /// Returns whether they are of a padding by a constant.
     pub fn is_constant_padding(&self) -> bool {
         self.is("mode", "constant")
     }

@@ -11,16 +11,13 @@ use thiserror::Error;
 use crate::networks::one_line;
 use crate::networks::runtime::{self, RuntimeError};
 
-/// A network could not be loaded or computed.
 #[derive(Debug, Error)]
 pub enum PlanesError {
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
     #[error("{network} cannot be computed: {reason}")]
     Network {
-        /// The name of the file.
         network: &'static str,
-        /// The library's reason.
         reason: String,
     },
 }
@@ -53,10 +50,6 @@ impl PlanesNetwork {
         Self::of(name, bytes, runtime, shapes)
     }
 
-    /// Loads a network from the bytes of its file.
-    ///
-    /// # Errors
-    /// A library or a network that cannot be used.
     pub fn of(
         name: &'static str,
         bytes: &'static [u8],

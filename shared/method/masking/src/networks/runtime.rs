@@ -20,7 +20,6 @@ use thiserror::Error;
 /// The command that installs it in the user's data folder: the release of `models/onnxruntime.txt`.
 /// The library does not depend on the version of Python.
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" onnxruntime==1.31.1";
-/// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 /// The folder that [`INSTALL`] creates in Gyre's data folder; beside the program it has the same
 /// name.
@@ -32,7 +31,6 @@ const LIBRARY: &str = "libonnxruntime.so";
 /// The folder of the packages among which Gyre's own Python package is, in a process that uses it.
 static PACKAGES: OnceLock<PathBuf> = OnceLock::new();
 
-/// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     #[error(
@@ -40,30 +38,8 @@ pub enum RuntimeError {
          masking.backend = \"rten\" does not need it"
     )]
     Missing,
-    #[error(
-        "{named_by} is {path}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
-    )]
-    NotFound {
-        named_by: &'static str,
-        path: PathBuf,
-    },
-    #[error(
-        "ONNX Runtime at {path} is version {version}, but at least 1.{} is needed: `{INSTALL}` installs one",
-        ort::MINOR_VERSION
-    )]
-    TooOld {
-        /// The path of the library.
-        path: PathBuf,
-        /// The version of the library.
-        version: String,
-    },
-    /// The file is not ONNX Runtime, is damaged, or is for another platform.
-    #[error("{path} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one")]
-    Unusable {
-        /// The path of the library.
-        path: PathBuf,
-        reason: String,
-    },
+    #[error("{0}")]
+    Unusable(String),
 }
 
 /// Returns the path of the library: named by `configured` (`masking.runtime`) or by the
@@ -86,7 +62,12 @@ fn find_in(
         (None, None) => None,
     };
     if let Some((named_by, path)) = named {
-        return library_at(&path).ok_or(RuntimeError::NotFound { named_by, path });
+        let shown = path.display();
+        return library_at(&path).ok_or_else(|| {
+            RuntimeError::Unusable(format!(
+                "{named_by} is {shown}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
+            ))
+        });
     }
     installed_in
         .iter()
@@ -118,7 +99,6 @@ pub fn search_packages(folder: PathBuf) {
     PACKAGES.get_or_init(|| folder);
 }
 
-/// Returns the folders of packages of the Python environment whose programs are in `bin`.
 fn packages_beside(bin: &Path) -> Vec<PathBuf> {
     let lib = bin.parent().map(|environment| environment.join("lib"));
     let entries = lib.and_then(|lib| fs::read_dir(lib).ok());
@@ -156,7 +136,6 @@ fn library_at(path: &Path) -> Option<PathBuf> {
             .ok()?
             .flatten()
             .map(|file| file.path());
-        // Take the newest of several versions.
         files
             .filter_map(|file| Some((version(&file)?, file)))
             .max()
@@ -185,30 +164,25 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     if let Some(environment) = &*opened {
         return Ok(environment.clone());
     }
-    let unusable = |reason: String| RuntimeError::Unusable {
-        path: path.to_owned(),
-        reason,
+    let named = path.display();
+    let unusable = |reason: &str| {
+        RuntimeError::Unusable(format!(
+            "{named} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one"
+        ))
     };
     let builder = ort::init_from(path).map_err(|error| match error {
-        LoadDynamicError::BadVersion { version_str, path } => RuntimeError::TooOld {
-            path,
-            version: version_str,
-        },
+        LoadDynamicError::BadVersion { version_str, path } => RuntimeError::Unusable(format!(
+            "ONNX Runtime at {} is version {version_str}, but at least 1.{} is needed: `{INSTALL}` installs one",
+            path.display(),
+            ort::MINOR_VERSION
+        )),
         LoadDynamicError::Dlopen { error, .. } => {
-            let reason = error
-                .source()
-                .map_or_else(|| error.to_string(), ToString::to_string);
+            let reason = error.source().map_or_else(|| error.to_string(), ToString::to_string);
             // The dynamic linker's message starts with the file.
-            unusable(
-                reason
-                    .trim_start_matches(&format!("{}: ", path.display()))
-                    .to_owned(),
-            )
+            unusable(reason.trim_start_matches(&format!("{named}: ")))
         }
-        LoadDynamicError::MissingApi { .. } => {
-            unusable("it does not have ONNX Runtime's functions".to_owned())
-        }
-        LoadDynamicError::InvalidVersionString => unusable("its version is not text".to_owned()),
+        LoadDynamicError::MissingApi { .. } => unusable("it does not have ONNX Runtime's functions"),
+        LoadDynamicError::InvalidVersionString => unusable("its version is not text"),
     })?;
     // Errors are returned; other messages go to the run's log.
     let log = |level, _: &str, _: &str, location: &str, message: &str| match level {
@@ -219,7 +193,7 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
         .with_telemetry(false)
         .with_logger(Arc::new(log))
         .build();
-    let environment = environment.map_err(|error| unusable(error.to_string()))?;
+    let environment = environment.map_err(|error| unusable(&error.to_string()))?;
     environment.set_log_level(LogLevel::Error);
     Ok(opened.insert(environment).clone())
 }
@@ -303,41 +277,6 @@ mod tests {
         let requirements = include_str!("../../../../../models/onnxruntime.txt");
         let release = INSTALL.rsplit(' ').next().unwrap();
         assert!(requirements.contains(&format!("\n{release} ")), "{release}");
-    }
-
-    #[test]
-    fn the_data_folder_is_absolute() {
-        let text = |path: &str| Some(OsString::from(path));
-        let cases = [
-            (text("/data"), text("/home/me"), Some("/data/gyre")),
-            (None, text("/home/me"), Some("/home/me/.local/share/gyre")),
-            (
-                text(""),
-                text("/home/me"),
-                Some("/home/me/.local/share/gyre"),
-            ),
-            (text("data"), text("."), None),
-        ];
-        for (data_home, home, expected) in cases {
-            assert_eq!(data_folder(data_home, home), expected.map(PathBuf::from));
-        }
-    }
-
-    #[test]
-    fn a_named_path_without_a_library_is_an_error() {
-        let (project, _) = folder_with("onnxruntime/capi/libonnxruntime.so");
-        let installed_in = [project.path().to_owned()];
-        let error = find_in(Some(Path::new("/no/such")), None, &installed_in)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("masking.runtime is /no/such"), "{error}");
-        let error = find_in(None, Some("/no/such".into()), &installed_in)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("ORT_DYLIB_PATH is /no/such") && error.contains(INSTALL),
-            "{error}"
-        );
     }
 
     #[test]

@@ -32,23 +32,19 @@ const DEPENDENT_AZIMUTHS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct Fit {
     seen: Vec<Seen>,
-    /// Absolute residuals, for their median.
     sizes: Vec<f64>,
 }
 
-/// The approach at a bearing.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     azimuth: usize,
     direction: Vector2<f64>,
     /// Measured approach less the fitted velocity's, m/s.
     residual_mps: f64,
-    /// By the height of its peak.
     weight: f64,
 }
 
 impl Fit {
-    /// Returns the velocity that explains the shifts of most of these rows.
     pub fn velocity(&mut self, rows: &[RowShifts]) -> Result<DopplerVelocity, NoDoppler> {
         let bearings = rows.len();
         let too_few = |bearings| NoDoppler::TooFewBearings {
@@ -82,7 +78,6 @@ impl Fit {
         })
     }
 
-    /// Looks up the approach at each row near a velocity.
     fn look(&mut self, rows: &[RowShifts], velocity: &Vector2<f64>, window: f64) {
         self.seen.clear();
         self.seen.reserve(rows.len());
@@ -98,7 +93,6 @@ impl Fit {
         }));
     }
 
-    /// The residual beyond which a bearing has no weight, m/s.
     fn cutoff_mps(&mut self, rows: &[RowShifts]) -> f64 {
         self.sizes.clear();
         let sizes = self.seen.iter().map(|seen| seen.residual_mps.abs());
@@ -155,7 +149,6 @@ impl Fit {
     }
 }
 
-/// Returns the velocity with the highest sum of the correlations of all rows.
 fn vote(rows: &[RowShifts]) -> Vector2<f64> {
     let cell_mps = rows[0].mps_per_lag.abs();
     let reach = REACH as i32;

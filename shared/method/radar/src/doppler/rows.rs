@@ -1,7 +1,7 @@
 //! The powers of a scan above its noise, in cells deep enough that the fastest vehicle shifts
 //! echoes by [`REACH`] of them.
 
-use crate::scan::PolarScan;
+use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
 
 /// Largest shift of echoes in cells, either way.
 pub(super) const REACH: usize = 31;
@@ -25,20 +25,19 @@ const RINGING_M: f32 = 2.5;
 /// all ended at one range, a wall there would seem to stand still.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    layout: Layout,
+    pub layout: Layout,
     powers: Vec<f32>,
+    bins: Vec<u8>,
+    sums: Vec<u16>,
 }
 
-/// The assignment of bins to cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     bins_per_cell: usize,
     first_bin: usize,
-    /// Cells of a row.
     cells: usize,
     /// Cells before and behind it that are not empty.
     beside: [usize; 2],
-    /// Depth of a cell, m.
     pub cell_m: f32,
 }
 
@@ -65,14 +64,12 @@ impl Layout {
         }
     }
 
-    /// Cells of a row with the empty ones.
     fn stride(&self) -> usize {
         self.cells + WIDTH
     }
 }
 
 impl Rows {
-    /// Computes the cells of a checked scan.
     pub fn update(&mut self, scan: &PolarScan<'_>, min_range_m: f32) {
         let layout = Layout::of(scan, min_range_m);
         let (azimuths, stride) = (scan.geometry.azimuths, layout.stride());
@@ -86,17 +83,19 @@ impl Rows {
         let all = before + layout.cells + behind;
         let bins = first_bin..first_bin + all * layout.bins_per_cell;
         let floor = median(scan, bins.clone()).saturating_add(ABOVE_MEDIAN);
+        let floor = u16::from(floor) * layout.bins_per_cell as u16;
+        self.bins.resize(bins.len(), 0);
+        self.sums.resize(all, 0);
         for (azimuth, powers) in self.powers.chunks_exact_mut(stride).enumerate() {
+            let row = &scan.row(azimuth)[bins.clone()];
+            sum_pieces(row, 0, layout.bins_per_cell, &mut self.bins, &mut self.sums);
             let cells = &mut powers[REACH - before..REACH - before + all];
-            sum_above(&scan.row(azimuth)[bins.clone()], floor, layout, cells);
+            for (cell, sum) in cells.iter_mut().zip(&self.sums) {
+                *cell = f32::from(sum.saturating_sub(floor));
+            }
         }
     }
 
-    pub fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    /// Returns the cells of a row.
     pub fn row(&self, azimuth: usize) -> &[f32] {
         &self.padded(azimuth)[REACH..REACH + self.layout.cells]
     }
@@ -109,7 +108,6 @@ impl Rows {
     }
 }
 
-/// Returns the median power of these bins of all rows.
 fn median(scan: &PolarScan<'_>, bins: std::ops::Range<usize>) -> u8 {
     let mut counts = [0_u32; 256];
     for azimuth in (0..scan.geometry.azimuths).step_by(MEDIAN_STEP) {
@@ -125,33 +123,4 @@ fn median(scan: &PolarScan<'_>, bins: std::ops::Range<usize>) -> u8 {
         below > half
     });
     reaches_half.unwrap_or(0) as u8
-}
-
-/// Writes the sums of the bins of each cell, less the floor.
-fn sum_above(bins: &[u8], floor: u8, layout: Layout, cells: &mut [f32]) {
-    match layout.bins_per_cell {
-        1 => sum_each::<1>(bins, floor, cells),
-        2 => sum_each::<2>(bins, floor, cells),
-        3 => sum_each::<3>(bins, floor, cells),
-        4 => sum_each::<4>(bins, floor, cells),
-        depth => {
-            for (cell, bins) in cells.iter_mut().zip(bins.chunks_exact(depth)) {
-                *cell = above(bins, floor);
-            }
-        }
-    }
-}
-
-/// The same for a depth that the compiler knows.
-fn sum_each<const DEPTH: usize>(bins: &[u8], floor: u8, cells: &mut [f32]) {
-    let (whole, _) = bins.as_chunks::<DEPTH>();
-    for (cell, bins) in cells.iter_mut().zip(whole) {
-        *cell = above(bins, floor);
-    }
-}
-
-#[inline(always)]
-fn above(bins: &[u8], floor: u8) -> f32 {
-    let sum: i32 = bins.iter().map(|power| i32::from(*power)).sum();
-    (sum - i32::from(floor) * bins.len() as i32).max(0) as f32
 }

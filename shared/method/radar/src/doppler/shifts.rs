@@ -9,7 +9,6 @@ use super::{
 };
 use crate::scan::{PolarScan, Sense};
 
-/// Shifts that are looked at.
 pub(super) const LAGS: usize = 2 * REACH + 1;
 /// The mean of this many shifts on either side, about a metre, is subtracted from the correlation.
 /// Walls along the beam, at places of their own, correlate broadly; only the scatterers that both
@@ -22,12 +21,10 @@ const MIN_SHARE: f32 = 0.5;
 /// The correlations of all rows with echoes that lie between two rows of the other chirp.
 #[derive(Debug, Default)]
 pub(super) struct Shifts {
-    rows: Vec<RowShifts>,
-    /// The sum of both neighbours.
+    pub rows: Vec<RowShifts>,
     beside: Vec<f32>,
 }
 
-/// The correlation of a row with its neighbours.
 #[derive(Clone, Debug)]
 pub(super) struct RowShifts {
     pub azimuth: usize,
@@ -43,17 +40,13 @@ pub(super) struct RowShifts {
     top: f32,
 }
 
-/// A maximum of the correlation of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peak {
-    /// Shift, cells.
     pub lag: f64,
-    /// Height, at most 1.
     pub height: f64,
 }
 
 impl Shifts {
-    /// Correlates the rows of a checked scan.
     pub fn update(&mut self, scan: &PolarScan<'_>, rows: &Rows) {
         self.rows.clear();
         self.rows.reserve(scan.geometry.azimuths);
@@ -76,17 +69,12 @@ impl Shifts {
             self.rows.push(RowShifts {
                 azimuth,
                 direction: direction(scan, azimuth),
-                mps_per_lag: mps_per_lag(scan, rows.layout().cell_m, azimuth),
+                mps_per_lag: mps_per_lag(scan, rows.layout.cell_m, azimuth),
                 correlation,
                 top_lag: top as f64 - REACH as f64,
                 top: height,
             });
         }
-    }
-
-    /// Returns those rows, in the order of their azimuths.
-    pub fn rows(&self) -> &[RowShifts] {
-        &self.rows
     }
 }
 
@@ -132,7 +120,6 @@ impl RowShifts {
     }
 }
 
-/// Returns the place of the highest value, and the value.
 fn highest(values: &[f32; WIDTH], places: std::ops::Range<usize>) -> (usize, f32) {
     let mut best = (places.start, values[places.start]);
     for at in places {
@@ -165,7 +152,6 @@ fn mps_per_lag(scan: &PolarScan<'_>, cell_m: f32, azimuth: usize) -> f64 {
 fn correlate(row: &[f32], beside: &[f32], sums: &mut [f32; WIDTH]) {
     let mut totals = [0.0_f32; WIDTH];
     for (power, shifted) in row.iter().zip(beside.windows(WIDTH)) {
-        // Most cells are empty.
         if let Some(shifted) = shifted.first_chunk::<WIDTH>().filter(|_| *power > 0.0) {
             for (total, other) in totals.iter_mut().zip(shifted) {
                 *total += power * other;

@@ -147,17 +147,6 @@ proptest! {
 }
 
 #[test]
-fn a_standing_radar_stands() {
-    let scan = measured(
-        &ras6(Sense::Clockwise),
-        &scene(250, 3, (0.2, Vector2::new(8.0, 0.0))),
-        Vector2::zeros(),
-    );
-    let found = estimate(&scan).unwrap();
-    assert!(Vector2::from(found.velocity_mps).norm() < 0.05, "{found:?}");
-}
-
-#[test]
 fn the_scan_before_leaves_no_trace() {
     let scans = [12.0, -5.0, 20.0].map(|ahead| {
         let sensor = ras6(Sense::Clockwise);
@@ -218,16 +207,7 @@ fn what_a_scan_lacks_is_named() {
 
 #[test]
 fn scans_of_any_shape_are_looked_at() {
-    for (azimuths, bins) in [
-        (0, 0),
-        (1, 1),
-        (2, 5),
-        (3, 1),
-        (3, 4000),
-        (400, 0),
-        (400, 1),
-        (40, 130),
-    ] {
+    for (azimuths, bins) in [(0, 0), (2, 5), (3, 4000), (400, 1), (40, 130)] {
         let sensor = Sensor {
             azimuth_rad: (0..azimuths)
                 .map(|k| (k as f64 / azimuths as f64 * TAU) as f32)

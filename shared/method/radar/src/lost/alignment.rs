@@ -36,7 +36,6 @@ const NEGLIGIBLE: f64 = -30.0;
 type Turns<T> = [T; TURNS.next_multiple_of(8)];
 const TURNS: usize = 2 * TURN * STEPS + 1;
 
-/// Aligns the rows of scans with predictions.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Alignment {
     /// Sum of products of each row with each predicted azimuth around it.
@@ -62,7 +61,6 @@ struct Places {
 }
 
 impl Places {
-    /// Averages with others, each by how likely it is.
     fn add(&mut self, likelihood: f64, others: impl Iterator<Item = [f64; 2]>) {
         let most = self.likelihood.max(likelihood);
         let [of_self, of_other] = [self.likelihood, likelihood].map(|of| (of - most).exp());

@@ -18,7 +18,6 @@ const MAX_BINS_PER_CELL: usize = 128;
 /// Cells that are passed over together where none of them has a return.
 const BLOCK: usize = 16;
 
-/// The cells of a turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     pub azimuths: usize,
@@ -132,7 +131,6 @@ impl Echoes {
         }
     }
 
-    /// Returns the rows that have echoes.
     pub fn rows(&self) -> impl Iterator<Item = EchoRow<'_>> {
         let mut start = 0;
         self.rows.iter().map(move |row| {

@@ -17,7 +17,6 @@ const TYPICAL_M: f32 = 30.0;
 /// Azimuths before the turn and beyond it that a prediction has.
 const BEFORE: usize = 8;
 const BEYOND: usize = 88;
-/// Echoes that are located at once.
 const BLOCK: usize = 16;
 
 /// The motion of the sensor from one turn to the next: at a constant velocity, so between two looks
@@ -29,7 +28,6 @@ pub(super) struct Motion {
     /// Change of that pose, in the same frame: m/s and rad/s.
     velocity_mps: Vector2<f64>,
     yaw_rate_radps: f64,
-    /// From the first azimuth to the last one.
     turn_s: f64,
 }
 
@@ -91,7 +89,6 @@ impl Moved {
     }
 }
 
-/// The predicted powers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
     layout: Layout,
@@ -102,7 +99,6 @@ pub(super) struct Prediction {
 }
 
 impl Prediction {
-    /// Draws the echoes of the scan before where the sensor sees them now.
     pub fn make(&mut self, before: &Echoes, motion: &Motion) {
         self.layout = before.layout;
         self.powers.clear();
@@ -115,7 +111,6 @@ impl Prediction {
         self.close();
     }
 
-    /// Repeats the turn's ends beyond it, and sums the energies.
     fn close(&mut self) {
         let (width, azimuths) = (self.width(), self.layout.azimuths);
         self.energies.clear();
@@ -128,7 +123,6 @@ impl Prediction {
         add_squares(&self.powers, &mut self.energies);
     }
 
-    /// Azimuths of the turn and beyond it.
     fn width(&self) -> usize {
         BEFORE + self.layout.azimuths + BEYOND
     }
@@ -202,7 +196,6 @@ struct Places {
     far: [[f32; BLOCK]; 2],
 }
 
-/// Draws the echoes of a row into the powers.
 #[simd]
 fn draw(row: &EchoRow, from: &Moved, frame: &Frame, powers: &mut [f32]) {
     let ((cells, rest), (of_cells, of_rest)) = (
@@ -271,7 +264,6 @@ fn add(places: &Places, count: usize, frame: &Frame, powers: &mut [f32]) {
     }
 }
 
-/// Adds the squares of the powers of each cell to the sums of the azimuths.
 #[simd]
 fn add_squares(powers: &[f32], sums: &mut [f32]) {
     for powers in powers.chunks_exact(sums.len()) {

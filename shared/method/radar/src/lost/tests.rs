@@ -106,7 +106,6 @@ fn lost_azimuths_are_found_where_they_were_lost() {
         distances.extend(middles.zip(&lost).map(|(a, b)| a.abs_diff(*b)));
     }
     let near = distances.iter().filter(|distance| **distance <= 4).count();
-    println!("{near} of {} within 4 rows", distances.len());
     assert!(near * 100 >= distances.len() * 95, "{distances:?}");
 }
 

@@ -40,7 +40,7 @@ impl Beam {
         self.found.clear();
         // The upper bound, so that no later scan of this size allocates. Untouched memory is not
         // committed.
-        self.found.reserve(azimuths * cells.cells());
+        self.found.reserve(azimuths * cells.layout.cells);
         for azimuth in 0..azimuths {
             let Some(powers) = cells.powers(azimuth) else {
                 continue;

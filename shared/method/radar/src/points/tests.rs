@@ -3,9 +3,10 @@
 use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
 use crate::raster::tests::scene::Sensor;
 use crate::scan::{OwnedScan, ScanError, Sense, flag};
-use gyre_geometry::{SparsePoint, Twist};
-use nalgebra::{Point2, Vector2};
+use gyre_geometry::SparsePoint;
 use proptest::prelude::*;
+use serde::Deserialize;
+use serde::de::value::{Error as ValueError, MapDeserializer};
 
 const UNSET: SparsePoint = SparsePoint {
     x_m: f32::NAN,
@@ -67,11 +68,8 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
                 continue;
             }
             let (sin, cos) = view.azimuth_rad[azimuth].sin_cos();
-            let left = if geometry.sense == Sense::Clockwise {
-                -sin
-            } else {
-                sin
-            };
+            let is_clockwise = geometry.sense == Sense::Clockwise;
+            let left = if is_clockwise { -sin } else { sin };
             let weight = (here as f32 / depth as f32 / WEIGHT_CAP).min(1.0);
             let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
             points.push(SparsePoint {
@@ -162,123 +160,6 @@ proptest! {
     }
 }
 
-/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or
-/// not at all.
-fn places() -> Vec<Point2<f64>> {
-    let polar = |k: u32| {
-        (
-            f64::from(k) * std::f64::consts::FRAC_PI_4,
-            10.0 + 11.0 * f64::from(k),
-        )
-    };
-    (1..8)
-        .map(polar)
-        .map(|(bearing, range)| Point2::new(range * bearing.cos(), range * bearing.sin()))
-        .collect()
-}
-
-#[test]
-fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
-    let twist = Twist {
-        vx_mps: 18.0,
-        vy_mps: -0.4,
-        yaw_rate_radps: 0.4,
-    };
-    for (sense, chirps_alternate, range_resolution_m) in [
-        (Sense::Clockwise, false, 0.0438),
-        (Sense::CounterClockwise, false, 0.1736),
-        (Sense::Clockwise, true, 0.0438),
-    ] {
-        let sensor = Sensor {
-            twist,
-            sense,
-            chirps_alternate,
-            range_resolution_m,
-            bins: (100.0 / range_resolution_m) as usize,
-            range_offset_m: -0.31,
-            doppler_s: 0.045,
-            ..Sensor::navtech()
-        };
-        let all = PointsConfig {
-            max_range_m: 95.0,
-            ..PointsConfig::default()
-        };
-        let points = extract(&all, &sensor.measure(&places(), 0.5), 30);
-        let placed: Vec<_> = points.iter().map(|point| place(point, &twist)).collect();
-        for scatterer in places() {
-            let near = placed
-                .iter()
-                .zip(&points)
-                .filter(|(place, _)| (*place - scatterer).norm() < 4.0);
-            let (sum, moment) =
-                near.fold((0.0, Vector2::zeros()), |(sum, moment), (place, point)| {
-                    (
-                        sum + f64::from(point.weight),
-                        moment + (place - scatterer) * f64::from(point.weight),
-                    )
-                });
-            // The accuracy is half an azimuth in bearing, and a tenth of a cell in range.
-            let miss = moment / sum;
-            let along = miss.dot(&scatterer.coords.normalize()).abs();
-            assert!(
-                along < 0.03,
-                "{sense:?} {chirps_alternate}: {scatterer} missed by {along} m along range"
-            );
-            assert!(
-                miss.norm() < 0.05 + 0.5 * 0.9f64.to_radians() * scatterer.coords.norm(),
-                "{scatterer}: {miss}"
-            );
-        }
-    }
-}
-
-/// Transforms a point to the frame at the scan's stamp, with Doppler compensation.
-fn place(point: &SparsePoint, twist: &Twist) -> Point2<f64> {
-    let [x, y, time_s, _, doppler_s] = <[f32; 5]>::from(*point).map(f64::from);
-    let direction = Vector2::new(x, y).normalize();
-    let shift_m = doppler_s * direction.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
-    twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + direction * shift_m)
-}
-
-#[test]
-fn a_scatterer_between_the_last_and_first_azimuth_gives_one_point() {
-    let mut scan = Sensor {
-        bins: 500,
-        range_resolution_m: 0.1736,
-        ..Sensor::navtech()
-    }
-    .scan();
-    for (azimuth, power) in [(398, 100), (399, 180), (0, 150), (1, 90)] {
-        let geometry = scan.geometry;
-        scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = power;
-    }
-    let points = extract(&PointsConfig::default(), &scan, 60);
-    assert_eq!(points.len(), 1);
-    assert_eq!(
-        (points[0].time_s, points[0].weight),
-        ((scan.view().time_s(399)) as f32, 1.0)
-    );
-}
-
-#[test]
-fn two_equally_strong_azimuths_both_give_points() {
-    let mut scan = Sensor {
-        bins: 500,
-        range_resolution_m: 0.1736,
-        ..Sensor::navtech()
-    }
-    .scan();
-    for azimuth in [20, 21] {
-        let geometry = scan.geometry;
-        scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = 90;
-    }
-    let points = extract(&PointsConfig::default(), &scan, 60);
-    assert_eq!(
-        points.iter().map(|point| point.weight).collect::<Vec<_>>(),
-        [0.5, 0.5]
-    );
-}
-
 #[test]
 fn the_previous_scan_leaves_no_trace() {
     let scans = [
@@ -319,50 +200,22 @@ fn tiny_scans_have_no_points_and_inconsistent_ones_are_rejected() {
 
 #[test]
 fn settings_out_of_bounds_are_rejected_by_name() {
-    let default = PointsConfig::default;
-    for (name, config) in [
-        (
-            "beam_deg",
-            PointsConfig {
-                beam_deg: f32::NAN,
-                ..default()
-            },
-        ),
-        (
-            "range_cell_m",
-            PointsConfig {
-                range_cell_m: 0.0,
-                ..default()
-            },
-        ),
-        (
-            "min_range_m",
-            PointsConfig {
-                min_range_m: -1.0,
-                ..default()
-            },
-        ),
-        (
-            "max_range_m",
-            PointsConfig {
-                max_range_m: 5.0,
-                ..default()
-            },
-        ),
-        (
-            "capacity",
-            PointsConfig {
-                capacity: 100_000,
-                ..default()
-            },
-        ),
-    ] {
-        let rejected = PointExtractor::new(&config).unwrap_err();
-        assert!(
-            rejected
-                .to_string()
-                .starts_with(&format!("points.{name} is ")),
-            "{rejected}"
-        );
+    let wrong = [
+        ("beam_deg", f32::NAN),
+        ("range_cell_m", 0.0),
+        ("min_range_m", -1.0),
+        ("max_range_m", 5.0),
+    ];
+    let read = |(key, value): (&'static str, f32)| {
+        let entries = MapDeserializer::<_, ValueError>::new([(key, value)].into_iter());
+        (key, PointsConfig::deserialize(entries).unwrap())
+    };
+    let many = PointsConfig {
+        capacity: 100_000,
+        ..PointsConfig::default()
+    };
+    for (key, config) in wrong.map(read).into_iter().chain([("capacity", many)]) {
+        let rejected = PointExtractor::new(&config).unwrap_err().to_string();
+        assert!(rejected.starts_with(&format!("points.{key} is ")));
     }
 }

@@ -20,7 +20,6 @@ pub(super) struct BearingTable {
     pub start: f32,
     /// Fractional azimuth, `[0, azimuths]`; `azimuths` is the first one again.
     pub row: Box<[f32; NODES + 1]>,
-    /// Time relative to the scan's stamp, s.
     pub time_s: Box<[f32; NODES + 1]>,
     /// Bearings of the azimuths relative to the first, turns, non-decreasing, followed by 1.
     bearings: Vec<f64>,
@@ -36,7 +35,6 @@ impl BearingTable {
         }
     }
 
-    /// Computes the table of a checked scan with at least one azimuth.
     pub fn update(&mut self, scan: &PolarScan<'_>) {
         let azimuths = &scan.azimuth_rad[..scan.geometry.azimuths];
         let first = azimuths.first().copied().unwrap_or(0.0);

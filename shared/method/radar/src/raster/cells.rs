@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 /// Cells per iteration of the vectorised loops.
 pub(super) const BLOCK: usize = 32;
 
-/// One value per cell of a block.
 pub(super) type Block<T> = [T; BLOCK];
 
 /// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points towards
@@ -23,15 +22,11 @@ pub(super) struct Cells {
     z_m: Vec<Block<f32>>,
     /// Bearing from straight ahead towards `z`, turns in `[0, 1]`, row by row.
     bearing: Vec<Block<f32>>,
-    /// Range, m, row by row.
     range_m: Vec<Block<f32>>,
-    /// Range of the corners, m.
     pub max_range_m: f32,
 }
 
-/// One row of the raster.
 pub(super) struct CellRow<'a> {
-    /// x of the row, m.
     pub x_m: f32,
     /// See [`Cells`]; all three have the same number of blocks.
     pub z_m: &'a [Block<f32>],
@@ -63,7 +58,6 @@ impl Cells {
         }
     }
 
-    /// Blocks per row.
     pub fn blocks(&self) -> usize {
         self.z_m.len()
     }
@@ -78,7 +72,6 @@ impl Cells {
         }
     }
 
-    /// x of a row or y of a column, m.
     fn offset_m(&self, index: usize) -> f64 {
         (0.5 * (self.n as f64 - 1.0) - index as f64) * f64::from(self.cell_m)
     }

@@ -13,23 +13,20 @@ use crate::scan::{PolarScan, SweepGeometry};
 pub(super) struct PolarImage {
     window_m: f32,
     layout: Layout,
-    samples: Vec<u16>,
+    pub samples: Vec<u16>,
     /// Piecewise sums of one azimuth, padded with zeros by the reach of the window.
     pieces: Vec<u16>,
-    /// Powers above the floor of one azimuth.
     above_floor: Vec<u8>,
     /// Samples of one azimuth before Doppler compensation.
     measured: Vec<u16>,
 }
 
-/// The dimensions, which follow from the geometry of the scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Layout {
     azimuths: usize,
     bins: usize,
     range_resolution_m: f32,
     window: Window,
-    /// Pieces per azimuth.
     pieces: usize,
 }
 
@@ -51,7 +48,6 @@ impl Layout {
         self.window.reach() + 1
     }
 
-    /// Number of columns; the last two are empty.
     fn stride(&self) -> usize {
         self.lead() + self.pieces + self.window.reach() + 2
     }
@@ -137,10 +133,6 @@ impl PolarImage {
         self.layout = layout;
     }
 
-    pub fn samples(&self) -> &[u16] {
-        &self.samples
-    }
-
     pub fn stride(&self) -> usize {
         self.layout.stride()
     }
@@ -149,7 +141,6 @@ impl PolarImage {
         1.0 / self.layout.piece_m()
     }
 
-    /// The fractional column at range 0.
     pub fn column_at_sensor(&self, range_offset_m: f32) -> f32 {
         self.layout.lead() as f32 - 0.5 - range_offset_m / self.layout.piece_m()
     }

@@ -56,7 +56,6 @@ impl SweepMotion {
         self.vx_mps * cos + self.vz_mps * sin
     }
 
-    /// The largest closing speed, m/s.
     pub fn speed_mps(&self) -> f32 {
         self.vx_mps.hypot(self.vz_mps)
     }

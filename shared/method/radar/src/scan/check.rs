@@ -13,7 +13,6 @@ pub enum ScanError {
     #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
     Length {
         what: &'static str,
-        /// Elements required by the geometry.
         expected: usize,
         actual: usize,
     },
@@ -26,34 +25,19 @@ pub enum ScanError {
     #[error(
         "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
     )]
-    StampOrder {
-        /// The row, from 0.
-        row: usize,
-        /// Difference to the earlier stamp, s.
-        back_s: f64,
-    },
+    StampOrder { row: usize, back_s: f64 },
     #[error(
         "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
     StampSpan {
-        /// The row, from 0.
         row: usize,
-        /// The stamp minus the stamp of the first row, s.
         after_s: f64,
-        /// The longest sweep, s.
         max_s: f64,
     },
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
-    StampApart {
-        /// Stamp of the scan minus the stamp of the first row, s.
-        apart_s: f64,
-    },
+    StampApart { apart_s: f64 },
     #[error("azimuth {index} of the scan is at {value} rad")]
-    Azimuth {
-        /// The row.
-        index: usize,
-        value: f32,
-    },
+    Azimuth { index: usize, value: f32 },
 }
 
 impl PolarScan<'_> {

@@ -2,12 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Overlap, Peak, Section, positive};
 
 /// Configuration of [`ExhaustiveSearch`](crate::ExhaustiveSearch): section `[exhaustive]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ExhaustiveConfig {
     /// Largest angle searched to either side, degrees; 180 is the whole circle.
@@ -40,15 +41,6 @@ impl Default for ExhaustiveConfig {
 }
 
 impl ExhaustiveConfig {
-    /// The search of MbyM as Weston et al. compare with it: plain correlations.
-    pub fn mbym() -> Self {
-        Self {
-            overlap: Overlap::None,
-            peak: Peak::Parabola,
-            ..Self::default()
-        }
-    }
-
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("exhaustive");
         let fits = self.reach_deg > 0.0 && self.reach_deg <= 180.0;
@@ -61,7 +53,6 @@ impl ExhaustiveConfig {
         section.require(fits, "peak", &"soft_argmax", "gaussian or parabola")
     }
 
-    /// Returns the number of angles tried.
     pub fn candidates(&self) -> usize {
         self.angles().count
     }
@@ -113,12 +104,10 @@ impl AngleGrid {
         }) as usize
     }
 
-    /// Returns whether the k-th angle has a neighbour on both sides.
     pub fn is_inner(&self, k: usize) -> bool {
         self.circle || (k > 0 && k + 1 < self.count)
     }
 
-    /// Returns whether two angles are the same or neighbours.
     pub fn are_close(&self, a: usize, b: usize) -> bool {
         (-1..=1).any(|by| self.beside(a, by) == b)
     }
@@ -171,11 +160,5 @@ mod tests {
         assert!(refused(|c| c.reach_m = 0.0).contains("reach_m"));
         let soft = refused(|c| c.peak = Peak::SoftArgmax { temperature: 1.0 });
         assert!(soft.contains("gaussian or parabola"));
-        ExhaustiveConfig::mbym().validate().unwrap();
-        let written = toml::to_string(&ExhaustiveConfig::mbym()).unwrap();
-        assert_eq!(
-            toml::from_str::<ExhaustiveConfig>(&written).unwrap(),
-            ExhaustiveConfig::mbym()
-        );
     }
 }

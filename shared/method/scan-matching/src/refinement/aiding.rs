@@ -16,7 +16,7 @@ use super::{
 impl Refiner {
     /// Predicts the turn since the scan before by the gyro, if that has measured it.
     pub(super) fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
-        let Some(turn) = self.turn else {
+        let Some(turn) = self.aiding.turn else {
             let heading = self.state.heading.iter_mut();
             heading.for_each(|heading| heading.propagate(interval_s, &self.gyro));
             return None;
@@ -36,7 +36,7 @@ impl Refiner {
     /// Returns the displacement since the scan before by Doppler; `None` if one of both scans does
     /// not determine its velocity.
     pub(super) fn displacement_by_doppler(&self, interval_s: f64) -> Option<DopplerDisplacement> {
-        let [earlier, later] = &self.velocities;
+        let [earlier, later] = &self.aiding.velocities;
         let both = [earlier.as_ref()?, later.as_ref()?];
         let is_used = self.doppler.is_used();
         is_used.then(|| self.doppler.displacement(both, interval_s))
@@ -66,7 +66,7 @@ impl Refiner {
     }
 
     fn predict_by_wheels(&mut self, interval_s: f64) -> Option<PredictedDistance> {
-        let measured = self.distance;
+        let measured = self.aiding.distance;
         if measured.is_some() {
             self.state
                 .wheels
@@ -151,7 +151,6 @@ impl Refiner {
             && (self.state.unmatched == 0 || self.agrees_with_search(scan, best, along))
     }
 
-    /// Compares the heading of a match with the gyro's.
     fn gate(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
@@ -171,29 +170,33 @@ impl Refiner {
         let Some(by) = scan.step.distance.map(|it| it.by) else {
             return false;
         };
-        let (state, measured, config) = self.distance_by(by);
-        match (state, measured) {
-            (Some(state), Some(measured)) => {
-                !state.agrees(&measured, &self.driven(registered, config))
-            }
-            _ => false,
-        }
+        let displacement = self.displacement.map(|it| it.ahead);
+        let (state, measured, config) = match by {
+            DistanceBy::Wheels => (&self.state.wheels, self.aiding.distance, &self.wheels),
+            DistanceBy::Doppler => (&self.state.doppler, displacement, &self.doppler_as_wheels),
+        };
+        let both = state.as_ref().zip(measured);
+        both.is_some_and(|(state, measured)| {
+            !state.agrees(&measured, &self.driven(registered, config))
+        })
     }
 
-    /// Returns the state of an aiding sensor of the distance, its measurement since the scan
+    /// Returns the state of each aiding sensor of the distance, its measurement since the scan
     /// before, and its settings.
-    fn distance_by(
-        &self,
-        by: DistanceBy,
-    ) -> (Option<&WheelState>, Option<WheelDistance>, &WheelsConfig) {
-        match by {
-            DistanceBy::Wheels => (self.state.wheels.as_ref(), self.distance, &self.wheels),
-            DistanceBy::Doppler => (
-                self.state.doppler.as_ref(),
-                self.displacement.map(|it| it.ahead),
-                &self.doppler_as_wheels,
-            ),
-        }
+    fn distances(
+        &mut self,
+    ) -> [(
+        &mut Option<WheelState>,
+        Option<WheelDistance>,
+        &WheelsConfig,
+    ); 2] {
+        let displacement = self.displacement.map(|it| it.ahead);
+        let distance = self.aiding.distance;
+        let state = &mut self.state;
+        [
+            (&mut state.wheels, distance, &self.wheels),
+            (&mut state.doppler, displacement, &self.doppler_as_wheels),
+        ]
     }
 
     /// Hands each aiding sensor of the distance its measurement and the distance driven to a
@@ -205,31 +208,17 @@ impl Refiner {
     ) {
         let driven =
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
-        let displacement = self.displacement.map(|it| it.ahead);
-        let sensors = [
-            (&mut self.state.wheels, self.distance, &self.wheels),
-            (
-                &mut self.state.doppler,
-                displacement,
-                &self.doppler_as_wheels,
-            ),
-        ];
-        for ((state, measured, config), driven) in sensors.into_iter().zip(driven) {
+        for ((state, measured, config), driven) in self.distances().into_iter().zip(driven) {
             if let Some(state) = state {
                 take(state, measured.as_ref(), &driven, config);
             }
         }
     }
 
-    /// Takes the predicted motion of a scan that matches nothing.
     pub(super) fn propagate_distances(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
         let by = scan.step.distance.map(|it| it.by);
-        let displacement = self.displacement.map(|it| it.ahead);
-        let sensors = [
-            (&mut self.state.wheels, self.distance, DistanceBy::Wheels),
-            (&mut self.state.doppler, displacement, DistanceBy::Doppler),
-        ];
-        for (state, measured, sensor) in sensors {
+        let sensors = [DistanceBy::Wheels, DistanceBy::Doppler];
+        for ((state, measured, _), sensor) in self.distances().into_iter().zip(sensors) {
             let Some(state) = state else {
                 continue;
             };

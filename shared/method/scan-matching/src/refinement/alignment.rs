@@ -24,7 +24,6 @@ const FIRST_SHARE: f64 = 0.3;
 /// The next share is within these factors of the last one.
 const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
 
-/// The result of an alignment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alignment {
     /// Pose of the points' frame in the map.
@@ -41,36 +40,19 @@ pub(super) struct Alignment {
 /// share of the step with the least cost. That share is nearly the same from step to step, so each
 /// step takes the share that the one before would have needed, at one evaluation of the cost a
 /// step.
+///
+/// With a `locked` direction along the map's axes the steps are across it, and turns.
 pub(super) fn align(
     map: &MapView<'_>,
     points: &DeskewedPoints,
     initial: &Pose,
     max_iterations: usize,
+    locked: Option<UnitVector2<f64>>,
 ) -> Alignment {
-    align_by(map, points, initial, max_iterations, gauss_newton_step)
-}
-
-/// As [`align`], with steps across a direction along the map's axes alone, and turns.
-pub(super) fn align_across(
-    map: &MapView<'_>,
-    points: &DeskewedPoints,
-    initial: &Pose,
-    max_iterations: usize,
-    locked: UnitVector2<f64>,
-) -> Alignment {
-    let locked = locked.push(0.0);
-    align_by(map, points, initial, max_iterations, |normal| {
-        gauss_newton_step(&normal.without(&locked))
-    })
-}
-
-fn align_by(
-    map: &MapView<'_>,
-    points: &DeskewedPoints,
-    initial: &Pose,
-    max_iterations: usize,
-    step: impl Fn(&NormalEquations) -> Option<Vector3<f64>>,
-) -> Alignment {
+    let whole_step = |normal: &NormalEquations| match locked {
+        Some(locked) => gauss_newton_step(&normal.without(&locked.push(0.0))),
+        None => gauss_newton_step(normal),
+    };
     let at = |pose: Pose| Alignment {
         normal: linearise(map, points, &pose),
         pose,
@@ -78,7 +60,7 @@ fn align_by(
     let mut best = at(*initial);
     let mut share = FIRST_SHARE;
     for _ in 0..max_iterations {
-        let Some(whole) = step(&best.normal) else {
+        let Some(whole) = whole_step(&best.normal) else {
             break;
         };
         let step = whole * share;

@@ -22,15 +22,10 @@ use super::{
     uncertainty::{self, Uncertainty},
 };
 
-/// A plausible match of a scan.
 pub(super) struct Match {
-    /// Pose in the map, with the covariance of the motion to it.
     pub registered: UncertainMotion,
-    /// The direction along the axes of the map that leaves the place undetermined.
     pub undetermined: Option<UnitVector2<f64>>,
-    /// Displacement by the search beyond a predicted place, m.
     pub ahead_m: Vector2<f64>,
-    /// Walls without structure have ended: the map is left.
     pub leaves_map: bool,
 }
 
@@ -155,7 +150,6 @@ impl Refiner {
         (is_undetermined && !is_seen()).then_some(weakest.along)
     }
 
-    /// Returns whether the search is asked: the scan before was not moved along walls.
     fn asks_search(&self) -> bool {
         self.state.along_walls == 0
     }
@@ -178,7 +172,6 @@ impl Refiner {
         self.acceleration_m(age_s + scan.step.interval_s)
     }
 
-    /// Returns how much farther a vehicle drives in a time if it accelerates, m.
     fn acceleration_m(&self, time_s: f64) -> f64 {
         self.config.acceleration_mps2 * time_s.powi(2)
     }
@@ -225,7 +218,6 @@ impl Refiner {
         }
     }
 
-    /// Takes a scan whose place along the walls is the predicted one.
     pub(super) fn propagate_along_walls(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
         self.state.along_walls = self.state.along_walls.saturating_add(1);
         self.state.sliding = match scan.step.distance {

@@ -1,5 +1,6 @@
 //! Configuration of the refinement.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Section};
@@ -12,7 +13,7 @@ pub(super) const JITTER_DEG: f64 = 3.0;
 pub(super) const COARSE: f64 = 3.0;
 
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinementConfig {
     /// `none`: the searched motion is the result. `local-map`: it is refined by registration
@@ -53,9 +54,7 @@ pub struct RefinementConfig {
 }
 
 /// The refinement of searched motions.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefinementKind {
     /// No refinement.

@@ -40,9 +40,7 @@ const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
 /// The bias and the scale of the gyro, and the steady error of the radar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
-    /// Bias of the gyro, rad/s.
     pub bias_radps: f64,
-    /// Steady error of registered headings, rad.
     pub yaw_bias_rad: f64,
     /// True turn over the one that is measured, but for the bias. With one that the gyro cannot
     /// have ([`GyroConfig::allows_scale`]) it is not used any more.
@@ -50,11 +48,9 @@ pub struct Heading {
     /// Covariance of the errors of the heading against the map, the bias, the yaw bias and the
     /// scale.
     pub covariance: Matrix4<f64>,
-    /// The verdict of the last registered heading on the gyro's.
     pub verdict: Verdict,
 }
 
-/// The verdict of a registered heading on the gyro's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Verdict {
     /// Noise can bring both so far apart.
@@ -66,27 +62,19 @@ pub enum Verdict {
     Refused,
 }
 
-/// The bias of the gyro, as it is known after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GyroBias {
-    /// The bias, rad/s.
     pub rate_radps: f64,
-    /// Standard deviation, rad/s.
     pub sigma_radps: f64,
-    /// True turn over the measured one.
     pub scale: f64,
     /// The verdict of the registered heading on the turn, or the last one.
     pub verdict: Verdict,
 }
 
-/// The heading that the gyro predicts, against the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PredictedTurn {
-    /// Turn since the scan before, rad.
     pub yaw_rad: f64,
-    /// Variance of that, rad².
     pub variance_rad2: f64,
-    /// Rate during the sweep, rad/s.
     pub sweep_rate_radps: f64,
     /// The part of the variance that is of neither bias nor scale.
     noise_rad2: f64,
@@ -106,7 +94,6 @@ impl PredictedTurn {
             + self.scale_variance * grown(self.yaw_rad, angle_rad)
     }
 
-    /// Returns whether the vehicle has certainly turned.
     pub fn is_certain(&self) -> bool {
         self.yaw_rad.powi(2) > GATE * self.variance_rad2
     }
@@ -125,7 +112,6 @@ pub(super) fn grown(step: f64, sum: f64) -> f64 {
 }
 
 impl Heading {
-    /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
         let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
         let variances = Vector4::new(0.0, bias, YAW_BIAS_SIGMA_RAD.powi(2), scale);
@@ -138,7 +124,6 @@ impl Heading {
         }
     }
 
-    /// Returns the estimate of the bias.
     pub(super) fn bias(&self) -> GyroBias {
         GyroBias {
             rate_radps: self.bias_radps,
@@ -148,7 +133,6 @@ impl Heading {
         }
     }
 
-    /// Predicts the heading of the next scan.
     pub(super) fn predict(&mut self, turn: &GyroTurn, config: &GyroConfig) -> PredictedTurn {
         let time_s = turn.interval_s;
         let turn_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;

@@ -11,8 +11,7 @@ use crate::ConfigError;
 
 /// Initial guesses come from a search on coarse cells, so more iterations are allowed than from
 /// scan to scan.
-const COARSE_ITERATIONS: usize = 20;
-const FINE_ITERATIONS: usize = 20;
+const ITERATIONS: usize = 20;
 
 /// Aligns the middle keyframes of two submaps.
 ///
@@ -80,13 +79,8 @@ impl KeyframeAligner {
         self.thinned.clear();
         self.thinned.extend(points, &Pose::identity());
         self.thinned.thin(COARSE_STRIDE);
-        let coarse = align(
-            &self.map.coarse(),
-            &self.thinned,
-            initial,
-            COARSE_ITERATIONS,
-        );
-        let fine = align(&self.map.fine(), points, &coarse.pose, FINE_ITERATIONS);
+        let coarse = align(&self.map.coarse(), &self.thinned, initial, ITERATIONS, None);
+        let fine = align(&self.map.fine(), points, &coarse.pose, ITERATIONS, None);
         let covariance = uncertainty::of_alignment(&fine, points, &Pose::identity(), &self.config)?;
         Some(UncertainMotion {
             motion: fine.pose,

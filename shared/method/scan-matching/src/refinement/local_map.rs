@@ -9,7 +9,7 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 use super::{
     RefinementConfig,
     config::COARSE,
-    map_level::{Image, ImageView, MapLevel, MapView},
+    map_level::{Image, MapLevel, MapView},
     points::DeskewedPoints,
 };
 
@@ -17,7 +17,6 @@ use super::{
 const KEYFRAME_DISTANCE_M: f64 = 1.5;
 const KEYFRAME_ANGLE_DEG: f64 = 3.0;
 
-/// A scan that is part of the local map.
 #[derive(Debug, Clone)]
 pub struct Keyframe {
     pub id: u64,
@@ -25,8 +24,8 @@ pub struct Keyframe {
     pub pose: Pose,
     /// [`super::TrackerState::ahead_m`] of its scan.
     pub ahead_m: Vector2<f64>,
-    fine: Image,
-    coarse: Image,
+    /// A fine and a coarse one.
+    images: [Image; 2],
 }
 
 impl Keyframe {
@@ -36,47 +35,41 @@ impl Keyframe {
     /// Rows are of equal x, which grows with the row; y grows with the column. A cell is 0 where
     /// the scan saw nothing, and at most 255.
     pub fn images(&self) -> [([i64; 2], ArrayView2<'_, u8>); 2] {
-        [&self.fine, &self.coarse].map(|image| (image.corner, image.view()))
+        self.images.each_ref().map(|it| (it.corner, it.view()))
     }
 
-    /// Returns the same images to be filled in.
     pub fn images_mut(&mut self) -> [(&mut [i64; 2], ArrayViewMut2<'_, u8>); 2] {
-        [&mut self.fine, &mut self.coarse].map(Image::parts_mut)
+        self.images.each_mut().map(Image::parts_mut)
     }
 }
 
-/// The last keyframes and their sums.
 #[derive(Debug)]
 pub(super) struct LocalMap {
-    fine: MapLevel,
-    coarse: MapLevel,
+    /// A fine and a coarse one.
+    levels: [MapLevel; 2],
     used: VecDeque<Keyframe>,
     spare: Vec<Keyframe>,
 }
 
 impl LocalMap {
     pub fn new(config: &RefinementConfig) -> Self {
-        let level = |cell_m| MapLevel::new(cell_m, config.reach_m);
-        let (fine, coarse) = (level(config.cell_m), level(config.cell_m * COARSE));
+        let cells_m = [config.cell_m, config.cell_m * COARSE];
+        let levels = cells_m.map(|cell_m| MapLevel::new(cell_m, config.reach_m));
         let keyframe = Keyframe {
             id: 0,
             pose: Pose::identity(),
             ahead_m: Vector2::zeros(),
-            fine: fine.new_image(),
-            coarse: coarse.new_image(),
+            images: levels.each_ref().map(MapLevel::new_image),
         };
-        let count = config.keyframes;
         Self {
-            fine,
-            coarse,
-            used: VecDeque::with_capacity(count),
-            spare: vec![keyframe; count],
+            levels,
+            used: VecDeque::with_capacity(config.keyframes),
+            spare: vec![keyframe; config.keyframes],
         }
     }
 
-    /// Cells of both images of a keyframe.
     pub fn keyframe_cells(&self) -> usize {
-        self.fine.n.pow(2) + self.coarse.n.pow(2)
+        self.levels.iter().map(|level| level.n.pow(2)).sum()
     }
 
     pub fn len(&self) -> usize {
@@ -98,24 +91,16 @@ impl LocalMap {
 
     /// Adds a keyframe in place of the oldest one, if the map is full.
     pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose, ahead_m: Vector2<f64>) {
-        let oldest = self.spare.is_empty().then(|| self.used.pop_front());
-        if let Some(oldest) = oldest.flatten() {
-            self.fine.subtract(&oldest.fine);
-            self.coarse.subtract(&oldest.coarse);
-            self.spare.push(oldest);
-        }
-        let Some(mut keyframe) = self.spare.pop() else {
+        let spare = self.spare.pop().or_else(|| self.used.pop_front());
+        let Some(mut keyframe) = spare else {
             return;
         };
         (keyframe.id, keyframe.pose, keyframe.ahead_m) = (id, *pose, ahead_m);
-        self.fine.draw(points, pose, &mut keyframe.fine);
-        self.coarse.draw(points, pose, &mut keyframe.coarse);
-        let used = self.used.iter();
-        self.fine
-            .add_newest(&keyframe.fine, used.clone().map(|other| &other.fine));
-        self.coarse
-            .add_newest(&keyframe.coarse, used.map(|other| &other.coarse));
+        for (level, image) in self.levels.iter_mut().zip(&mut keyframe.images) {
+            level.draw(points, pose, image);
+        }
         self.used.push_back(keyframe);
+        self.sum_images();
     }
 
     /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false`
@@ -133,25 +118,21 @@ impl LocalMap {
     }
 
     fn sum_images(&mut self) {
-        self.fine
-            .sum_images(self.used.iter().map(|keyframe| &keyframe.fine));
-        self.coarse
-            .sum_images(self.used.iter().map(|keyframe| &keyframe.coarse));
+        for (k, level) in self.levels.iter_mut().enumerate() {
+            level.sum_images(self.used.iter().map(move |it| &it.images[k]));
+        }
     }
 
     pub fn fine(&self) -> MapView<'_> {
-        self.fine.view()
-    }
-
-    /// The fine image of each keyframe, and its [`Keyframe::ahead_m`].
-    pub fn fine_images(&self) -> impl Iterator<Item = (ImageView<'_>, Vector2<f64>)> {
-        let cell_m = self.fine.cell_m;
-        let used = self.used.iter();
-        used.map(move |it| (ImageView::new(&it.fine, cell_m), it.ahead_m))
+        self.levels[0].view()
     }
 
     pub fn coarse(&self) -> MapView<'_> {
-        self.coarse.view()
+        self.levels[1].view()
+    }
+
+    pub fn fine_images(&self) -> impl Iterator<Item = (&Image, Vector2<f64>)> {
+        self.used.iter().map(|it| (&it.images[0], it.ahead_m))
     }
 
     /// Returns whether `pose` is far enough from the last keyframe for a new one, also by the
@@ -173,8 +154,7 @@ mod tests {
 
     use super::*;
 
-    /// Keyframes come and go, the map is cleared and filled again: the sum equals the sum of its
-    /// keyframes.
+    /// Keyframes come and go, and the map is cleared: it is the map of its last keyframes.
     #[test]
     fn the_sum_is_that_of_the_keyframes_in_the_map() {
         let config = RefinementConfig {
@@ -182,31 +162,26 @@ mod tests {
             reach_m: 20.0,
             ..RefinementConfig::default()
         };
-        let mut map = LocalMap::new(&config);
         let points = DeskewedPoints {
             x_m: vec![3.0, -7.0, 11.0],
             y_m: vec![1.0, 9.0, -4.0],
             weight: vec![1.0, 2.0, 0.5],
         };
-        for id in 0..12 {
-            if id == 5 {
-                map.clear();
-                assert!(map.fine().sum.iter().all(|sum| *sum == 0));
-            }
+        let insert = |map: &mut LocalMap, id: u64| {
             let at = id as f64;
-            map.insert(
-                id,
-                &points,
-                &pose(2.3 * at, -1.1 * at, 0.2 * at),
-                Vector2::zeros(),
-            );
-            let kept = [map.fine().sum.to_vec(), map.coarse().sum.to_vec()];
-            map.sum_images();
-            assert_eq!(kept, [map.fine().sum, map.coarse().sum], "{id}");
-        }
-        assert_eq!(
-            map.keyframes().map(|k| k.id).collect::<Vec<_>>(),
-            [9, 10, 11]
-        );
+            let pose = pose(2.3 * at, -1.1 * at, 0.2 * at);
+            map.insert(id, &points, &pose, Vector2::zeros());
+        };
+        let mut map = LocalMap::new(&config);
+        (0..5).for_each(|id| insert(&mut map, id));
+        map.clear();
+        assert!(map.fine().sum.iter().all(|sum| *sum == 0));
+        (5..12).for_each(|id| insert(&mut map, id));
+        let mut last = LocalMap::new(&config);
+        (9..12).for_each(|id| insert(&mut last, id));
+        assert_eq!(map.fine().sum, last.fine().sum);
+        assert_eq!(map.coarse().sum, last.coarse().sum);
+        let kept: Vec<u64> = map.keyframes().map(|keyframe| keyframe.id).collect();
+        assert_eq!(kept, [9, 10, 11]);
     }
 }

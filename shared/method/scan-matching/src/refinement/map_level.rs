@@ -16,22 +16,22 @@ const BLUR_REACH: usize = 3;
 /// Cells along an axis over which a point is spread: it is between two cells, which are both
 /// blurred.
 const SPREAD: usize = 2 * BLUR_REACH + 2;
-/// Cells that are worked on together.
 const CHUNK: usize = 16;
 // A row of a point's cells lies within two chunks.
 const _: () = assert!(SPREAD <= CHUNK + 1);
 /// The farthest cell from the origin: a damaged checkpoint may contain any number.
 const FARTHEST: f64 = 1e15;
-/// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
+
+const SQUARE: &str = "an image has n x n cells";
 
 /// The image of one keyframe, on a square of the map's grid: 0 for an empty cell, up to 255.
 #[derive(Debug, Clone)]
 pub(super) struct Image {
     /// The map's cell (x, y) that the first value belongs to.
     pub corner: [i64; 2],
-    /// Cells a side.
     n: usize,
+    cell_m: f64,
     /// Row after row. Rows are of equal x, which grows with the row; y grows within a row.
     pub cells: Vec<u8>,
 }
@@ -41,32 +41,16 @@ impl Image {
         ArrayView2::from_shape((self.n, self.n), &self.cells).expect(SQUARE)
     }
 
-    /// The corner and the cells, to be filled in.
     pub fn parts_mut(&mut self) -> (&mut [i64; 2], ArrayViewMut2<'_, u8>) {
         let cells = ArrayViewMut2::from_shape((self.n, self.n), &mut self.cells);
         (&mut self.corner, cells.expect(SQUARE))
-    }
-}
-
-const SQUARE: &str = "an image has n x n cells";
-
-/// An image as it lies in the map.
-pub(super) struct ImageView<'a> {
-    image: &'a Image,
-    /// Metres a cell.
-    cell_m: f64,
-}
-
-impl<'a> ImageView<'a> {
-    pub fn new(image: &'a Image, cell_m: f64) -> Self {
-        Self { image, cell_m }
     }
 
     /// The slope at a place in the map, per metre, of an image from 0 to 1, between whose cells it
     /// is interpolated linearly: zero outside the image.
     pub fn slope(&self, place: Vector2<f64>) -> Vector2<f64> {
-        let n = self.image.n;
-        let at = |axis: usize| place[axis] / self.cell_m - self.image.corner[axis] as f64;
+        let n = self.n;
+        let at = |axis: usize| place[axis] / self.cell_m - self.corner[axis] as f64;
         let (u, v) = (at(0), at(1));
         let last = (n - 1) as f64;
         if !((0.0..last).contains(&u) && (0.0..last).contains(&v)) {
@@ -74,9 +58,8 @@ impl<'a> ImageView<'a> {
         }
         let (across, along) = (u.fract(), v.fract());
         let first = u as usize * n + v as usize;
-        let cells = &self.image.cells;
         let [a, b, c, d] =
-            [first, first + 1, first + n, first + n + 1].map(|cell| f64::from(cells[cell]));
+            [first, first + 1, first + n, first + n + 1].map(|cell| f64::from(self.cells[cell]));
         let per_m = 1.0 / (self.cell_m * f64::from(FULL));
         let (upper, lower) = (a + along * (b - a), c + along * (d - c));
         let (left, right) = (a + across * (c - a), b + across * (d - b));
@@ -84,32 +67,25 @@ impl<'a> ImageView<'a> {
     }
 }
 
-/// The sum of the keyframes' images.
 #[derive(Debug)]
 pub(super) struct MapLevel {
-    /// Metres a cell.
     pub cell_m: f64,
-    /// Cells a side.
     pub n: usize,
     corner: [i64; 2],
-    /// Sum of the images.
     sum: Vec<u16>,
     images: usize,
     /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few
     /// cells more than n x n.
     drawing: Vec<f32>,
-    /// True if there is anything in a chunk of the drawing.
     drawn: Vec<bool>,
 }
 
-/// A level as alignments read it.
 pub(super) struct MapView<'a> {
     /// Sums of the images, row after row; divided by `full` they are shares from 0 to 1.
     pub sum: &'a [u16],
     pub n: usize,
     /// The sum in a cell that is fully occupied in all keyframes.
     pub full: f32,
-    /// Cells a metre.
     pub per_m: f32,
     /// Map coordinates (x, y) of cell (0, 0), m.
     pub origin: [f64; 2],
@@ -134,6 +110,7 @@ impl MapLevel {
         Image {
             corner: [0; 2],
             n: self.n,
+            cell_m: self.cell_m,
             cells: vec![0; self.n * self.n],
         }
     }
@@ -157,8 +134,8 @@ impl MapLevel {
         saturate(&mut self.drawing, &mut self.drawn, mean, &mut image.cells);
     }
 
-    /// Sums these images, oldest first, on the square of the last one. The sums are of integers, so
-    /// exact in any order.
+    /// Sums these images on the square of the last one. The sums are of integers, so exact in any
+    /// order.
     pub fn sum_images<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
         self.sum.fill(0);
         self.images = 0;
@@ -166,98 +143,19 @@ impl MapLevel {
             return;
         };
         self.corner = newest.corner;
+        let n = self.n as i64;
         for image in images {
             self.images += 1;
-            self.combine(image, [[0, 0], [self.n, self.n]], add);
-        }
-    }
-
-    /// Takes an image that is no longer in the map out of the sum.
-    pub fn subtract(&mut self, image: &Image) {
-        self.images -= 1;
-        self.combine(image, [[0, 0], [self.n, self.n]], subtract);
-    }
-
-    /// Moves the sum to the square of a new image, and adds it. `others` are all images in the sum:
-    /// newly covered cells are summed again.
-    pub fn add_newest<'a>(
-        &mut self,
-        newest: &Image,
-        others: impl Iterator<Item = &'a Image> + Clone,
-    ) {
-        let [down, right] =
-            [0, 1].map(|axis| newest.corner[axis].saturating_sub(self.corner[axis]));
-        self.corner = newest.corner;
-        for part in self.move_sum(down, right) {
-            for other in others.clone() {
-                self.combine(other, part, add);
+            let off = [0, 1].map(|axis| image.corner[axis].saturating_sub(self.corner[axis]));
+            let [rows, columns] = off.map(|off| off.max(0)..off.saturating_add(n).min(n));
+            if columns.is_empty() {
+                continue;
             }
-        }
-        self.images += 1;
-        self.combine(newest, [[0, 0], [self.n, self.n]], add);
-    }
-
-    /// Moves the square of the sum by so many cells, and empties the newly covered ones: the rows
-    /// and the columns that are returned, each as the first cell and the one behind the last, (x,
-    /// y).
-    fn move_sum(&mut self, down: i64, right: i64) -> [[[usize; 2]; 2]; 2] {
-        let n = self.n;
-        let (rows, columns) = (exposed(down, n), exposed(right, n));
-        let kept = n - (columns.end - columns.start);
-        let (to, from) = if right >= 0 {
-            (0, n - kept)
-        } else {
-            (n - kept, 0)
-        };
-        let mut move_row = |row: usize| {
-            let source = (row as i64 + down) as usize * n + from;
-            self.sum.copy_within(source..source + kept, row * n + to);
-        };
-        // Each row is moved before another takes its place.
-        if down >= 0 {
-            (0..rows.start).for_each(&mut move_row);
-        } else {
-            (rows.end..n).rev().for_each(&mut move_row);
-        }
-        let parts = [
-            [[rows.start, 0], [rows.end, n]],
-            // The rows above have these columns already.
-            if down >= 0 {
-                [[0, columns.start], [rows.start, columns.end]]
-            } else {
-                [[rows.end, columns.start], [n, columns.end]]
-            },
-        ];
-        for [first, end] in parts {
-            for row in first[0]..end[0] {
-                self.sum[row * n + first[1]..row * n + end[1]].fill(0);
+            for row in rows {
+                let to = (row * n + columns.start) as usize..(row * n + columns.end) as usize;
+                let from = ((row - off[0]) * n + columns.start - off[1]) as usize;
+                add(&image.cells[from..from + to.len()], &mut self.sum[to]);
             }
-        }
-        parts
-    }
-
-    /// Combines a part of the sum, from its first cell (x, y) to the one behind its last, with an
-    /// image.
-    fn combine(
-        &mut self,
-        image: &Image,
-        [first, end]: [[usize; 2]; 2],
-        with: impl Fn(&[u8], &mut [u16]),
-    ) {
-        let n = self.n as i64;
-        let off = [0, 1].map(|axis| image.corner[axis].saturating_sub(self.corner[axis]));
-        let [rows, columns] = [0, 1].map(|axis| {
-            let (first, end) = (first[axis] as i64, end[axis] as i64);
-            first.max(off[axis])..end.min(off[axis] + n)
-        });
-        if columns.is_empty() {
-            return;
-        }
-        for row in rows {
-            let to = (row * n + columns.start) as usize..(row * n + columns.end) as usize;
-            let from = ((row - off[0]) * n + columns.start - off[1]) as usize;
-            let from = &image.cells[from..from + to.len()];
-            with(from, &mut self.sum[to]);
         }
     }
 
@@ -272,20 +170,11 @@ impl MapLevel {
     }
 }
 
-/// Returns the newly covered cells of a range of n cells that moves by `by` cells.
-fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
-    let count = by.unsigned_abs().min(n as u64) as usize;
-    if by >= 0 { n - count..n } else { 0..count }
-}
-
 struct Drawing {
-    /// Of the scan, in map coordinates.
     pose: Pose,
     /// The map's cell (x, y) that the drawing begins with.
     corner: [i64; 2],
-    /// Cells a metre.
     per_m: f64,
-    /// Cells a side.
     n: usize,
 }
 
@@ -356,7 +245,6 @@ fn mean(drawing: &[f32], drawn: &[bool]) -> f32 {
     }
 }
 
-/// Saturates the cells that are drawn, and clears the drawing.
 #[simd]
 fn saturate(drawing: &mut [f32], drawn: &mut [bool], mean: f32, cells: &mut [u8]) {
     cells.fill(0);
@@ -379,14 +267,6 @@ fn add(cells: &[u8], sum: &mut [u16]) {
         .for_each(|(sum, cell)| *sum += u16::from(*cell));
 }
 
-/// Takes out of the sum an image that is in it.
-#[simd]
-fn subtract(cells: &[u8], sum: &mut [u16]) {
-    sum.iter_mut()
-        .zip(cells)
-        .for_each(|(sum, cell)| *sum -= u16::from(*cell));
-}
-
 #[cfg(test)]
 mod tests {
     use gyre_geometry::pose;
@@ -401,19 +281,14 @@ mod tests {
         }
     }
 
-    fn brightest(level: &MapLevel) -> [f64; 2] {
+    /// The brightest place of the map, m, and its share.
+    fn brightest(level: &MapLevel) -> ([f64; 2], f32) {
         let view = level.view();
-        let brightest = (0..view.sum.len())
-            .max_by_key(|k| (view.sum[*k], std::cmp::Reverse(*k)))
-            .unwrap_or(0);
-        [brightest / level.n, brightest % level.n]
-            .map(|k| k as f64 * level.cell_m)
-            .into_iter()
-            .zip(view.origin)
-            .map(|(at, origin)| at + origin)
-            .collect::<Vec<_>>()
-            .try_into()
-            .unwrap_or([f64::NAN; 2])
+        let most = view.sum.iter().copied().max().unwrap_or(0);
+        let at = view.sum.iter().position(|sum| *sum == most).unwrap_or(0);
+        let cell = [at / level.n, at % level.n];
+        let place = [0, 1].map(|axis| cell[axis] as f64 * level.cell_m + view.origin[axis]);
+        (place, f32::from(most) / view.full)
     }
 
     #[test]
@@ -423,45 +298,13 @@ mod tests {
         level.draw(&points(&[[6.0, 2.0]]), &Pose::identity(), &mut first);
         let pose = pose(3.0, 1.0, std::f64::consts::FRAC_PI_2);
         let seen = pose.inverse() * Point2::new(6.0, 2.0);
-        level.draw(
-            &points(&[[seen.x as f32, seen.y as f32]]),
-            &pose,
-            &mut second,
-        );
+        let seen = points(&[[seen.x as f32, seen.y as f32]]);
+        level.draw(&seen, &pose, &mut second);
         level.sum_images([&first, &second].into_iter());
-        assert_eq!(brightest(&level), [6.0, 2.0]);
-        let peak = f32::from(level.view().sum.iter().copied().max().unwrap_or(0));
-        assert!(
-            (peak / level.view().full - 2.0 / 3.0).abs() < 0.01,
-            "{peak}: m / (m + mean), a Gaussian's mean being half its peak"
-        );
-    }
-
-    proptest::proptest! {
-        /// Wherever the vehicle drives, even back over places that have left the square.
-        #[test]
-        fn a_sum_that_is_kept_up_is_the_sum_of_all_images(
-            steps in proptest::collection::vec((-120.0..120.0, -30.0..30.0), 1..12),
-        ) {
-            let mut kept = MapLevel::new(1.0, 10.0);
-            let mut anew = MapLevel::new(1.0, 10.0);
-            let mut images: Vec<Image> = Vec::new();
-            let near: Vec<[f32; 2]> = (0..60).map(|k| [(k * 7 % 13 - 6) as f32, (k * 5 % 11 - 5) as f32]).collect();
-            let mut at = [0.0, 0.0];
-            for (dx, dy) in steps {
-                at = [at[0] + dx / 4.0, at[1] + dy / 4.0];
-                let mut image = kept.new_image();
-                kept.draw(&points(&near), &pose(at[0], at[1], 0.3), &mut image);
-                if images.len() == 4 {
-                    kept.subtract(&images.remove(0));
-                }
-                kept.add_newest(&image, images.iter());
-                images.push(image);
-                anew.sum_images(images.iter());
-                proptest::prop_assert_eq!(kept.view().sum, anew.view().sum);
-                proptest::prop_assert_eq!(kept.view().full, anew.view().full);
-            }
-        }
+        let (place, share) = brightest(&level);
+        assert_eq!(place, [6.0, 2.0]);
+        // m / (m + mean): the mean of a Gaussian is half of its peak.
+        assert!((share - 2.0 / 3.0).abs() < 0.01, "{share}");
     }
 
     /// The definition: the points are shared between the cells around them, and these are blurred
@@ -519,11 +362,8 @@ mod tests {
     fn points_out_of_reach_are_ignored() {
         let mut level = MapLevel::new(1.0, 20.0);
         let mut image = level.new_image();
-        level.draw(
-            &points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]),
-            &Pose::identity(),
-            &mut image,
-        );
+        let outside = points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]);
+        level.draw(&outside, &Pose::identity(), &mut image);
         assert!(image.cells.iter().all(|cell| *cell == 0));
         level.sum_images([&image].into_iter());
         assert!(level.view().sum.iter().all(|sum| *sum == 0));

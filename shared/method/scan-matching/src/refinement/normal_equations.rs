@@ -11,7 +11,6 @@ use super::{map_level::MapView, points::DeskewedPoints};
 
 /// Points whose sums are kept in single precision.
 const BLOCK: usize = 64;
-/// Points that are processed side by side.
 const LANES: usize = 16;
 
 /// The cost at a pose, and its normal equations: information * step = right-hand side.
@@ -41,7 +40,6 @@ impl NormalEquations {
     }
 }
 
-/// The cost and the normal equations at a pose.
 pub(super) fn linearise(
     map: &MapView<'_>,
     points: &DeskewedPoints,
@@ -86,7 +84,6 @@ struct CellPose {
 /// Sums of the cost, the overlap, the 3 of the right-hand side and the 6 of the information.
 const SUMS: usize = 11;
 
-/// One value per point.
 type Lanes = [f32; LANES];
 
 /// The sums over a block of points. The last lanes are filled up with points of weight 0.

@@ -38,7 +38,6 @@ impl DeskewedPoints {
         );
     }
 
-    /// Keeps every `stride`-th point.
     pub fn thin(&mut self, stride: usize) {
         for column in self.columns() {
             let count = column.len().div_ceil(stride);

@@ -5,10 +5,9 @@ use gyre_geometry::{Pose, SparsePoint};
 use nalgebra::UnitVector2;
 
 use super::{
-    InitialGuess, RefinementConfig, TrackerState,
-    alignment::{Alignment, align, align_across},
+    RefinementConfig, TrackerState,
+    alignment::{Alignment, align},
     config::COARSE,
-    initial_guess::{initial_guesses, yaw_offsets},
     local_map::LocalMap,
     points::DeskewedPoints,
     tracker::Step,
@@ -26,16 +25,29 @@ const SAME_BASIN_RAD: f64 = 0.035;
 /// A later guess is preferred to an earlier one if its coarse overlap is better by this factor.
 const CLEARLY_BETTER: f64 = 1.02;
 
-/// A scan to be registered.
+/// Yaw offsets from the prediction, tried if no other initial guess gives a plausible match.
+const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
+
+/// The initial guess that an alignment started from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InitialGuess {
+    Prediction,
+    /// The motion that the search found; along walls also the mean of that and the prediction.
+    Search,
+    /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
+    YawOffset,
+    /// The prediction, whose place along walls without structure stays: the radar does not see how
+    /// far the vehicle has driven. The wheels or the motions before determine it.
+    AlongWalls,
+}
+
 pub(super) struct Scan<'a> {
     pub id: u64,
     pub points: &'a [SparsePoint],
-    /// Pose in the map by the motion that the search found.
     pub searched: Pose,
     pub step: Step,
 }
 
-/// The registration of one scan.
 pub(super) struct Registration<'a> {
     pub scan: &'a Scan<'a>,
     pub map: &'a LocalMap,
@@ -45,7 +57,6 @@ pub(super) struct Registration<'a> {
     pub points: &'a mut DeskewedPoints,
 }
 
-/// An alignment on the fine map and how well it fits.
 pub(super) struct Candidate {
     pub guess: InitialGuess,
     pub alignment: Alignment,
@@ -53,13 +64,11 @@ pub(super) struct Candidate {
     /// Sum of the points' weights, and the same as a share of its running mean.
     pub weight: f64,
     pub support: f64,
-    /// The scan overlaps the map about as much as the scans before.
     pub fits: bool,
     /// So it does, and a vehicle can have driven there.
     pub is_plausible: bool,
 }
 
-/// An alignment on the coarse map.
 struct CoarseMatch {
     guess: InitialGuess,
     coarse: Alignment,
@@ -87,25 +96,30 @@ impl Registration<'_> {
             return best;
         }
         let [predicted, _] = self.state.predict(&self.scan.step);
-        let offset = self.align(&yaw_offsets(predicted));
+        let offsets = YAW_OFFSETS_RAD.map(|offset| predicted * Pose::rotation(offset));
+        let offset = self.align(&offsets.map(|pose| (InitialGuess::YawOffset, pose)));
         if offset.is_plausible { offset } else { best }
     }
 
-    /// Returns the best match of the predictions and the searched motion.
     pub fn match_prediction_or_search(&mut self) -> Candidate {
-        let predicted = self.state.predict(&self.scan.step);
-        self.align(&initial_guesses(predicted, self.scan.searched))
+        let [from_last, from_second_last] = self.state.predict(&self.scan.step);
+        self.align(&[
+            (InitialGuess::Prediction, from_last),
+            (InitialGuess::Search, self.scan.searched),
+            // In case the last match was wrong.
+            (InitialGuess::Prediction, from_second_last),
+        ])
     }
 
     /// Aligns the scan from each initial guess on the coarse map, and from the best of them on the
     /// fine map.
     fn align(&mut self, guesses: &[(InitialGuess, Pose)]) -> Candidate {
-        let (guess, coarse) = self.align_coarse(guesses);
-        let alignment = self.align_fine(coarse);
+        let (guess, coarse) = self.best_coarse(guesses);
+        let alignment = self.align_fine(coarse, None);
         self.assess(guess, alignment)
     }
 
-    fn align_coarse(&mut self, guesses: &[(InitialGuess, Pose)]) -> (InitialGuess, Pose) {
+    fn best_coarse(&mut self, guesses: &[(InitialGuess, Pose)]) -> (InitialGuess, Pose) {
         let mut best: Option<CoarseMatch> = None;
         for (k, (guess, initial)) in guesses.iter().enumerate() {
             if guesses[..k]
@@ -116,9 +130,7 @@ impl Registration<'_> {
             }
             // Each guess deskews with its own motion. With a sweep of a second, the motion of the
             // scan before is ten degrees off where a bend begins.
-            self.deskew(initial);
-            self.points.thin(COARSE_STRIDE);
-            let coarse = align(&self.map.coarse(), self.points, initial, COARSE_ITERATIONS);
+            let coarse = self.align_coarse(initial, None);
             let found = CoarseMatch {
                 guess: *guess,
                 is_reachable: self.is_reachable(&coarse.pose, 1.0),
@@ -140,42 +152,36 @@ impl Registration<'_> {
             && apart.rotation.angle().abs() <= SAME_BASIN_RAD
     }
 
-    fn align_fine(&mut self, coarse: Pose) -> Alignment {
+    fn align_coarse(&mut self, initial: &Pose, locked: Option<UnitVector2<f64>>) -> Alignment {
+        self.deskew(initial);
+        self.points.thin(COARSE_STRIDE);
+        let (map, points) = (self.map.coarse(), &*self.points);
+        align(&map, points, initial, COARSE_ITERATIONS, locked)
+    }
+
+    fn align_fine(&mut self, coarse: Pose, locked: Option<UnitVector2<f64>>) -> Alignment {
+        let mut fine = |pose: &Pose| {
+            self.deskew(pose);
+            align(&self.map.fine(), self.points, pose, FINE_ITERATIONS, locked)
+        };
         let mut pose = coarse;
         for _ in 1..FINE_ROUNDS {
-            pose = self.align_fine_once(&pose).pose;
+            pose = fine(&pose).pose;
         }
-        self.align_fine_once(&pose)
+        fine(&pose)
     }
 
-    fn align_fine_once(&mut self, pose: &Pose) -> Alignment {
-        self.deskew(pose);
-        align(&self.map.fine(), self.points, pose, FINE_ITERATIONS)
-    }
-
-    /// Aligns the scan from a pose whose place in a direction along the map's axes stays.
     pub fn align_across(
         &mut self,
         guess: InitialGuess,
         initial: &Pose,
         locked: UnitVector2<f64>,
     ) -> Candidate {
-        self.deskew(initial);
-        self.points.thin(COARSE_STRIDE);
-        let (coarse, points) = (self.map.coarse(), &*self.points);
-        let mut pose = align_across(&coarse, points, initial, COARSE_ITERATIONS, locked).pose;
-        let mut fine = |pose: &Pose| {
-            self.deskew(pose);
-            align_across(&self.map.fine(), self.points, pose, FINE_ITERATIONS, locked)
-        };
-        for _ in 1..FINE_ROUNDS {
-            pose = fine(&pose).pose;
-        }
-        let alignment = fine(&pose);
+        let coarse = self.align_coarse(initial, Some(locked)).pose;
+        let alignment = self.align_fine(coarse, Some(locked));
         self.assess(guess, alignment)
     }
 
-    /// Deskews the scan with the motion that leads to `pose`.
     pub fn deskew(&mut self, pose: &Pose) {
         let twist = self.state.twist_to(pose, &self.scan.step);
         self.points.deskew(self.scan.points, &twist);

@@ -47,11 +47,9 @@ pub struct Standstill {
     pub time_s: f64,
     /// Mean squared jitter from scan to scan while the vehicle stood, relative to the covariances.
     pub jitter: f64,
-    /// Number of scans in that mean.
     pub jitter_scans: u32,
 }
 
-/// An estimate of a scan's pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Estimate {
     /// The pose in the first scan's frame, with the covariance of the motion from the scan before.
@@ -79,7 +77,6 @@ impl Estimate {
     }
 }
 
-/// A motion to be reported.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Report {
     pub motion: UncertainMotion,
@@ -103,12 +100,10 @@ impl Default for Standstill {
 }
 
 impl Standstill {
-    /// Returns whether the vehicle stands.
     pub fn stands(&self) -> bool {
         self.time_s >= MIN_TIME_S
     }
 
-    /// Returns the motion to report for the next estimate, and updates the state.
     pub(super) fn next(&mut self, estimate: &Estimate) -> Report {
         let before = *self;
         if self.is_left_by(estimate) {

@@ -29,11 +29,8 @@ const POINTS: usize = 400;
 /// The direction with the least information by structure about the place of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WeakestDirection {
-    /// Along the axes of the map.
     pub along: UnitVector2<f64>,
-    /// The share of the information along it that is by structure.
     share: f64,
-    /// The information by structure along it, over that along the strongest direction.
     ratio: f64,
 }
 

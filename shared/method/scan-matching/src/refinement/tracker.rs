@@ -16,21 +16,16 @@ const TWIST_GAIN: f64 = 0.5;
 /// Weight of the newest scan in the running means of overlap and weight.
 const FIT_GAIN: f64 = 0.2;
 
-/// The pose of the vehicle, the scans it is predicted from, and how well scans match on average.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrackerState {
     /// Pose of the last scan in the first one's frame.
     pub pose: Pose,
     /// The last two refined scans, newest first. The second one is used if the first turns out to
     /// be wrong.
     pub anchors: [Option<Anchor>; 2],
-    /// Running mean of the overlap of matched scans.
     pub mean_overlap: f64,
-    /// Running mean of the weight of the points of matched scans.
     pub mean_weight: f64,
-    /// Number of scans in a row that were weak or predicted.
     pub doubtful: u32,
-    /// Number of scans in a row that were predicted.
     pub unmatched: u32,
     /// Number of scans in a row, but for predicted ones, whose place along walls without structure
     /// was the predicted one.
@@ -39,7 +34,6 @@ pub struct TrackerState {
     pub sliding: u32,
     /// Displacement by the search beyond such guesses, m, along the axes of the map.
     pub ahead_m: Vector2<f64>,
-    /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
     /// The bias of the gyro, and the like; `None` until it has measured a turn.
     pub heading: Option<Heading>,
@@ -50,59 +44,30 @@ pub struct TrackerState {
     pub doppler: Option<WheelState>,
 }
 
-/// The time, the turn and the distance since the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
-    /// Time since the scan before, s.
     pub interval_s: f64,
-    /// The turn since then, by the gyro.
     pub turn: Option<PredictedTurn>,
     /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
 }
 
 impl Step {
-    /// Returns whether wheels, Doppler or the gyro measure a motion.
     pub fn moves(&self) -> bool {
         self.distance.is_some_and(|it| it.is_certain())
             || self.turn.is_some_and(|it| it.is_certain())
     }
 }
 
-/// A refined scan for predicting the next poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
-    /// Pose in the first scan's frame.
     pub pose: Pose,
-    /// Running mean of the velocity.
     pub twist: Twist,
-    /// Time from its stamp to the last scan's, s.
     pub age_s: f64,
 }
 
-impl Default for TrackerState {
-    fn default() -> Self {
-        Self {
-            pose: Pose::identity(),
-            anchors: [None; 2],
-            mean_overlap: 0.0,
-            mean_weight: 0.0,
-            doubtful: 0,
-            unmatched: 0,
-            along_walls: 0,
-            sliding: 0,
-            ahead_m: Vector2::zeros(),
-            standstill: Standstill::default(),
-            heading: None,
-            wheels: None,
-            doppler: None,
-        }
-    }
-}
-
 impl Anchor {
-    /// The pose after the interval at constant velocity; with the heading of the gyro, if there is
-    /// one.
+    /// The pose after the interval at constant velocity, with the heading of the gyro if known.
     fn predict(&self, interval_s: f64, heading: Option<UnitComplex<f64>>) -> Pose {
         let time_s = self.age_s + interval_s;
         let Some(heading) = heading else {
@@ -115,7 +80,6 @@ impl Anchor {
         self.pose * twist.chord_pose_at(time_s)
     }
 
-    /// The mean velocity from here to `pose`.
     fn twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         Twist::from_chord(&self.pose.inv_mul(pose), self.age_s + interval_s)
     }
@@ -163,13 +127,11 @@ impl TrackerState {
         [self.pose * distance.motion([yaw_rad, 0.0]).motion, second]
     }
 
-    /// The turn to the pose that is predicted first, rad.
     pub(super) fn predicted_turn_rad(&self, step: &Step) -> f64 {
         let [predicted, _] = self.predict(step);
         self.pose.rotation.rotation_to(&predicted.rotation).angle()
     }
 
-    /// The heading of a scan by the gyro.
     fn heading_at(&self, step: &Step) -> Option<UnitComplex<f64>> {
         let turn = step.turn?;
         Some(self.pose.rotation * UnitComplex::new(turn.yaw_rad))
@@ -194,7 +156,6 @@ impl TrackerState {
         }
     }
 
-    /// Returns whether a vehicle can have come to `pose` from either anchor.
     pub(super) fn can_reach(
         &self,
         pose: &Pose,
@@ -223,7 +184,6 @@ impl TrackerState {
         }
     }
 
-    /// Updates the state with the pose of the next scan.
     pub(super) fn update(
         &mut self,
         pose: Pose,
@@ -246,15 +206,13 @@ impl TrackerState {
             self.mean_overlap = running_mean(self.mean_overlap, overlap);
             self.mean_weight = running_mean(self.mean_weight, weight);
         }
-        self.doubtful = if outcome == Outcome::Refined {
-            0
-        } else {
-            self.doubtful.saturating_add(1)
+        self.doubtful = match outcome {
+            Outcome::Refined => 0,
+            _ => self.doubtful.saturating_add(1),
         };
-        self.unmatched = if outcome == Outcome::Predicted {
-            self.unmatched.saturating_add(1)
-        } else {
-            0
+        self.unmatched = match outcome {
+            Outcome::Predicted => self.unmatched.saturating_add(1),
+            _ => 0,
         };
         self.pose = pose;
     }
@@ -266,16 +224,17 @@ impl TrackerState {
         let twist = self.mean_twist_to(&pose, interval_s);
         let [first, second] = self.anchors;
         let refined = if self.unmatched == 0 { first } else { second };
-        let aged = refined.map(|anchor| Anchor {
+        self.set_anchors(pose, twist, refined, interval_s);
+    }
+
+    fn set_anchors(&mut self, pose: Pose, twist: Twist, second: Option<Anchor>, interval_s: f64) {
+        let age_s = 0.0;
+        let newest = Anchor { pose, twist, age_s };
+        let aged = second.map(|anchor| Anchor {
             age_s: anchor.age_s + interval_s,
             ..anchor
         });
-        let carried = Anchor {
-            pose,
-            twist,
-            age_s: 0.0,
-        };
-        self.anchors = [Some(carried), aged];
+        self.anchors = [Some(newest), aged];
     }
 
     /// Makes `pose` the newest anchor. An anchor is wrong and dropped if `pose` is out of its
@@ -294,18 +253,7 @@ impl TrackerState {
                 .lerp(&anchor.twist_to(&pose, interval_s), TWIST_GAIN),
             None => self.mean_twist_to(&pose, interval_s),
         };
-        let aged = valid.map(|anchor| Anchor {
-            age_s: anchor.age_s + interval_s,
-            ..anchor
-        });
-        self.anchors = [
-            Some(Anchor {
-                pose,
-                twist,
-                age_s: 0.0,
-            }),
-            aged,
-        ];
+        self.set_anchors(pose, twist, valid, interval_s);
     }
 }
 
@@ -337,25 +285,6 @@ mod tests {
             state.update(pose, Outcome::Refined, [0.3, 100.0], &STEP, &config);
         }
         state
-    }
-
-    #[test]
-    fn a_steady_drive_is_predicted() {
-        let state = after(&[
-            (0.0, 0.0),
-            (2.5, 0.0),
-            (5.0, 0.0),
-            (7.5, 0.0),
-            (10.0, 0.0),
-            (12.5, 0.0),
-            (15.0, 0.0),
-        ]);
-        let [from_last, from_second_last] = state.predict(&STEP);
-        assert!((from_last.translation.x - 17.5).abs() < 0.1, "{from_last}");
-        assert!(
-            (from_second_last.translation.x - 17.5).abs() < 0.2,
-            "{from_second_last}"
-        );
     }
 
     #[test]

@@ -15,7 +15,6 @@ use super::{
     tracker::Step,
 };
 
-/// Factor on the covariance of a weak match.
 pub(super) const WEAK_FACTOR: f64 = 4.0;
 /// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero,
 /// since edges of a pose graph need a covariance that has an inverse.
@@ -27,17 +26,14 @@ pub(super) struct Uncertainty {
     /// The covariance of a prediction over the scan's interval, behind a match.
     of_step: Matrix3<f64>,
     /// The same behind the predictions in a row before it.
-    of_prediction: Matrix3<f64>,
-    /// Predictions in a row whose error a match takes back.
+    pub of_prediction: Matrix3<f64>,
     predictions: u32,
-    /// The covariance of all of these.
     of_predictions: Matrix3<f64>,
     /// The share of a match's covariance that makes the map drift.
     of_map: f64,
 }
 
 impl Uncertainty {
-    /// The uncertainty before the scan is registered with the map.
     pub fn before(
         scan: &Scan<'_>,
         map: &LocalMap,
@@ -63,11 +59,6 @@ impl Uncertainty {
             of_predictions,
             of_map: drift_share(map.len(), config),
         }
-    }
-
-    /// Returns the covariance of the motion to the predicted pose.
-    pub fn of_prediction(&self) -> Matrix3<f64> {
-        self.of_prediction
     }
 
     /// Returns the variance of the prediction in an otherwise undetermined direction, such that the
@@ -258,25 +249,5 @@ mod tests {
             let ratio = of_sectors[(axis, axis)] / stated[(axis, axis)];
             assert!((0.8..1.25).contains(&ratio), "axis {axis}: {ratio}");
         }
-    }
-
-    /// Poses that are each the mean of the last ten, with noise of their own: the remaining noise
-    /// after a long time.
-    #[test]
-    fn a_mean_that_keeps_up_with_itself_drifts_by_two_over_k_plus_one_of_the_noise() {
-        const KEYFRAMES: usize = 10;
-        let mut poses = vec![0.0; KEYFRAMES];
-        // The noise of one pose alone. The walk is linear: this is what each one contributes in the
-        // end.
-        poses.push(1.0);
-        for _ in 0..1000 {
-            let last = &poses[poses.len() - KEYFRAMES..];
-            poses.push(last.iter().sum::<f64>() / KEYFRAMES as f64);
-        }
-        let left = poses.last().copied().unwrap_or_default();
-        assert!(
-            (left - 2.0 / (KEYFRAMES as f64 + 1.0)).abs() < 1e-9,
-            "{left}"
-        );
     }
 }

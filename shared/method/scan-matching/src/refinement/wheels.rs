@@ -19,10 +19,8 @@ const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Least standard deviation of a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
 
-/// The scale of the wheels, and the uses of their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelState {
-    /// True distance over the one that is measured.
     pub scale: f64,
     /// Error of the last pose along the path, against the map, m.
     pub offset_m: f64,
@@ -33,9 +31,7 @@ pub struct WheelState {
     pub slips: bool,
     /// The distance by the wheels since the last registered scan, m.
     pub since_match_m: f64,
-    /// The time since then, s.
     pub since_match_s: f64,
-    /// The turn since then, rad.
     pub since_match_rad: f64,
     /// The time since a match last determined the place along the path, s: also along walls.
     pub since_place_s: f64,
@@ -44,25 +40,20 @@ pub struct WheelState {
     pub unmatched: Matrix3<f64>,
 }
 
-/// The scale of the wheels, as it is known after a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelScale {
-    /// True distance over the one that is measured.
     pub scale: f64,
-    /// Standard deviation.
     pub sigma: f64,
     /// They disagree with the registered motion, or have last done so: they are not used.
     pub slip: bool,
 }
 
-/// The aiding sensor of a distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DistanceBy {
     Wheels,
     Doppler,
 }
 
-/// The distance that the wheels or Doppler predict, against the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PredictedDistance {
     pub by: DistanceBy,
@@ -73,7 +64,6 @@ pub(super) struct PredictedDistance {
     /// Variance of the distance, m², such that the variances of the motions since the last
     /// registered one add up.
     pub variance_m2: f64,
-    /// Variance across the path, m².
     pub side_variance_m2: f64,
     /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
@@ -81,10 +71,8 @@ pub(super) struct PredictedDistance {
     pub since_match: [f64; 2],
 }
 
-/// A registered motion along the path.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Registered {
-    /// Distance that the axle has driven, m.
     distance_m: f64,
     variance_m2: f64,
     /// The share of the variance that accumulates.
@@ -92,7 +80,6 @@ pub(super) struct Registered {
 }
 
 impl Registered {
-    /// Takes the part along the path of a motion in the axes of the scan before.
     pub fn of(motion: &UncertainMotion, drift_share: f64, config: &WheelsConfig) -> Self {
         let ahead = pose(config.radar_ahead_m, 0.0, 0.0);
         let axle = ahead * motion.motion * ahead.inverse();
@@ -105,14 +92,12 @@ impl Registered {
         }
     }
 
-    /// The variance of the place of one of its poses, and the variance of the drift.
     fn noise_and_drift_m2(&self) -> [f64; 2] {
         let drift = self.drift_share * self.variance_m2;
         [0.5 * (self.variance_m2 - drift), drift]
     }
 }
 
-/// A measured distance against a registered one.
 struct Innovation {
     apart_m: f64,
     /// The covariance of the errors of the offset before, the scale, and the offset after.
@@ -124,7 +109,6 @@ struct Innovation {
 }
 
 impl WheelState {
-    /// Creates the state before the first scan.
     pub(super) fn new(config: &WheelsConfig) -> Self {
         Self {
             scale: 1.0,
@@ -139,7 +123,6 @@ impl WheelState {
         }
     }
 
-    /// Returns the estimate of the scale.
     pub(super) fn estimate(&self) -> WheelScale {
         WheelScale {
             scale: self.scale,
@@ -148,7 +131,6 @@ impl WheelState {
         }
     }
 
-    /// Lets time pass: the scale changes.
     pub(super) fn wait(&mut self, time_s: f64) {
         self.covariance[(1, 1)] += SCALE_WALK_PER_SQRT_S.powi(2) * time_s;
         self.since_place_s += time_s;
@@ -230,12 +212,10 @@ impl WheelState {
         }
     }
 
-    /// Returns whether wheels with these settings can have the learnt scale.
     fn has_scale_of(&self, config: &WheelsConfig) -> bool {
         (self.scale - 1.0).powi(2) <= GATE * config.scale_sigma.max(TYRES).powi(2)
     }
 
-    /// Takes a registered distance that agrees with the measured one.
     pub(super) fn correct(&mut self, measured: &WheelDistance, registered: &Registered) {
         let Innovation {
             apart_m,
@@ -250,7 +230,6 @@ impl WheelState {
         let after = kept * before * kept.transpose() + gain * gain.transpose() * noise_m2;
         self.scale += gain[1] * apart_m;
         self.offset_m = gain[2] * apart_m;
-        // The offset of the last scan replaces the offset of the scan before.
         self.covariance = Matrix2::new(after[(2, 2)], after[(2, 1)], after[(1, 2)], after[(1, 1)]);
         self.slips = false;
         self.reset_since_match();
@@ -271,7 +250,6 @@ impl WheelState {
         self.unmatched = Matrix3::zeros();
     }
 
-    /// Takes a pose that is predicted by the wheels.
     pub(super) fn dead_reckon(&mut self, measured: &WheelDistance) {
         let step = Matrix2::new(1.0, -measured.distance_m, 0.0, 1.0);
         self.covariance = step * self.covariance * step.transpose();
@@ -309,7 +287,6 @@ impl WheelState {
         self.slips &= apart_m.powi(2) > GATE * (variance_m2 + measured.variance_m2);
     }
 
-    /// Takes a pose that is predicted from the motions before, with this variance.
     pub(super) fn inflate(&mut self, variance_m2: f64) {
         self.covariance[(0, 0)] += variance_m2;
     }
@@ -361,7 +338,6 @@ impl PredictedDistance {
         }
     }
 
-    /// Returns whether the vehicle has certainly moved.
     pub(super) fn is_certain(&self) -> bool {
         self.distance_m.powi(2) > GATE * self.variance_m2
     }

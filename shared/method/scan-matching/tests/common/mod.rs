@@ -96,14 +96,20 @@ pub fn draw(
 /// the raster's edge.
 pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Array2<f32>, Array2<f32>) {
     let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
-    let earlier = draw(scene.iter().copied(), n, cell_m, 1.2);
-    let later = draw(
-        scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),
-        n,
-        cell_m,
-        1.2,
-    );
-    (earlier, later)
+    pair_of(&scene, n, cell_m, 1.2, motion)
+}
+
+/// The earlier and the later raster of these scatterers.
+pub fn pair_of(
+    scene: &[([f64; 2], f64)],
+    n: usize,
+    cell_m: f64,
+    blur: f64,
+    motion: Motion,
+) -> (Array2<f32>, Array2<f32>) {
+    let earlier = draw(scene.iter().copied(), n, cell_m, blur);
+    let seen = scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s));
+    (earlier, draw(seen, n, cell_m, blur))
 }
 
 /// Both searches over one pair.

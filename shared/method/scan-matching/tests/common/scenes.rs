@@ -1,8 +1,9 @@
 //! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that
 //! scans clockwise.
 
-use gyre_geometry::{Pose, SparsePoint};
-use gyre_scan_matching::{Refined, RefinementConfig, Refiner};
+use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
+use gyre_samples::{GyroTurn, WheelDistance};
+use gyre_scan_matching::{Aiding, Refined, RefinementConfig, Refiner};
 use nalgebra::{Point2, Vector2, Vector3};
 
 use super::Numbers;
@@ -20,20 +21,12 @@ pub const CAPACITY: usize = 4096;
 pub struct Reflector {
     pub from: Vector2<f64>,
     pub along: Vector2<f64>,
-    /// m/s; nonzero for traffic.
-    pub velocity: Vector2<f64>,
     pub points: usize,
 }
 
-/// Four walls about `middle`, turned, each with a number of points.
-pub fn rectangle(
-    middle: [f64; 2],
-    [length, width]: [f64; 2],
-    yaw: f64,
-    velocity: [f64; 2],
-    points: usize,
-) -> [Reflector; 4] {
-    let pose = Pose::new(middle.into(), yaw);
+/// Four walls about `middle`, turned, each with five points.
+fn house(middle: Vector2<f64>, [length, width]: [f64; 2], yaw: f64) -> [Reflector; 4] {
+    let pose = Pose::new(middle, yaw);
     let corner = |k: usize| {
         let (ahead, aside) = [(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)][k % 4];
         (pose * Point2::new(ahead * length, aside * width)).coords
@@ -41,14 +34,8 @@ pub fn rectangle(
     std::array::from_fn(|k| Reflector {
         from: corner(k),
         along: corner(k + 1) - corner(k),
-        velocity: velocity.into(),
-        points,
+        points: 5,
     })
-}
-
-/// A car that drives along x.
-pub fn car(middle: [f64; 2], speed_mps: f64) -> [Reflector; 4] {
-    rectangle(middle, [4.5, 1.8], 0.0, [speed_mps, 0.0], 6)
 }
 
 pub fn wall(from: [f64; 2], to: [f64; 2], points: usize) -> Reflector {
@@ -56,7 +43,6 @@ pub fn wall(from: [f64; 2], to: [f64; 2], points: usize) -> Reflector {
     Reflector {
         from,
         along: Vector2::from(to) - from,
-        velocity: Vector2::zeros(),
         points,
     }
 }
@@ -78,21 +64,9 @@ pub fn town(area: [[f64; 2]; 2], seed: u64) -> Vec<Reflector> {
     let mut numbers = Numbers(seed);
     let houses = posts(area, 1000.0, seed + 1).into_iter().flat_map(|place| {
         let size = [8.0 + 8.0 * numbers.next(), 6.0 + 4.0 * numbers.next()];
-        rectangle(place.from.into(), size, numbers.within(0.3), [0.0; 2], 5)
+        house(place.from, size, numbers.within(0.3))
     });
     houses.chain(posts(area, 100.0, seed + 2)).collect()
-}
-
-/// The scene with left and right exchanged.
-pub fn mirrored(scene: &[Reflector]) -> Vec<Reflector> {
-    let mirror = |v: Vector2<f64>| Vector2::new(v.x, -v.y);
-    let mirrored = |r: &Reflector| Reflector {
-        from: mirror(r.from),
-        along: mirror(r.along),
-        velocity: mirror(r.velocity),
-        points: r.points,
-    };
-    scene.iter().map(mirrored).collect()
 }
 
 /// A drive that accelerates or turns, not both.
@@ -127,10 +101,6 @@ impl Drive {
         let time_s = k as f64 * SWEEP_S;
         arc(self.length_m(time_s), self.yaw_rate_radps * time_s)
     }
-
-    pub fn driven_m(&self) -> f64 {
-        self.length_m((self.scans - 1) as f64 * SWEEP_S)
-    }
 }
 
 /// The motion along an arc of this length that turns by this angle.
@@ -149,30 +119,28 @@ fn arc(length: f64, turn: f64) -> Pose {
 pub struct Sensor {
     /// Standard deviation of the ranges, m.
     pub noise_m: f64,
-    /// Uncorrected range offset, m.
-    pub offset_m: f64,
     /// Ranges are too short by this for each m/s of approach, s.
     pub doppler_s: f64,
-    /// The points do not report the Doppler shift.
-    pub hides_doppler: bool,
     pub seed: u64,
 }
 
 /// Ranges that are noisy, and right in the mean.
 pub const NOISY: Sensor = Sensor {
     noise_m: 0.1,
-    offset_m: 0.0,
     doppler_s: 0.0,
-    hides_doppler: false,
     seed: 1,
+};
+
+pub const LITTLE_NOISE: Sensor = Sensor {
+    noise_m: 0.05,
+    ..NOISY
 };
 
 impl Sensor {
     /// Scan `k` of a drive. The velocity stays the same during the sweep.
     pub fn scan(&self, scene: &[Reflector], drive: &Drive, k: usize) -> Vec<SparsePoint> {
         let mut numbers = Numbers(self.seed << 32 | k as u64);
-        let middle_s = k as f64 * SWEEP_S;
-        let (pose, speed) = (drive.pose(k), drive.speed(middle_s));
+        let (pose, speed) = (drive.pose(k), drive.speed(k as f64 * SWEEP_S));
         let mut points = Vec::with_capacity(CAPACITY);
         for reflector in scene {
             for _ in 0..reflector.points {
@@ -185,26 +153,17 @@ impl Sensor {
                     continue;
                 }
                 let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate_radps * t);
-                let seen = |t: f64| {
-                    sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t))
-                };
+                let seen = |t: f64| sensor(t).inverse() * Point2::from(place);
                 let Some(time_s) = swept(seen) else { continue };
                 let at = seen(time_s).coords;
                 if !VISIBLE_M.contains(&at.norm()) {
                     continue;
                 }
-                let approach = Vector2::new(speed, 0.0)
-                    - sensor(time_s).rotation.inverse() * reflector.velocity;
+                let approach = Vector2::new(speed, 0.0);
                 let sight = at.normalize();
-                let shift =
-                    self.noise_m * normal + self.offset_m - self.doppler_s * sight.dot(&approach);
-                let reported = if self.hides_doppler {
-                    0.0
-                } else {
-                    self.doppler_s
-                };
+                let shift = self.noise_m * normal - self.doppler_s * sight.dot(&approach);
                 let at = at + sight * shift;
-                points.push(point([at.x, at.y, time_s, weight, reported]));
+                points.push(point([at.x, at.y, time_s, weight, self.doppler_s]));
             }
         }
         points
@@ -268,8 +227,6 @@ pub struct Run {
 /// The error at the end of a run, and the error of its worst motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
-    /// Yaw drift, degrees counter-clockwise per 100 m.
-    pub drift_deg: f64,
     /// Yaw error at the end, degrees counter-clockwise.
     pub yaw_deg: f64,
     /// Distance from the true position at the end, m.
@@ -295,10 +252,7 @@ impl Run {
         }
         let off = self.drive.pose(self.refined.len()).inv_mul(&pose);
         let yaw_deg = off.rotation.angle().to_degrees();
-        let drift_deg =
-            100.0 * yaw_deg / (self.drive.driven_m() - self.drive.length_m(first as f64 * SWEEP_S));
         Errors {
-            drift_deg,
             yaw_deg,
             shift_m: off.translation.vector.norm(),
             worst_m,
@@ -317,6 +271,21 @@ pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));
     true_motion(drive, k) * Pose::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
+}
+
+/// The displacement over scans by the motions against the true one, and its standard deviation
+/// ahead, m.
+pub fn off(drive: &Drive, refined: &[Refined], over: std::ops::Range<usize>) -> (Pose, f64) {
+    let mut composed = ComposedMotion::of(&refined[over.start].motion);
+    for refined in &refined[over.start + 1..over.end] {
+        composed = composed.then(&refined.motion);
+    }
+    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
+    let motion = composed.motion();
+    (
+        truth.inv_mul(&motion.motion),
+        motion.covariance[(0, 0)].sqrt(),
+    )
 }
 
 /// The scans of a drive.
@@ -361,6 +330,52 @@ pub fn refine_on(
             )
         })
         .collect()
+}
+
+/// Refines the motions to each scan but the first, with what aids each and what its search finds.
+pub fn refine_aided(
+    refiner: &mut Refiner,
+    scans: &[Vec<SparsePoint>],
+    aiding: impl Fn(usize) -> Aiding,
+    mut search: impl FnMut(usize) -> Pose,
+) -> Vec<Refined> {
+    let mut refine = |k: usize| {
+        refiner.aiding = aiding(k);
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
+    };
+    (1..scans.len()).map(&mut refine).collect()
+}
+
+/// The true distance to scan `k` times a factor, as wheels measure it.
+pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> WheelDistance {
+    let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
+    WheelDistance {
+        distance_m: factor * (to_m - from_m),
+        variance_m2: 1e-4,
+        side_variance_m2: 1e-4,
+        interval_s: SWEEP_S,
+    }
+}
+
+/// The turn to a scan by a gyro whose rate is off by so much.
+pub fn by_gyro(drive: &Drive, off_radps: f64) -> GyroTurn {
+    let rate_radps = drive.yaw_rate_radps + off_radps;
+    GyroTurn {
+        yaw_rad: rate_radps * SWEEP_S,
+        variance_rad2: 1e-9,
+        interval_s: SWEEP_S,
+        sweep_rate_radps: rate_radps,
+    }
+}
+
+/// The scans of a vehicle that leaves a town for a tunnel, with more beside its walls. At every
+/// place of a wall is another point in each scan: speckle.
+pub fn into_a_tunnel(drive: &Drive, more: Vec<Reflector>) -> Vec<Vec<SparsePoint>> {
+    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
+    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
+    scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500)));
+    scene.extend(more);
+    scans(&scene, drive, &LITTLE_NOISE)
 }
 
 /// Simulates and refines a drive.

@@ -22,7 +22,6 @@ const EXACT: f32 = (1 << 24) as f32;
 /// The meaning of a floating-point tensor.
 #[derive(Clone)]
 enum Float {
-    /// The raster over a divisor.
     Raster {
         divisor: f32,
         shape: Vec<usize>,
@@ -40,14 +39,12 @@ enum Float {
     Factors,
 }
 
-/// The meaning of a tensor of integers.
 #[derive(Clone)]
 enum Integer {
     Of(Layout),
     Factors,
 }
 
-/// The scale and the zero of quantised values.
 #[derive(Clone, Copy, PartialEq)]
 struct Quantisation {
     scale: f32,
@@ -161,7 +158,6 @@ impl<'a> Reader<'a> {
         self.floats.get(node.input.get(index)?.as_str()).cloned()
     }
 
-    /// Returns an input that is integers of an image.
     fn layout(&self, node: &NodeProto, index: usize) -> Option<Layout> {
         match self.input(node, index)? {
             Float::Of(layout) => Some(layout),
@@ -288,7 +284,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds an image, and returns its number and its values.
     fn image(&mut self, shape: [usize; 4], quantisation: Quantisation) -> Option<(usize, Layout)> {
         let [1, channels, rows, columns] = shape else {
             return None;

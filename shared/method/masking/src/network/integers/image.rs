@@ -25,12 +25,10 @@ impl Image {
         image
     }
 
-    /// Values from one row to the next.
     pub fn stride(&self) -> usize {
         self.columns.next_multiple_of(LANES) + 2
     }
 
-    /// Values from one channel to the next.
     fn plane(&self) -> usize {
         (self.rows + 2) * self.stride()
     }
@@ -44,7 +42,6 @@ impl Image {
         &self.values
     }
 
-    /// Returns a channel with its margin.
     pub fn channel(&self, channel: usize) -> &[f32] {
         let plane = self.plane();
         &self.values[channel * plane..][..plane]

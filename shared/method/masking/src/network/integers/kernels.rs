@@ -10,12 +10,10 @@ use super::image::{Image, LANES};
 
 /// Output channels that are computed at once.
 pub const OUTPUTS: usize = 8;
-/// The largest value.
 const MOST: f32 = 255.0;
 /// Numbers from -2^22 to 2^22 lose all digits behind the point, ties to even, when this is added.
 const ROUND: f32 = (3 << 22) as f32;
 
-/// A convolution of 3 x 3.
 #[derive(Debug)]
 pub struct Kernel {
     /// Block of outputs x input x row and column x output.
@@ -43,7 +41,6 @@ fn rounded(value: f32, zero: f32) -> f32 {
     ((near + ROUND - ROUND) + zero).clamp(0.0, MOST)
 }
 
-/// A convolution of an image.
 pub struct Convolution<'a> {
     pub kernel: &'a Kernel,
     pub from: &'a Image,
@@ -73,7 +70,6 @@ impl SimdOp for Convolution<'_> {
     }
 }
 
-/// Returns the values of an output with these sums.
 #[inline(always)]
 fn values<I: Isa>(isa: I, kernel: &Kernel, output: usize, sums: I::F32) -> [f32; LANES] {
     let ops = isa.f32();

@@ -2,7 +2,6 @@
 
 use std::{fs, path::Path};
 
-use ndarray::Array3;
 use rten_onnx::onnx::ModelProto;
 use rten_simd::{SimdOp, isa::GenericIsa};
 
@@ -182,20 +181,4 @@ fn a_network_with_another_number_of_channels_is_not_read() {
     let values = dims[0] * dims[1];
     (dims[0], dims[1]) = (1, values);
     assert!(Integers::read(&graph).is_none());
-}
-
-#[test]
-fn the_masks_are_factors_that_differ_from_cell_to_cell() {
-    let mut network = Integers::read(&model("gyre-255.onnx").graph.unwrap()).unwrap();
-    let mut numbers = Numbers(3);
-    let rasters = Array3::from_shape_simple_fn((1, 255, 255), || numbers.next(196) as f32);
-    let mut masks = Array3::from_elem((1, 255, 255), -1.0);
-    network.run(rasters.view(), masks.view_mut());
-    assert!(masks.iter().all(|mask| (0.0..=1.0).contains(mask)));
-    let (least, most) = masks
-        .iter()
-        .fold((1.0_f32, 0.0_f32), |(least, most), mask| {
-            (least.min(*mask), most.max(*mask))
-        });
-    assert!(most - least > 0.1, "{least} to {most}");
 }

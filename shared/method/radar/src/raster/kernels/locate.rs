@@ -13,22 +13,16 @@ use std::array::from_fn;
 /// centimetres for a cell 12 m away, and less for others.
 const FIXED_POINT_STEPS: usize = 2;
 
-/// The tables that cells are looked up in.
 #[derive(Clone, Copy, Debug)]
 pub struct Lookup<'a> {
-    /// Maps bearings to azimuths and times.
     pub bearings: &'a BearingTable,
     /// The last row of the polar image with a successor.
     pub last_azimuth: i32,
-    /// Samples between consecutive rows of the polar image.
     pub stride: i32,
-    /// Columns of the polar image per metre.
     pub columns_per_metre: f32,
-    /// The column at range 0.
     pub column_at_sensor: f32,
     /// The last column with a successor.
     pub last_column: f32,
-    /// Nearer cells are zero.
     pub min_range_m: f32,
 }
 
@@ -42,7 +36,6 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Initial value.
     pub const NONE: Self = Self {
         sample: [0; BLOCK],
         along_range: [0.0; BLOCK],
@@ -89,7 +82,6 @@ fn tap(lookup: &Lookup<'_>, from_start: &Block<f32>, range_m: &Block<f32>) -> Ta
         let row = interpolate(&lookup.bearings.row, from_start[k]);
         let column = range_m[k] * lookup.columns_per_metre + lookup.column_at_sensor;
         let column = column.max(0.0).min(lookup.last_column);
-        // Column 0 is always empty.
         let column = if range_m[k] < lookup.min_range_m {
             0.0
         } else {

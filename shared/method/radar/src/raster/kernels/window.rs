@@ -25,7 +25,6 @@ pub struct Window {
     full: usize,
     /// 65536 UNIT / (length of the window in bins).
     full_weight: u32,
-    /// Likewise for the two partial pieces.
     part_weight: u32,
 }
 
@@ -50,7 +49,6 @@ impl Window {
         }
     }
 
-    /// Number of pieces on each side of the middle one.
     pub fn reach(&self) -> usize {
         self.full / 2 + 1
     }
@@ -72,6 +70,9 @@ pub fn sum_pieces(
     match bins_per_piece {
         1 => sum_each(above_floor, pieces, |[a]: [u8; 1]| u16::from(a)),
         2 => sum_each(above_floor, pieces, sum_2),
+        3 => sum_each(above_floor, pieces, |bins: [u8; 3]| {
+            bins.map(u16::from).iter().sum()
+        }),
         4 => sum_each(above_floor, pieces, sum_4),
         _ => sum_long(above_floor, bins_per_piece, pieces),
     }
@@ -111,7 +112,6 @@ fn sum_long(bins: &[u8], bins_per_piece: usize, pieces: &mut [u16]) {
     }
 }
 
-/// Columns per iteration, so that their sums stay in registers.
 const BLOCK: usize = 32;
 
 /// Writes the mean of the window at each column; column `c` is centred on

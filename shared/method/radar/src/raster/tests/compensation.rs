@@ -34,35 +34,6 @@ fn worst_miss(config: &RasterConfig, sensor: &Sensor, twist: Option<Twist>) -> f
     misses.fold(0.0, f64::max)
 }
 
-#[test]
-fn scatterers_are_placed_at_mid_sweep_only_with_compensation() {
-    let twist = Twist {
-        vx_mps: 15.0,
-        vy_mps: -0.4,
-        yaw_rate_radps: 0.5,
-    };
-    for sense in [Sense::Clockwise, Sense::CounterClockwise] {
-        for sampling in [Sampling::Averaged, Sampling::Bilinear] {
-            let sensor = Sensor {
-                twist,
-                sense,
-                ..Sensor::navtech()
-            };
-            let config = RasterConfig {
-                sampling,
-                ..RasterConfig::default()
-            };
-            let compensated = worst_miss(&config, &sensor, Some(twist));
-            let uncompensated = worst_miss(&config, &sensor, None);
-            assert!(compensated < 0.03, "{sense:?} {sampling:?}: {compensated}");
-            assert!(
-                uncompensated > 1.0,
-                "{sense:?} {sampling:?}: {uncompensated}"
-            );
-        }
-    }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
     #[test]
@@ -120,32 +91,6 @@ fn doppler_shifts_are_compensated_chirp_by_chirp() {
 }
 
 #[test]
-fn an_unknown_doppler_shift_displaces_scatterers() {
-    let twist = Twist {
-        vx_mps: 20.0,
-        vy_mps: 0.0,
-        yaw_rate_radps: 0.0,
-    };
-    let sensor = Sensor {
-        twist,
-        doppler_s: 0.042,
-        ..Sensor::navtech()
-    };
-    let config = RasterConfig::default();
-    let mut scan = sensor.measure(&places(), SIGMA_M);
-    scan.geometry.doppler_s = 0.0;
-    let place = polar(12.0, 3.0 * std::f64::consts::FRAC_PI_4);
-    let miss = miss_cells(
-        &config,
-        &raster(&config, &scan, Some(twist)),
-        &place,
-        4.0 * SIGMA_M,
-    );
-    let expected = 0.042 * 20.0 * std::f64::consts::FRAC_1_SQRT_2 / f64::from(config.cell_m);
-    assert!((miss - expected).abs() < 0.05, "{miss} for {expected}");
-}
-
-#[test]
 fn stamps_in_bursts_are_used_as_they_are() {
     let twist = Twist {
         vx_mps: 20.0,
@@ -161,16 +106,4 @@ fn stamps_in_bursts_are_used_as_they_are() {
     }
     let miss = worst_miss(&RasterConfig::default(), &sensor, Some(twist));
     assert!(miss < 0.1, "{miss}");
-}
-
-#[test]
-fn compensation_of_a_zero_twist_changes_nothing() {
-    let sensor = Sensor::navtech();
-    let config = RasterConfig::default();
-    let scan = sensor.measure(&places(), SIGMA_M);
-    let plain = raster(&config, &scan, None);
-    let standing = raster(&config, &scan, Some(Twist::default()));
-    for (plain, standing) in plain.iter().zip(&standing) {
-        assert!((plain - standing).abs() < 0.05, "{plain} {standing}");
-    }
 }

@@ -48,10 +48,8 @@ fn tiny_scans_give_finite_rasters() {
         let mut scan = sensor(azimuths, bins).scan();
         scan.bytes.fill(255);
         let raster = try_raster(&scan, None).unwrap();
-        assert!(
-            raster.iter().all(|power| (0.0..=245.0).contains(power)),
-            "{azimuths} x {bins}"
-        );
+        let are_powers = raster.iter().all(|power| (0.0..=245.0).contains(power));
+        assert!(are_powers, "{azimuths} x {bins}");
     }
 }
 
@@ -88,33 +86,14 @@ fn power_is_a_view_of_the_rows_without_metadata() {
 fn a_scan_that_is_shorter_than_its_geometry_is_rejected() {
     let mut scan = sensor(4, 10).scan();
     scan.geometry.bins = 11;
-    let rejected = try_raster(&scan, None).unwrap_err();
-    assert!(
-        matches!(
-            rejected,
-            RasterError::Scan(ScanError::Length {
-                what: "image",
-                expected: 85,
-                actual: 84
-            })
-        ),
-        "{rejected}"
-    );
+    let rejected = try_raster(&scan, None).unwrap_err().to_string();
+    let words = "image has 84 elements, but its geometry requires 85";
+    assert!(rejected.contains(words), "{rejected}");
     let mut view = scan.view();
     view.stamp_ns = &[];
-    let rejected = Rasteriser::new(&small()).unwrap().rasterise(
-        &view,
-        0,
-        None,
-        Array2::zeros((33, 33)).view_mut(),
-    );
-    assert!(matches!(
-        rejected,
-        Err(RasterError::Scan(ScanError::Length {
-            what: "stamp table",
-            ..
-        }))
-    ));
+    let mut rasteriser = Rasteriser::new(&small()).unwrap();
+    let rejected = rasteriser.rasterise(&view, 0, None, Array2::zeros((33, 33)).view_mut());
+    assert!(rejected.unwrap_err().to_string().contains("stamp table"));
     scan.geometry.stride = usize::MAX;
     assert!(matches!(
         try_raster(&scan, None),
@@ -127,13 +106,9 @@ fn numbers_out_of_bounds_are_rejected() {
     for resolution_m in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let mut scan = sensor(4, 10).scan();
         scan.geometry.range_resolution_m = resolution_m;
-        assert!(
-            matches!(
-                try_raster(&scan, None),
-                Err(RasterError::Scan(ScanError::Geometry { .. }))
-            ),
-            "{resolution_m}"
-        );
+        let rejected = try_raster(&scan, None).unwrap_err();
+        let is_named = matches!(rejected, RasterError::Scan(ScanError::Geometry { .. }));
+        assert!(is_named, "{resolution_m}");
     }
     let mut scan = sensor(4, 10).scan();
     scan.azimuth_rad[2] = f32::NAN;
@@ -146,90 +121,49 @@ fn numbers_out_of_bounds_are_rejected() {
 #[test]
 fn motions_out_of_bounds_are_rejected() {
     let scan = sensor(400, 100).scan();
-    let impossible = [
-        (f64::NAN, 0.0, 0.0),
-        (0.0, f64::INFINITY, 0.0),
-        (0.0, 0.0, 1e3),
-        (1e9, 0.0, 0.0),
-    ];
-    for (vx_mps, vy_mps, yaw_rate_radps) in impossible {
+    let is_rejected = |scan: &OwnedScan, [vx_mps, vy_mps, yaw_rate_radps]: [f64; 3]| {
         let twist = Twist {
             vx_mps,
             vy_mps,
             yaw_rate_radps,
         };
-        assert!(
-            matches!(
-                try_raster(&scan, Some(twist)),
-                Err(RasterError::Twist { .. })
-            ),
-            "{twist:?}"
-        );
-    }
+        let rejected = try_raster(scan, Some(twist));
+        assert!(matches!(rejected, Err(RasterError::Twist { .. })));
+    };
+    is_rejected(&scan, [f64::NAN, 0.0, 0.0]);
+    is_rejected(&scan, [0.0, f64::INFINITY, 0.0]);
+    is_rejected(&scan, [0.0, 0.0, 1e3]);
+    is_rejected(&scan, [1e9, 0.0, 0.0]);
     // All rows at the stamp of the scan: nothing moves, but the velocity has no number in f32.
     let mut scan = sensor(2, 100).scan();
     scan.stamp_ns.fill(scan.geometry.stamp_ns);
-    let twist = Twist {
-        yaw_rate_radps: -4e270,
-        ..Twist::default()
-    };
-    assert!(matches!(
-        try_raster(&scan, Some(twist)),
-        Err(RasterError::Twist { .. })
-    ));
+    is_rejected(&scan, [0.0, 0.0, -4e270]);
 }
 
 #[test]
-fn settings_out_of_bounds_are_rejected_by_name() {
-    let default = RasterConfig::default;
-    let wrong = [
-        ("n", RasterConfig { n: 0, ..default() }),
-        (
-            "cell_m",
-            RasterConfig {
-                cell_m: f32::NAN,
-                ..default()
-            },
-        ),
-        (
-            "min_range_m",
-            RasterConfig {
-                min_range_m: -1.0,
-                ..default()
-            },
-        ),
-        (
-            "averaged_cells",
-            RasterConfig {
-                averaged_cells: 0.0,
-                ..default()
-            },
-        ),
-    ];
-    for (name, config) in wrong {
-        let rejected = Rasteriser::new(&config).unwrap_err();
-        assert!(
-            rejected
-                .to_string()
-                .starts_with(&format!("raster.{name} is ")),
-            "{rejected}"
-        );
-    }
-    assert_eq!(default().validate(), Ok(()));
-}
-
-#[test]
-fn unknown_settings_are_rejected_and_missing_ones_have_defaults() {
-    let read = |key: &str| {
-        let entries = MapDeserializer::<_, ValueError>::new([(key, 0.4f32)].into_iter());
+fn settings_out_of_bounds_and_unknown_ones_are_rejected_by_name() {
+    let read = |key: &'static str, value: f32| {
+        let entries = MapDeserializer::<_, ValueError>::new([(key, value)].into_iter());
         RasterConfig::deserialize(entries)
     };
     let expected = RasterConfig {
         cell_m: 0.4,
         ..RasterConfig::default()
     };
-    assert_eq!(read("cell_m").unwrap(), expected);
-    assert!(read("cel_m").unwrap_err().to_string().contains("cel_m"));
+    assert_eq!(read("cell_m", 0.4).unwrap(), expected);
+    let unknown = read("cel_m", 0.4).unwrap_err();
+    assert!(unknown.to_string().contains("cel_m"));
+    let wrong = [
+        ("cell_m", f32::NAN),
+        ("min_range_m", -1.0),
+        ("averaged_cells", 0.0),
+    ];
+    let none = RasterConfig { n: 0, ..expected };
+    let wrong = wrong.map(|(key, value)| (key, read(key, value).unwrap()));
+    for (key, config) in wrong.into_iter().chain([("n", none)]) {
+        let rejected = Rasteriser::new(&config).unwrap_err().to_string();
+        assert!(rejected.starts_with(&format!("raster.{key} is ")));
+    }
 }
 
 #[test]

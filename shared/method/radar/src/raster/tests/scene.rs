@@ -68,11 +68,8 @@ impl Sensor {
             stamp_ns: STAMP_NS,
         };
         scan.azimuth_rad.copy_from_slice(&self.azimuth_rad);
-        let stamps = self
-            .time_s
-            .iter()
-            .map(|time_s| STAMP_NS + (time_s * 1e9).round() as i64);
-        scan.stamp_ns = stamps.collect();
+        let stamp_ns = |time_s: &f64| STAMP_NS + (time_s * 1e9).round() as i64;
+        scan.stamp_ns = self.time_s.iter().map(stamp_ns).collect();
         for (azimuth, flags) in scan.flags.iter_mut().enumerate() {
             *flags = flag::MEASURED | self.chirp(azimuth);
         }
@@ -83,34 +80,21 @@ impl Sensor {
     /// scan's stamp.
     pub fn measure(&self, scatterers: &[Point2<f64>], sigma_m: f64) -> OwnedScan {
         let mut scan = self.scan();
-        let first_centre_m =
-            0.5 * f64::from(self.range_resolution_m) + f64::from(self.range_offset_m);
-        for (azimuth, row) in scan
-            .bytes
-            .chunks_exact_mut(METADATA + self.bins)
-            .enumerate()
-        {
+        let resolution_m = f64::from(self.range_resolution_m);
+        let first_centre_m = 0.5 * resolution_m + f64::from(self.range_offset_m);
+        let rows = scan.bytes.chunks_exact_mut(METADATA + self.bins);
+        for (azimuth, row) in rows.enumerate() {
             row[..METADATA].fill(255);
             let sensor_from_stamp = self.twist.pose_at(self.time_s[azimuth]).inverse();
             let direction = self.direction(azimuth);
-            let approach_mps = direction.dot(&nalgebra::Vector2::new(
-                self.twist.vx_mps,
-                self.twist.vy_mps,
-            ));
+            let velocity = nalgebra::Vector2::new(self.twist.vx_mps, self.twist.vy_mps);
             let is_falling = self.chirp(azimuth) == flag::CHIRP_KNOWN;
-            let shift_m = f64::from(if is_falling {
-                -self.doppler_s
-            } else {
-                self.doppler_s
-            }) * approach_mps;
-            for scatterer in scatterers
-                .iter()
-                .map(|scatterer| sensor_from_stamp * scatterer)
-            {
+            let sign = if is_falling { -1.0 } else { 1.0 };
+            let shift_m = sign * f64::from(self.doppler_s) * direction.dot(&velocity);
+            for scatterer in scatterers {
+                let scatterer = sensor_from_stamp * scatterer;
                 for (bin, power) in row[METADATA..].iter_mut().enumerate() {
-                    let measured_m =
-                        first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
-                    let range_m = measured_m + shift_m;
+                    let range_m = first_centre_m + bin as f64 * resolution_m + shift_m;
                     let distance_sq = (scatterer.coords - direction * range_m).norm_squared();
                     let power_here = 200.0 * (-0.5 * distance_sq / (sigma_m * sigma_m)).exp();
                     *power = power.saturating_add(power_here.round() as u8);

@@ -149,24 +149,6 @@ fn a_slow_drive_is_no_standstill() {
 }
 
 #[test]
-fn what_a_passing_vehicle_pulls_at_the_estimates_does_not_stay() {
-    let mut drive = Drive::with_jitter(0.5);
-    drive.drive(80, [0.0, 0.0]);
-    for _ in 0..10 {
-        for off_m in [0.03, 0.06, 0.06, 0.03, 0.0, 0.0, 0.0, 0.0] {
-            drive.step(Outcome::Refined, off_m);
-        }
-    }
-    assert_eq!(drive.reported, Pose::identity());
-    // Pulled away farther than jitter goes, the pose comes back.
-    for _ in 0..8 {
-        drive.step(Outcome::Refined, 0.6);
-    }
-    drive.drive(40, [0.0, 0.0]);
-    assert!(drive.reported.translation.vector.norm() < 0.2);
-}
-
-#[test]
 fn predictions_neither_begin_nor_end_a_standstill() {
     let mut drive = Drive::with_jitter(0.0);
     drive.drive(80, [0.0, 0.0]);

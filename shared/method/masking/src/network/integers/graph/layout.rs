@@ -38,7 +38,6 @@ impl Layout {
         self.places.is_none()
     }
 
-    /// Returns the place of each value in the image.
     pub fn places(&self, image: &Image) -> Vec<u32> {
         if let Some(places) = &self.places {
             return places.to_vec();
@@ -72,7 +71,6 @@ impl Layout {
     }
 }
 
-/// Where the values of a tensor come from.
 struct Move {
     shape: Vec<usize>,
     /// Returns the index of a value before; `None` of a zero that was not there.
@@ -197,7 +195,6 @@ fn unsqueezed(shape: &[usize], axes: &[usize]) -> Option<Vec<usize>> {
     Some(shape)
 }
 
-/// Values from one index to the next, for each axis.
 struct Strides(Vec<usize>);
 
 impl Strides {
@@ -219,7 +216,6 @@ impl Strides {
     }
 }
 
-/// Returns all indices of a tensor in their order.
 fn indices(shape: &[usize]) -> impl Iterator<Item = Vec<usize>> + '_ {
     let strides = Strides::of(shape);
     let values = shape.iter().product();
