@@ -139,15 +139,3 @@ fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
     close(&[arrow.scale.x], &[9.0 / FRAC_1_SQRT_2]);
     assert_ne!(cube.color, shapes[4].color);
 }
-
-#[test]
-fn a_scan_without_objects_says_so() {
-    let header = ObjectsHeader::default();
-    let (frames, mounting) = (Frames::default(), Mounting::default());
-    let array = detections(STAMP_NS, &frames, &mounting, header.list());
-    assert_eq!(array.header.stamp.ns(), STAMP_NS);
-    assert!(array.detections.is_empty());
-    let shapes = markers(STAMP_NS, &frames, &mounting, header.list()).markers;
-    assert_eq!(shapes.len(), 1);
-    assert_eq!(shapes[0].action, DELETEALL);
-}

@@ -8,8 +8,7 @@ use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},
-    radar::{BadScan, Encoder, ScanMessages},
-    sensor_msgs::Image,
+    radar::{Encoder, ScanMessages},
     std_msgs::Header,
 };
 
@@ -213,51 +212,59 @@ fn an_image_alone_is_evenly_spaced() {
 
 #[test]
 fn images_that_are_not_of_powers_are_refused() {
-    let good = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
-    let refused = |message: RadarBScanMsg| message.rows(&radar(), 0, 0).err().unwrap();
-    let mut colours = good.clone();
-    colours.b_scan_img.encoding = "rgb8".to_owned();
-    assert!(matches!(refused(colours), BadScan::Encoding { .. }));
-    let mut short = good.clone();
-    short.b_scan_img.height = u32::MAX;
-    assert!(matches!(refused(short), BadScan::Size { .. }));
-    let empty = Image {
-        encoding: "8UC1".to_owned(),
-        ..Image::default()
-    };
-    assert!(matches!(
-        empty.rows(&radar(), 0, 0).err().unwrap(),
-        BadScan::Size { .. }
-    ));
-    let mut rows = good;
-    rows.timestamps.pop();
-    assert!(matches!(refused(rows), BadScan::Rows { .. }));
+    let edits: [(fn(&mut RadarBScanMsg), &str); 4] = [
+        (|it| it.b_scan_img.encoding = "rgb8".to_owned(), "pixels"),
+        (|it| it.b_scan_img.height = u32::MAX, "rows of 8 bytes"),
+        (|it| it.b_scan_img.width = 0, "for 0 bins"),
+        (
+            |it| it.timestamps.truncate(39),
+            "40 encoder values and 39 times",
+        ),
+    ];
+    for (edit, expected) in edits {
+        let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+        edit(&mut message);
+        let refused = message.rows(&radar(), 0, 0).err().unwrap();
+        assert!(refused.contains(expected), "{refused}");
+    }
 }
 
-#[test]
-fn configurations_of_both_forms_are_the_same() {
-    let older = RadarConfigurationMessage {
+/// The configuration of a driver before 2024, with these bytes as the depth of a bin.
+fn older(bin_size: [u8; 8]) -> Result<Configuration, String> {
+    let message = RadarConfigurationMessage {
         azimuth_samples: 400_u16.to_be_bytes().to_vec(),
         encoder_size: 5600_u16.to_be_bytes().to_vec(),
-        bin_size: 438.0_f64.to_le_bytes().to_vec(),
+        bin_size: bin_size.to_vec(),
         range_in_bins: 3768_u16.to_be_bytes().to_vec(),
         expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
         ..RadarConfigurationMessage::default()
     };
-    let older = older.configuration().unwrap();
-    let newer = RadarConfigurationMsg {
+    message.configuration().map_err(|error| error.to_string())
+}
+
+fn newer(bin_size: f32) -> Result<Configuration, String> {
+    let message = RadarConfigurationMsg {
         azimuth_samples: 400,
         encoder_size: 5600,
-        bin_size: 438.0,
+        bin_size,
         range_in_bins: 3768,
         expected_rotation_rate: 4000,
         ..RadarConfigurationMsg::default()
     };
-    let newer = newer.configuration().unwrap();
-    assert_eq!(older.range_resolution_m(), 0.0438);
-    assert_eq!(newer.range_resolution_m(), 0.0438);
-    assert_eq!((older.rotation_mhz, newer.rotation_mhz), (4000, 4000));
-    assert_eq!(older.encoder_size, newer.encoder_size);
+    message.configuration().map_err(|error| error.to_string())
+}
+
+#[test]
+fn configurations_of_both_forms_are_the_same() {
+    let (older, newer) = (
+        older(438.0_f64.to_le_bytes()).unwrap(),
+        newer(438.0).unwrap(),
+    );
+    for found in [older, newer] {
+        assert_eq!(found.range_resolution_m(), 0.0438);
+        assert_eq!((found.rotation_mhz, found.encoder_size), (4000, 5600));
+        assert_eq!((found.azimuth_samples, found.range_in_bins), (400, 3768));
+    }
 }
 
 #[test]
@@ -283,24 +290,6 @@ fn depths_of_bins_come_back_to_the_bit() {
 
 #[test]
 fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refused() {
-    let older = |bytes: [u8; 8]| {
-        let message = RadarConfigurationMessage {
-            azimuth_samples: 400_u16.to_be_bytes().to_vec(),
-            encoder_size: 5600_u16.to_be_bytes().to_vec(),
-            bin_size: bytes.to_vec(),
-            range_in_bins: 3768_u16.to_be_bytes().to_vec(),
-            expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
-            ..RadarConfigurationMessage::default()
-        };
-        message.configuration().map_err(|error| error.to_string())
-    };
-    let newer = |bin_size: f32| {
-        let message = RadarConfigurationMsg {
-            bin_size,
-            ..RadarConfigurationMsg::default()
-        };
-        message.configuration().map_err(|error| error.to_string())
-    };
     for (size, depth_m) in [
         (438.0, 0.0438),
         (0.0438, 0.0438),

@@ -66,15 +66,13 @@ pub(crate) fn azimuths(
         Kind::BScans => {
             // The stamp in its header is the radar's.
             let scan: RadarBScanMsg = of(message)?;
-            let rows = scan.rows(radar, *azimuth_offset, message.log_ns);
-            let rows = rows.map_err(|e| e.to_string())?;
+            let rows = scan.rows(radar, *azimuth_offset, message.log_ns)?;
             rows.for_each(|row| each(row.azimuth, row.arrived_ns));
         }
         Kind::Images => {
             let image: Image = of(message)?;
             let received_ns = received_ns(&image.header, message);
-            let rows = image.rows(radar, *azimuth_offset, received_ns);
-            let rows = rows.map_err(|e| e.to_string())?;
+            let rows = image.rows(radar, *azimuth_offset, received_ns)?;
             rows.for_each(|row| each(row.azimuth, row.arrived_ns));
         }
         Kind::Configuration(_) => {}

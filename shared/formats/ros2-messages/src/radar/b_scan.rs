@@ -1,41 +1,10 @@
 //! Messages of one turn.
 
 use gyre_colossus::{Azimuth, Configuration, Powers};
-use thiserror::Error;
 
 use crate::{navtech_msgs::RadarBScanMsg, sensor_msgs::Image};
 
 const SECOND_NS: u64 = 1_000_000_000;
-
-/// A message that is no scan.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum BadScan {
-    #[error("its pixels are `{encoding}`, expected `8UC1` or `mono8`")]
-    Encoding { encoding: String },
-    #[error(
-        "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
-    )]
-    Size {
-        /// Bytes of pixels.
-        bytes: usize,
-        /// Rows.
-        height: u32,
-        /// Bytes of a row.
-        step: u32,
-        /// Columns.
-        width: u32,
-    },
-    #[error(
-        "it has {rows} rows of powers, but {encoders} encoder values and {stamps} times, and needs one of each for a row"
-    )]
-    Rows {
-        /// Rows of the image.
-        rows: usize,
-        /// Encoder values.
-        encoders: usize,
-        stamps: usize,
-    },
-}
 
 /// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,15 +26,16 @@ impl RadarBScanMsg {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = TimedAzimuth<'a>> + 'a, BadScan> {
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'a>> + 'a, String> {
         let image = PowerImage::of(&self.b_scan_img, azimuth_offset)?;
         let (encoders, stamps) = (&self.encoder_values, &self.timestamps);
         if encoders.len() != image.height || stamps.len() != image.height {
-            return Err(BadScan::Rows {
-                rows: image.height,
-                encoders: encoders.len(),
-                stamps: stamps.len(),
-            });
+            return Err(format!(
+                "it has {} rows of powers, but {} encoder values and {} times, and needs one of each for a row",
+                image.height,
+                encoders.len(),
+                stamps.len()
+            ));
         }
         let time = TurnTime::new(radar, arrived_ns);
         let unit_ns = unit_ns(radar, encoders, stamps);
@@ -121,7 +91,7 @@ impl Image {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, BadScan> {
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, String> {
         let image = PowerImage::of(self, azimuth_offset)?;
         let time = TurnTime::new(radar, arrived_ns);
         let encoder_size = u64::from(radar.encoder_size);
@@ -158,30 +128,30 @@ struct PowerImage<'a> {
 }
 
 impl<'a> PowerImage<'a> {
-    fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, BadScan> {
+    fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, String> {
         if !matches!(image.encoding.as_str(), "8UC1" | "mono8") {
-            return Err(BadScan::Encoding {
-                encoding: image.encoding.chars().take(20).collect(),
-            });
+            let encoding: String = image.encoding.chars().take(20).collect();
+            return Err(format!(
+                "its pixels are `{encoding}`, expected `8UC1` or `mono8`"
+            ));
         }
-        let fits = image.width > 0
-            && image.height > 0
-            && image.step >= image.width
-            && u64::from(image.height) * u64::from(image.step) == image.data.len() as u64;
+        let (height, width, step) = (image.height, image.width, image.step);
+        let bytes = image.data.len();
+        let fits = width > 0
+            && height > 0
+            && step >= width
+            && u64::from(height) * u64::from(step) == bytes as u64;
         if !fits {
-            return Err(BadScan::Size {
-                bytes: image.data.len(),
-                height: image.height,
-                step: image.step,
-                width: image.width,
-            });
+            return Err(format!(
+                "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
+            ));
         }
-        let height = image.height as usize;
+        let height = height as usize;
         Ok(Self {
             data: &image.data,
             height,
-            width: image.width as usize,
-            step: image.step as usize,
+            width: width as usize,
+            step: step as usize,
             offset: usize::from(azimuth_offset) % height,
         })
     }
