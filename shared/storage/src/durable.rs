@@ -56,23 +56,28 @@ impl DurableFile {
         self.file.write_at(bytes, slots.offset(slot))
     }
 
-    /// Counts a change that has been made. Waits while [`GroupSync::LIMIT`] are in danger.
-    /// Fails if an earlier synchronisation has failed, because changes may be lost.
+    /// As [`GroupSync::changed`].
     pub fn changed(&self) -> Result<(), StorageError> {
         self.sync.changed()
     }
 
-    /// Waits until all changes that were counted survive a power failure.
-    /// Fails if an earlier synchronisation has failed, because changes may be lost.
+    /// As [`GroupSync::finish`].
     pub fn finish(&self) -> Result<(), StorageError> {
         self.sync.finish()
     }
 
-    /// Returns the number of changes that survive a power failure; `None` until the first
-    /// synchronisation has ended.
+    /// As [`GroupSync::safe`].
     pub fn safe(&self) -> Option<u64> {
         self.sync.safe()
     }
+}
+
+/// Returns whether a file with these first bytes may be one that begins with `magic`: a death or a
+/// power failure leaves a beginning of it, and zeros behind it.
+pub fn may_begin(found: &[u8], magic: &[u8; 16]) -> bool {
+    let bytes = found.iter().zip(magic);
+    let mut other = bytes.skip_while(|(found, magic)| found == magic);
+    other.all(|(found, _)| *found == 0)
 }
 
 /// Places of equal size in a file.

@@ -12,7 +12,6 @@
 //! zeros up to a multiple of four. So the same records are the same file.
 
 mod reader;
-mod records;
 #[cfg(test)]
 mod tests;
 
@@ -25,7 +24,7 @@ use thiserror::Error;
 
 use crate::{Busy, DurableFile, StorageError};
 pub use reader::LogReader;
-use records::{Records, encode};
+use reader::encode;
 
 /// The start of a log: the kind of its records, and their version.
 pub type LogMagic = [u8; 16];
@@ -41,19 +40,12 @@ pub enum LogError {
     Storage(#[from] StorageError),
     #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
     Foreign { path: PathBuf },
+    /// The record of this number, from 0.
     #[error("{path} is damaged at record {record}, although it had been written whole")]
-    Damaged {
-        path: PathBuf,
-        /// The number of the record, from 0.
-        record: usize,
-    },
+    Damaged { path: PathBuf, record: usize },
     /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
-    Malformed {
-        path: PathBuf,
-        /// The number of the record, from 0.
-        record: usize,
-    },
+    Malformed { path: PathBuf, record: usize },
     #[error(transparent)]
     Busy(#[from] Busy),
 }
@@ -62,7 +54,7 @@ pub enum LogError {
 #[derive(Debug)]
 pub struct Log {
     file: DurableFile,
-    records: Records,
+    records: LogReader,
     /// Number of changes that were counted.
     changes: u64,
     /// Their number when the last record was appended.
@@ -75,10 +67,10 @@ impl Log {
     /// failure. Of the others only the headers are read. The contents of the log then survive a
     /// power failure.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
-        let mut records = Records::new(path, magic);
+        let mut records = LogReader::new(path, magic);
         let file = DurableFile::open(path, |file| {
             records.refresh()?;
-            if !records.has_magic() {
+            if !records.has_magic {
                 file.set_length(0)?;
                 file.write_at(&magic, 0)?;
                 records.refresh()?;
@@ -95,20 +87,18 @@ impl Log {
         })
     }
 
-    /// Returns the number of records.
     pub fn len(&self) -> usize {
         self.records.len()
     }
 
-    /// Returns whether there are no records.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.records.is_empty()
     }
 
     /// Allocates the memory for appending records of up to `bytes` bytes: later appends allocate
     /// nothing.
     pub fn reserve(&mut self, bytes: usize) {
-        self.buffer.reserve(bytes + records::MARGIN);
+        self.buffer.reserve(bytes + reader::MARGIN);
         self.records.reserve(MANY);
     }
 

@@ -5,7 +5,7 @@ use std::{collections::VecDeque, path::Path};
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::{Busy, File, GroupSync};
 
-use crate::{JournalError, record::RECORDS, records::Places};
+use crate::{JournalError, Records, record::RECORDS};
 
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;
@@ -30,7 +30,7 @@ pub struct Content {
 /// power failure, and it is cut off with all that follows: those poses are computed again. Else the
 /// file was damaged after it had been written.
 pub fn check(path: &Path) -> Result<Content, JournalError> {
-    let Some(mut places) = Places::open(path)? else {
+    let Some(mut places) = Records::open(path)? else {
         return Ok(Content::default());
     };
     let (mut valid, mut ended) = (0, false);

@@ -8,6 +8,8 @@ use gyre_slam::Record;
 use gyre_storage::LogMagic;
 use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::record::split;
+
 /// The objects at the time of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedObjects {
@@ -87,19 +89,12 @@ impl Record for LoggedObjects {
     }
 
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (fixed, objects) = bytes.split_at_checked(size_of::<Fixed>())?;
-        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        if objects.len() % size_of::<FixedObject>() != 0 {
-            return None;
-        }
-        let objects = objects.chunks_exact(size_of::<FixedObject>());
-        let object =
-            |bytes: &[u8]| Object::from(&bytemuck::pod_read_unaligned::<FixedObject>(bytes));
+        let (fixed, objects) = split::<Fixed, FixedObject>(bytes)?;
         Some(Self {
             seq: fixed.seq,
             scan: fixed.scan,
             stamp_ns: fixed.stamp_ns,
-            objects: objects.map(object).collect(),
+            objects: objects.map(|object| Object::from(&object)).collect(),
         })
     }
 }

@@ -10,6 +10,8 @@ use gyre_slam::{Record, RecordLog, RecordReader, records_path};
 use gyre_storage::{LogError, LogMagic};
 use thiserror::Error;
 
+use crate::record::split;
+
 /// A scan with its pose and its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
@@ -62,29 +64,20 @@ impl Record for LoggedScan {
     const MAGIC: LogMagic = *b"gyre scans 1   \n";
 
     fn encode(&self, bytes: &mut Vec<u8>) {
-        let Twist {
-            vx_mps,
-            vy_mps,
-            yaw_rate_radps,
-        } = self.twist;
+        let twist = &self.twist;
         let fixed = Fixed {
             seq: self.seq,
             scan: self.scan,
             stamp_ns: self.stamp_ns,
             pose: xy_yaw(&self.pose),
-            twist: [vx_mps, vy_mps, yaw_rate_radps],
+            twist: [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps],
         };
         bytes.extend_from_slice(bytemuck::bytes_of(&fixed));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.points));
     }
 
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (fixed, points) = bytes.split_at_checked(size_of::<Fixed>())?;
-        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        if points.len() % size_of::<SparsePoint>() != 0 {
-            return None;
-        }
-        let points = points.chunks_exact(size_of::<SparsePoint>());
+        let (fixed, points) = split::<Fixed, SparsePoint>(bytes)?;
         let ([x, y, yaw], [vx_mps, vy_mps, yaw_rate_radps]) = (fixed.pose, fixed.twist);
         Some(Self {
             seq: fixed.seq,
@@ -96,7 +89,7 @@ impl Record for LoggedScan {
                 vy_mps,
                 yaw_rate_radps,
             },
-            points: points.map(bytemuck::pod_read_unaligned).collect(),
+            points: points.collect(),
         })
     }
 }
@@ -110,7 +103,6 @@ pub enum ScansError {
     Missing {
         path: PathBuf,
         scans: u64,
-        /// The poses of the journal.
         poses: u64,
     },
 }
