@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 use gyre_geometry::SparsePoint;
 use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, MotionEstimate, PoseHeader};
-use gyre_scan_matching::{RefinementConfig, Refiner, TrackerState};
+use gyre_scan_matching::{Keyframe, RefinementConfig, Refiner};
 use nalgebra::{Isometry2, Vector2};
 
 const WINDOW: usize = 8;
@@ -81,72 +81,36 @@ fn step(refinement: &mut Refiner, world: u64, item: u64) {
     );
 }
 
-/// The bits of the whole state of a refiner.
-fn state_bits(refinement: &Refiner) -> Vec<u64> {
-    let pose = |p: &Isometry2<f64>| {
-        [
-            p.translation.x,
-            p.translation.y,
-            p.rotation.re,
-            p.rotation.im,
-        ]
-        .map(f64::to_bits)
+/// The whole state of a refiner to the bit: numbers are printed with all their digits.
+fn state_of(refinement: &Refiner) -> String {
+    let keyframe = |it: &Keyframe| {
+        let images = it.images().map(|(corner, cells)| {
+            let cells: Vec<u8> = cells.iter().copied().collect();
+            (corner, cells)
+        });
+        format!("{} {:?} {:?} {images:?}", it.id, it.pose, it.ahead_m)
     };
-    let tracker: &TrackerState = refinement.state();
-    let mut words = pose(&tracker.pose).to_vec();
-    for anchor in &tracker.anchors {
-        words.push(anchor.is_some().into());
-        if let Some(anchor) = anchor {
-            words.extend(pose(&anchor.pose));
-            words.extend(
-                [
-                    anchor.twist.vx_mps,
-                    anchor.twist.vy_mps,
-                    anchor.twist.yaw_rate_radps,
-                    anchor.age_s,
-                ]
-                .map(f64::to_bits),
-            );
-        }
-    }
-    words.extend([tracker.mean_overlap, tracker.mean_weight].map(f64::to_bits));
-    words.extend([tracker.doubtful, tracker.unmatched].map(u64::from));
-    words.extend([tracker.along_walls, tracker.sliding].map(u64::from));
-    words.extend([tracker.ahead_m.x, tracker.ahead_m.y].map(f64::to_bits));
-    let standstill = &tracker.standstill;
-    words.extend(pose(&standstill.reported));
-    words.extend(pose(&standstill.anchor));
-    words.extend([standstill.time_s, standstill.jitter].map(f64::to_bits));
-    words.extend([standstill.scans, standstill.jitter_scans].map(u64::from));
-    for keyframe in refinement.keyframes() {
-        words.push(keyframe.id);
-        words.extend(pose(&keyframe.pose));
-        words.extend([keyframe.ahead_m.x, keyframe.ahead_m.y].map(f64::to_bits));
-        for (corner, cells) in keyframe.images() {
-            words.extend(corner.iter().map(|v| *v as u64));
-            words.extend(cells.iter().map(|v| u64::from(*v)));
-        }
-    }
-    words
+    let keyframes: Vec<String> = refinement.keyframes().map(keyframe).collect();
+    format!("{:?} {keyframes:?}", refinement.state())
 }
 
 /// The states after the items 0, 1, ... of one process; the state is empty after item 0, where the
 /// chain starts.
-fn history(world: u64, items: u64) -> Vec<Vec<u64>> {
+fn history(world: u64, items: u64) -> Vec<String> {
     let mut refinement = refinement();
-    let mut history = vec![state_bits(&refinement)];
+    let mut history = vec![state_of(&refinement)];
     for item in 1..items {
         step(&mut refinement, world, item);
-        history.push(state_bits(&refinement));
+        history.push(state_of(&refinement));
     }
     history
 }
 
-fn restored(path: &Path, item: u64) -> Result<Vec<u64>, CheckpointError> {
+fn restored(path: &Path, item: u64) -> Result<String, CheckpointError> {
     let mut refinement = refinement();
     open(path)
         .restore(item, &mut refinement)
-        .map(|()| state_bits(&refinement))
+        .map(|()| state_of(&refinement))
 }
 
 /// A folder with the checkpoint of a process of this many items.
@@ -170,19 +134,6 @@ fn every_item_of_the_last_window_is_restored_bit_for_bit() {
                 "item {item} of {items}"
             );
         }
-    }
-}
-
-#[test]
-fn a_restored_process_continues_as_if_it_had_not_ended() {
-    let history = history(1, 40);
-    let (_folder, path) = checkpoint_of(25);
-    for item in [17, 22, 24] {
-        let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-        checkpoint.restore(item, &mut refinement).unwrap();
-        process(&mut refinement, &mut checkpoint, 1, item + 1..40);
-        drop(checkpoint);
-        assert_eq!(state_bits(&refinement), history[39], "from item {item}");
     }
 }
 
@@ -272,7 +223,7 @@ fn the_file_of_another_configuration_is_overwritten() {
     open_with(&path, &other, WINDOW)
         .restore(9, &mut again)
         .unwrap();
-    assert_eq!(state_bits(&again), state_bits(&refinement));
+    assert_eq!(state_of(&again), state_of(&refinement));
     assert!(restored(&path, 9).is_err(), "and vice versa");
 }
 
@@ -285,7 +236,7 @@ fn another_window_continues_with_the_same_file() {
         open_with(&path, &config(), window)
             .restore(25, &mut refinement)
             .unwrap();
-        assert_eq!(state_bits(&refinement), history[25], "window {window}");
+        assert_eq!(state_of(&refinement), history[25], "window {window}");
     }
 }
 
@@ -313,17 +264,6 @@ fn a_missing_item_is_reported_in_one_sentence() {
 }
 
 #[test]
-fn repeated_items_overwrite_earlier_states() {
-    let (_folder, path) = checkpoint_of(21);
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    checkpoint.restore(14, &mut refinement).unwrap();
-    process(&mut refinement, &mut checkpoint, 2, 15..21);
-    drop(checkpoint);
-    assert_eq!(restored(&path, 20).unwrap(), state_bits(&refinement));
-    assert_ne!(state_bits(&refinement), history(1, 21)[20]);
-}
-
-#[test]
 fn keyframes_of_obsolete_items_are_not_restored() {
     let (_folder, path) = checkpoint_of(8);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
@@ -341,7 +281,7 @@ fn keyframes_of_obsolete_items_are_not_restored() {
     }
     drop(checkpoint);
     assert!(refinement.keyframes().all(|keyframe| keyframe.id < 3));
-    assert_eq!(restored(&path, 7).unwrap(), state_bits(&refinement));
+    assert_eq!(restored(&path, 7).unwrap(), state_of(&refinement));
 }
 
 #[test]
@@ -355,7 +295,7 @@ fn a_new_chain_does_not_restore_the_previous_one() {
     let mut checkpoint = open(&path);
     process(&mut refinement, &mut checkpoint, 2, 16..21);
     drop(checkpoint);
-    assert_eq!(restored(&path, 20).unwrap(), state_bits(&refinement));
+    assert_eq!(restored(&path, 20).unwrap(), state_of(&refinement));
 }
 
 /// The pose of an item whose motion moves by so many metres.
@@ -441,7 +381,7 @@ fn a_keyframe_does_not_replace_another_one_of_the_same_scan() {
         .max()
         .unwrap();
     checkpoint.restore(keyframe, &mut refinement).unwrap();
-    let before = state_bits(&refinement);
+    let before = state_of(&refinement);
     refinement.reset();
     step(&mut refinement, 2, keyframe + 1);
     assert!(refinement.keyframes().any(|other| other.id == keyframe));
@@ -449,7 +389,7 @@ fn a_keyframe_does_not_replace_another_one_of_the_same_scan() {
     drop(checkpoint);
     assert_eq!(
         restored(&path, keyframe + 1).unwrap(),
-        state_bits(&refinement)
+        state_of(&refinement)
     );
     assert_eq!(restored(&path, keyframe).unwrap(), before);
 }
