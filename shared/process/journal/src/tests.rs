@@ -199,7 +199,7 @@ fn the_files_of_other_programs_and_versions_are_refused_and_left_as_they_are() {
     let earlier = [&b"gyre journal v9 "[..], &own[MAGIC.len()..]].concat();
     for (theirs, expected) in [
         (&b"something else altogether"[..], "is not a journal"),
-        (&earlier, "of another version"),
+        (&earlier[..], "of another version"),
     ] {
         fs::write(&path, theirs).unwrap();
         for error in [check(&path).err(), Journal::open(&path).err()] {
