@@ -16,9 +16,9 @@ pub(crate) type Synchronise = Arc<dyn Fn(&File) -> io::Result<()> + Send + Sync>
 /// The file of a writer, beside the one that the library writes to.
 pub(crate) struct Disk {
     file: File,
-    synchronise: Synchronise,
+    pub synchronise: Synchronise,
     /// Length of the file up to the last complete table.
-    complete_bytes: u64,
+    pub complete_bytes: u64,
     /// When the oldest chunk that is not synchronised was written.
     unsynchronised: Option<Instant>,
 }
@@ -31,21 +31,6 @@ impl Disk {
             complete_bytes: 0,
             unsynchronised: None,
         }
-    }
-
-    /// Returns the call of an ordinary writer.
-    pub fn synchronises() -> Synchronise {
-        Arc::new(File::sync_data)
-    }
-
-    /// Returns the call for the next part.
-    pub fn synchronise_of_next(&self) -> Synchronise {
-        self.synchronise.clone()
-    }
-
-    /// Returns the length up to the last complete table.
-    pub fn complete_bytes(&self) -> u64 {
-        self.complete_bytes
     }
 
     /// Notes that a table is complete.

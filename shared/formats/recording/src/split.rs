@@ -61,7 +61,7 @@ impl SplitWriter {
 
     /// Returns the file that is being written.
     pub fn path(&self) -> &Path {
-        self.writer.path()
+        &self.writer.path
     }
 
     /// Adds a message, to the next part if this one is full.
