@@ -202,18 +202,45 @@ impl View {
 
 /// Returns what viewers draw of a message beside its image, its points and the trajectory.
 pub fn views(topic: &str, header: &[u8]) -> Vec<View> {
-    let views = match topic {
-        Rotation::TOPIC => read(header).map(rotation),
-        Motion::TOPIC => read(header).map(|header| motion("/motion", &header)),
-        Refined::TOPIC => read(header).map(|header| motion("/refined", &header)),
-        gyre_messages::Pose::TOPIC => read(header).map(integrated),
-        Loop::TOPIC => read(header).map(closed),
-        Correction::TOPIC => read(header).map(correction),
-        Fix::TOPIC => read(header).map(fix),
-        Objects::TOPIC => read(header).map(objects),
-        _ => None,
-    };
-    views.unwrap_or_default()
+    views_of(topic, header).unwrap_or_default()
+}
+
+fn views_of(topic: &str, header: &[u8]) -> Option<Vec<View>> {
+    Some(match topic {
+        Rotation::TOPIC => {
+            let it: RotationHeader = read(header)?;
+            let place = [0.0, 0.0, it.rotation.angle_rad];
+            vec![in_frame("/rotation", PREVIOUS, &it.item, place)]
+        }
+        Motion::TOPIC => vec![motion("/motion", &read(header)?)],
+        Refined::TOPIC => vec![motion("/refined", &read(header)?)],
+        gyre_messages::Pose::TOPIC => {
+            let it: PoseHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![
+                in_frame("/pose", ODOMETRY, &it.item, place),
+                transform("/tf", [ODOMETRY, RADAR], &it.item, place),
+            ]
+        }
+        Loop::TOPIC => {
+            let it: LoopHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![in_frame("/loop", "earlier_keyframe", &it.item, place)]
+        }
+        Correction::TOPIC => {
+            let it: CorrectionHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![transform("/correction", ["map", ODOMETRY], &it.item, place)]
+        }
+        Fix::TOPIC => {
+            let it: FixHeader = read(header)?;
+            it.pose()?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![in_frame("/fix", "earlier_map", &it.item, place)]
+        }
+        Objects::TOPIC => vec![objects(&read(header)?)],
+        _ => return None,
+    })
 }
 
 /// The last poses.
@@ -242,62 +269,22 @@ impl Recent {
     }
 }
 
-fn integrated(header: PoseHeader) -> Vec<View> {
-    let (item, place) = (&header.item, [header.x_m, header.y_m, header.yaw_rad]);
-    vec![
-        in_frame("/pose", ODOMETRY, item, place),
-        transform("/tf", ODOMETRY, RADAR, item, place),
-    ]
-}
-
-fn rotation(header: RotationHeader) -> Vec<View> {
-    let place = [0.0, 0.0, header.rotation.angle_rad];
-    vec![in_frame("/rotation", PREVIOUS, &header.item, place)]
-}
-
-fn motion(channel: &'static str, header: &MotionHeader) -> Vec<View> {
+fn motion(channel: &'static str, header: &MotionHeader) -> View {
     let motion = &header.motion;
     let place = [motion.x_m, motion.y_m, motion.yaw_rad];
-    vec![in_frame(channel, PREVIOUS, &header.item, place)]
-}
-
-fn closed(header: LoopHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    vec![in_frame("/loop", "earlier_keyframe", &header.item, place)]
-}
-
-fn correction(header: CorrectionHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    vec![transform(
-        "/correction",
-        "map",
-        ODOMETRY,
-        &header.item,
-        place,
-    )]
-}
-
-fn fix(header: FixHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    let found = header
-        .pose()
-        .map(|_| in_frame("/fix", "earlier_map", &header.item, place));
-    found.into_iter().collect()
+    in_frame(channel, PREVIOUS, &header.item, place)
 }
 
 /// Returns the objects as one entity, which replaces the entity of the scan before.
-fn objects(header: ObjectsHeader) -> Vec<View> {
+fn objects(header: &ObjectsHeader) -> View {
     let listed = header.list();
+    let moving = listed.iter().filter(|it| it.is_moving());
     let entity = SceneEntity {
         timestamp: Some(timestamp(header.item.stamp_ns)),
         frame_id: ODOMETRY.to_owned(),
         id: Objects::TOPIC.to_owned(),
         cubes: listed.iter().map(cube).collect(),
-        arrows: listed
-            .iter()
-            .filter(|it| it.is_moving())
-            .map(arrow)
-            .collect(),
+        arrows: moving.map(arrow).collect(),
         texts: listed.iter().map(name).collect(),
         ..SceneEntity::default()
     };
@@ -305,15 +292,12 @@ fn objects(header: ObjectsHeader) -> Vec<View> {
         deletions: Vec::new(),
         entities: vec![entity],
     };
-    vec![View::of("/objects", &message)]
+    View::of("/objects", &message)
 }
 
 fn cube(object: &ListedObject) -> CubePrimitive {
     CubePrimitive {
-        pose: Some(lifted(
-            [object.x_m, object.y_m, object.yaw_rad],
-            0.5 * OBJECT_HEIGHT_M,
-        )),
+        pose: lifted(object, object.yaw_rad, 0.5 * OBJECT_HEIGHT_M),
         size: Some(Vector3 {
             x: object.length_m,
             y: object.width_m,
@@ -327,10 +311,7 @@ fn cube(object: &ListedObject) -> CubePrimitive {
 fn arrow(object: &ListedObject) -> ArrowPrimitive {
     let (way_m, heading_rad) = (object.speed_mps(), object.vy_mps.atan2(object.vx_mps));
     ArrowPrimitive {
-        pose: Some(lifted(
-            [object.x_m, object.y_m, heading_rad],
-            OBJECT_HEIGHT_M,
-        )),
+        pose: lifted(object, heading_rad, OBJECT_HEIGHT_M),
         shaft_length: (way_m - ARROW_HEAD_M).max(0.0),
         shaft_diameter: 0.3,
         head_length: ARROW_HEAD_M.min(way_m),
@@ -341,7 +322,7 @@ fn arrow(object: &ListedObject) -> ArrowPrimitive {
 
 fn name(object: &ListedObject) -> TextPrimitive {
     TextPrimitive {
-        pose: Some(lifted([object.x_m, object.y_m, 0.0], OBJECT_HEIGHT_M + 1.0)),
+        pose: lifted(object, 0.0, OBJECT_HEIGHT_M + 1.0),
         billboard: true,
         font_size: 1.2,
         scale_invariant: false,
@@ -359,13 +340,11 @@ fn object_colour(object: &ListedObject, a: f64) -> Color {
     Color { r, g, b, a }
 }
 
-/// A place at a height, m.
-fn lifted(place: [f64; 3], height_m: f64) -> Pose {
-    let pose = pose(place);
-    Pose {
-        position: pose.position.map(|at| Vector3 { z: height_m, ..at }),
-        ..pose
-    }
+/// The place of an object at a height, m.
+fn lifted(object: &ListedObject, yaw_rad: f64, height_m: f64) -> Option<Pose> {
+    let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
+    pose.position.as_mut()?.z = height_m;
+    Some(pose)
 }
 
 fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) -> View {
@@ -377,23 +356,16 @@ fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) ->
     View::of(channel, &message)
 }
 
-fn transform(
-    channel: &'static str,
-    parent: &str,
-    child: &str,
-    item: &Item,
-    place: [f64; 3],
-) -> View {
-    let Pose {
-        position,
-        orientation,
-    } = pose(place);
+/// The pose of the second frame in the first.
+fn transform(channel: &'static str, frames: [&str; 2], item: &Item, place: [f64; 3]) -> View {
+    let [parent_frame_id, child_frame_id] = frames.map(str::to_owned);
+    let pose = pose(place);
     let message = FrameTransform {
         timestamp: Some(timestamp(item.stamp_ns)),
-        parent_frame_id: parent.to_owned(),
-        child_frame_id: child.to_owned(),
-        translation: position,
-        rotation: orientation,
+        parent_frame_id,
+        child_frame_id,
+        translation: pose.position,
+        rotation: pose.orientation,
     };
     View::of(channel, &message)
 }
