@@ -23,8 +23,8 @@ use mcap::{
 };
 
 use crate::RecordingError;
-pub(crate) use parse::parse;
 use parse::{Field, fields};
+pub(crate) use parse::{next, parse};
 
 /// Bytes of opcode and length before each record.
 const PREFIX: u64 = 9;
@@ -174,8 +174,7 @@ impl McapFile {
         if opcode != op::METADATA {
             return Ok(None);
         }
-        let bytes = self.content(span);
-        let bytes = bytes.map_err(|error| RecordingError::io(&self.path, error))?;
+        let bytes = self.content(span)?;
         match parse(opcode, bytes.get(PREFIX as usize..).unwrap_or_default()) {
             Ok(Record::Metadata(record)) => Ok(Some(record)),
             _ => {
@@ -193,8 +192,7 @@ impl McapFile {
             _ => return Ok(None),
         };
         let bytes = span.bytes.min(place.end as u64);
-        let head = self.content(Span { bytes, ..span });
-        let head = head.map_err(|error| RecordingError::io(&self.path, error))?;
+        let head = self.content(Span { bytes, ..span })?;
         let (numbers, _) = head.get(place).unwrap_or_default().as_chunks::<8>();
         let times = numbers.iter().map(|bytes| u64::from_le_bytes(*bytes));
         // A chunk without messages has zeros.
@@ -212,8 +210,7 @@ impl McapFile {
         let read = match span.bytes > MAX_SPAN_BYTES {
             true => Err(McapError::ChunkTooLarge(span.bytes)),
             false => {
-                let bytes = self.content(span);
-                let bytes = bytes.map_err(|error| RecordingError::io(&self.path, error))?;
+                let bytes = self.content(span)?;
                 records::records(&bytes, |record| {
                     self.learn(record, &wanted).map_or(0, |message| {
                         let kept = size_of::<Message>() + message.data.len();
@@ -251,8 +248,8 @@ impl McapFile {
                     && channel.topic.len() <= MAX_NAME_BYTES
                     && !channel.topic.contains(char::is_control) =>
             {
-                let schema = self.schemas.get(&channel.schema_id);
-                let (type_name, schema) = schema.cloned().unwrap_or_default();
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                let (type_name, schema) = schema.unwrap_or_default();
                 let learned = Channel {
                     topic: channel.topic,
                     type_name,
@@ -261,9 +258,8 @@ impl McapFile {
                 };
                 self.channels.insert(channel.id, learned);
             }
-            Record::Message { header, data } => {
-                let channel = self.channels.get(&header.channel_id)?;
-                return wanted(channel).then(|| Message {
+            Record::Message { header, data } if wanted(self.channels.get(&header.channel_id)?) => {
+                return Some(Message {
                     channel: header.channel_id,
                     sequence: header.sequence,
                     log_ns: i64::try_from(header.log_time).unwrap_or(i64::MAX),
@@ -294,10 +290,13 @@ impl McapFile {
     }
 
     /// Reads the bytes of a place, up to the end of the file.
-    fn content(&self, span: Span) -> io::Result<Vec<u8>> {
-        let left = self.file.metadata()?.len().saturating_sub(span.offset);
+    fn content(&self, span: Span) -> Result<Vec<u8>, RecordingError> {
+        let failed = |error| RecordingError::io(&self.path, error);
+        let length = self.file.metadata().map_err(failed)?.len();
+        let left = length.saturating_sub(span.offset);
         let mut bytes = vec![0; left.min(span.bytes) as usize];
-        self.file.read_exact_at(&mut bytes, span.offset)?;
+        let read = self.file.read_exact_at(&mut bytes, span.offset);
+        read.map_err(failed)?;
         Ok(bytes)
     }
 

@@ -58,31 +58,25 @@ impl Head {
         };
         let number = |key: &str| {
             let value = entry(key)?;
-            let invalid = |_| {
-                format!(
-                    "`{key}` of its metadata `{NAME}` is {}, not a number",
-                    quoted(&value)
-                )
-            };
-            value.parse().map_err(invalid)
+            value.parse().map_err(|_| {
+                let value = quoted(&value);
+                format!("`{key}` of its metadata `{NAME}` is {value}, not a number")
+            })
         };
         let format = entry("format")?;
         if format != FORMAT {
+            let format = quoted(&format);
             return Err(format!(
-                "it has format {}, and this version of Gyre reads {FORMAT}",
-                quoted(&format)
+                "it has format {format}, and this version of Gyre reads {FORMAT}"
             ));
         }
         let topics = entry("topics")?;
-        let topics = topics
-            .split(',')
-            .filter(|topic| !topic.is_empty())
-            .map(of_type);
+        let topics = topics.split(',').filter(|topic| !topic.is_empty());
         Ok(Self {
             id: entry("id")?,
             part: number("part")?,
             configuration: entry("configuration")?,
-            topics: topics.collect::<Result<_, _>>()?,
+            topics: topics.map(of_type).collect::<Result<_, _>>()?,
             scan_bytes: number("scan_bytes")?,
             mode: entry("mode")?,
         })
@@ -92,10 +86,8 @@ impl Head {
 /// Returns the topics with the types of their headers.
 fn types(topics: &[String]) -> String {
     let topics = topics.iter().filter_map(|name| topic(name));
-    let types: Vec<String> = topics
-        .map(|topic| format!("{}={}", topic.name, topic.header.name))
-        .collect();
-    types.join(",")
+    let types = topics.map(|topic| format!("{}={}", topic.name, topic.header.name));
+    types.collect::<Vec<String>>().join(",")
 }
 
 /// Returns the topic of this type, which must be the type that this program has.

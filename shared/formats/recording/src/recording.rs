@@ -2,7 +2,6 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    mem,
     path::{Path, PathBuf},
 };
 
@@ -24,12 +23,10 @@ const MAX_ABSENT: usize = 8;
 /// Chunks that are kept in memory: messages of one scan can be in two.
 const KEPT: usize = 2;
 
-/// A wire message as it was recorded.
+/// The bytes of a wire message: of its header, and of its payload that the header describes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stored {
-    /// The bytes of its header.
     pub header: Vec<u8>,
-    /// The bytes of its payload that the header describes.
     pub payload: Vec<u8>,
 }
 
@@ -157,8 +154,8 @@ impl Recording {
 
     /// Returns the file that holds a message; the first one if none does.
     pub fn path_of(&self, topic: &str, seq: u64) -> &Path {
-        let place = self.places.get(topic).and_then(|places| places.get(&seq));
-        &self.parts[place.map_or(0, |place| place.part)].file.path
+        let part = self.place(topic, seq).map_or(0, |place| place.part);
+        &self.parts[part].file.path
     }
 
     /// Returns the numbers of messages that the recorders have counted as missed, by topic. One
@@ -198,25 +195,29 @@ impl Recording {
         parts.find_map(|(number, part)| part.file.damage(number == last))
     }
 
+    fn place(&self, topic: &str, seq: u64) -> Option<Place> {
+        self.places.get(topic)?.get(&seq).copied()
+    }
+
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
-        let place = self.places.get(topic).and_then(|places| places.get(&seq));
-        let Some(place) = place.copied() else {
+        let Some(place) = self.place(topic, seq) else {
             return Err(RecordingError::Absent {
                 path: self.parts[0].file.path.clone(),
                 topic: topic.to_owned(),
                 seq,
             });
         };
-        let damaged = |path: &Path| RecordingError::Damaged {
-            path: path.to_owned(),
-            offset: place.chunk.offset,
-            reason: format!(
-                "it has no complete message {seq} of topic `{topic}`, which its table lists"
-            ),
-        };
         let kept = self.keep(place)?;
         let (messages, file) = (&self.kept[kept].messages, &self.parts[place.part].file);
-        stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| damaged(&file.path))
+        stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| {
+            RecordingError::Damaged {
+                path: file.path.clone(),
+                offset: place.chunk.offset,
+                reason: format!(
+                    "it has no complete message {seq} of topic `{topic}`, which its table lists"
+                ),
+            }
+        })
     }
 
     /// Reads the header of a message.
@@ -265,17 +266,14 @@ impl Part {
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
         let mut is_first = true;
         while let Some((opcode, span)) = part.file.next_record()? {
-            match opcode {
-                // Behind the end are the channels again, for a file whose first chunk is damaged.
-                op::SCHEMA | op::CHANNEL => part.learn_channels(span)?,
-                op::CHUNK => {
-                    // The first one has the channels.
-                    if mem::take(&mut is_first) {
-                        part.learn_channels(span)?;
-                    }
-                    chunk = Some(span);
-                }
-                _ => {}
+            let is_chunk = opcode == op::CHUNK;
+            // The first chunk has the channels, and behind the end they are again, for a file whose
+            // first chunk is damaged.
+            if matches!(opcode, op::SCHEMA | op::CHANNEL) || (is_chunk && is_first) {
+                part.learn_channels(span)?;
+            }
+            if is_chunk {
+                (is_first, chunk) = (false, Some(span));
             }
             let Some(record) = part.file.metadata(opcode, span)? else {
                 continue;
@@ -331,10 +329,8 @@ fn stored(
     entry: &Entry,
 ) -> Option<Stored> {
     let on = |message: &Message, channel: &str| {
-        let is_named = channels
-            .get(&message.channel)
-            .is_some_and(|it| it.topic == channel);
-        is_named && message.sequence == entry.seq as u32
+        let of = channels.get(&message.channel);
+        of.is_some_and(|it| it.topic == channel) && message.sequence == entry.seq as u32
     };
     let (exact, bytes) = (exact_channel(name), topic(name)?.header.bytes);
     // A reassigned number may occur twice in a chunk.

@@ -56,36 +56,23 @@ pub(crate) struct Table {
 
 impl Table {
     pub fn to_metadata(&self) -> Metadata {
-        let row = |entries: &Vec<Entry>| {
+        let mut metadata = BTreeMap::new();
+        for (topic, entries) in &self.entries {
             let mut row = String::new();
-            for Entry {
-                seq,
-                scan,
-                stamp_ns,
-                generation,
-                numbered_from,
-            } in entries
-            {
-                let _ = write!(row, "{seq}:{scan}:{stamp_ns}");
-                if *generation > 0 {
-                    let _ = write!(row, ":{generation}:{numbered_from}");
+            for it in entries {
+                let _ = write!(row, "{}:{}:{}", it.seq, it.scan, it.stamp_ns);
+                if it.generation > 0 {
+                    let _ = write!(row, ":{}:{}", it.generation, it.numbered_from);
                 }
                 row.push(' ');
             }
-            row
-        };
-        let entries = self
-            .entries
-            .iter()
-            .map(|(topic, it)| (topic.clone(), row(it)));
-        let missed = self
-            .missed
-            .iter()
-            .map(|(topic, missed)| (format!("{MISSED}{topic}"), missed.to_string()));
-        Metadata {
-            name: NAME.to_owned(),
-            metadata: entries.chain(missed).collect(),
+            metadata.insert(topic.clone(), row);
         }
+        for (topic, missed) in &self.missed {
+            metadata.insert(format!("{MISSED}{topic}"), missed.to_string());
+        }
+        let name = NAME.to_owned();
+        Metadata { name, metadata }
     }
 
     /// Returns whether a record is a table, be it a damaged one.
