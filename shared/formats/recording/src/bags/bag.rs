@@ -121,10 +121,7 @@ impl Bag {
             Err(RecordingError::Damaged { .. }) => Vec::new(),
             read => read?,
         };
-        if messages
-            .iter()
-            .any(|message| message.data.starts_with(&ZSTD))
-        {
+        if messages.iter().any(|it| it.data.starts_with(&ZSTD)) {
             return Err(compressed(&self.files[placed.file].path));
         }
         let key = |(number, message): (u32, Message)| {
@@ -142,12 +139,9 @@ impl Bag {
     ) -> Result<(), RecordingError> {
         let mut waiting = BTreeMap::new();
         for span in 0..=self.spans.len() as u32 {
-            let ns = self
-                .spans
-                .get(span as usize)
-                .map_or(i64::MAX, |it| it.from_ns);
+            let placed = self.spans.get(span as usize);
             let next = Key {
-                ns,
+                ns: placed.map_or(i64::MAX, |it| it.from_ns),
                 span,
                 number: 0,
             };
@@ -179,28 +173,36 @@ impl Bag {
             Some(Ok(own)) => own.radar.encoder_size,
             _ => ENCODER_COUNTS,
         };
-        let shown = survey.other_counts(usual, matches!(own, Some(Ok(_))));
+        let is_own = matches!(own, Some(Ok(_)));
+        let shown = survey.other_counts(usual, is_own);
         let (size, counts) = match (options.encoder_counts, shown) {
             (Some(size), _) => (size, CountsOrigin::Configured),
             (None, Some(size)) => (size, CountsOrigin::Azimuths { usual }),
             (None, None) => (usual, CountsOrigin::Usual),
         };
-        if let Some(Ok(mut described)) = own {
-            described.radar.encoder_size = size;
-            let radar = RadarOrigin::Itself;
-            return Ok((described, Origin { radar, counts }));
+        let mut origin = Origin {
+            is_own,
+            refused: None,
+            counts,
+        };
+        let resolution_m = options.range_resolution_m;
+        match own {
+            Some(Ok(mut described)) => {
+                described.radar.encoder_size = size;
+                return Ok((described, origin));
+            }
+            Some(Err(reason)) if resolution_m.is_none() => {
+                let reason = format!(
+                    "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
+                     dataset.range_resolution_m"
+                );
+                return Err(RecordingError::unreadable(&self.path, reason));
+            }
+            Some(Err(reason)) => origin.refused = Some(reason),
+            None => {}
         }
-        let refused = own.and_then(Result::err);
-        if let (Some(reason), None) = (&refused, options.range_resolution_m) {
-            let reason = format!(
-                "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
-                 dataset.range_resolution_m"
-            );
-            return Err(RecordingError::unreadable(&self.path, reason));
-        }
-        let described = survey.describe(&self.path, options.range_resolution_m, size)?;
-        let radar = RadarOrigin::Scans { refused };
-        Ok((described, Origin { radar, counts }))
+        let described = survey.describe(&self.path, resolution_m, size)?;
+        Ok((described, origin))
     }
 
     /// Looks at the first messages with scans, and for the first configuration that can be used, or
@@ -235,16 +237,14 @@ impl Bag {
     ) -> Option<OwnDescription> {
         let topic = topics.configuration.as_ref()?;
         let channel = self.file_of(span)?.channels.get(&message.channel)?;
-        match topic.kind {
-            Kind::Configuration(form) if channel.topic == topic.name => {
-                let described = described(form, message);
-                Some(described.and_then(|described| {
-                    let checked = described.radar.check();
-                    checked.map(|()| described).map_err(|e| e.to_string())
-                }))
-            }
-            _ => None,
-        }
+        let Kind::Configuration(form) = topic.kind else {
+            return None;
+        };
+        (channel.topic == topic.name).then(|| {
+            let described = described(form, message)?;
+            let checked = described.radar.check();
+            checked.map(|()| described).map_err(|e| e.to_string())
+        })
     }
 }
 
@@ -287,19 +287,11 @@ fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), Re
 
 /// The sources of the description of a radar.
 pub(crate) struct Origin {
-    pub radar: RadarOrigin,
+    /// True if it is the radar's own description, false if it follows from azimuths and options.
+    pub is_own: bool,
+    /// Why its own description cannot be used, if there is one.
+    pub refused: Option<String>,
     pub counts: CountsOrigin,
-}
-
-/// The source of azimuths, bins and rotation.
-pub(crate) enum RadarOrigin {
-    /// The radar's own description.
-    Itself,
-    /// Found from azimuths and options.
-    Scans {
-        /// Why its own cannot be used, if there is one.
-        refused: Option<String>,
-    },
 }
 
 /// The source of the encoder counts per turn.

@@ -3,16 +3,18 @@
 use std::path::Path;
 
 use gyre_datasets::OpenError;
-use gyre_ros2_messages::{decode, sensor_msgs::NavSatFix};
+use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use gyre_samples::{BagFixes, RawFix};
 
-use crate::bags::{Message, RecordingError, bag::Bag, files::files, sensors::Sensor};
+use crate::bags::{RecordingError, azimuths::of, bag::Bag, files::files, sensors::Sensor};
 
 /// A message has a fix, or reports that there is no fix.
 const RECEIVER: Sensor<Option<RawFix>> = Sensor {
     section: "gnss",
     measurements: "fixes of a GNSS receiver",
-    types: &[("sensor_msgs/msg/NavSatFix", fix)],
+    types: &[("sensor_msgs/msg/NavSatFix", |it| {
+        Ok(of::<NavSatFix>(it)?.fix(it.log_ns))
+    })],
 };
 
 /// Reads the fixes of a bag without its scans, on the topic of this name, else on the only topic of
@@ -38,9 +40,4 @@ pub(crate) fn read(
         without_fix: messages - fixes.len(),
         fixes,
     }))
-}
-
-fn fix(message: &Message) -> Result<Option<RawFix>, String> {
-    let fix: NavSatFix = decode(&message.data).map_err(|error| error.to_string())?;
-    Ok(fix.fix(message.log_ns))
 }

@@ -3,7 +3,7 @@
 use super::index::Index;
 use crate::bags::{
     azimuths::Described,
-    bag::{Bag, CountsOrigin, Origin, RadarOrigin},
+    bag::{Bag, CountsOrigin, Origin},
     topics::Topics,
 };
 
@@ -29,34 +29,23 @@ fn of_radar(described: &Described, origin: &Origin) -> String {
         "{} azimuths of {} bins",
         radar.azimuth_samples, radar.range_in_bins
     );
-    let (found, itself) = match &origin.radar {
-        RadarOrigin::Itself => (format!(", {found} as the radar says of itself"), true),
-        RadarOrigin::Scans { refused: None } => (
-            format!("; the radar does not describe itself in the bag: {found} are as found"),
-            false,
-        ),
-        RadarOrigin::Scans {
-            refused: Some(reason),
-        } => (
-            format!(
-                "; what the radar says of itself cannot be used ({reason}): {found} are as found"
-            ),
-            false,
+    let found = match &origin.refused {
+        _ if origin.is_own => format!(", {found} as the radar says of itself"),
+        None => {
+            format!("; the radar does not describe itself in the bag: {found} are as found")
+        }
+        Some(reason) => format!(
+            "; what the radar says of itself cannot be used ({reason}): {found} are as found"
         ),
     };
+    let said = if origin.is_own { " as it says" } else { "" };
     let counts = match origin.counts {
         CountsOrigin::Configured => " as configured".to_owned(),
-        CountsOrigin::Usual if itself => " as it says too".to_owned(),
+        CountsOrigin::Usual if origin.is_own => " as it says too".to_owned(),
         CountsOrigin::Usual => " as most radars have".to_owned(),
-        CountsOrigin::Azimuths { usual } => {
-            let usual = match itself {
-                true => format!(", not {usual} as it says"),
-                false => format!(", not {usual}"),
-            };
-            format!(
-                "{usual}: with these the step from the last azimuth to the first is as the others"
-            )
-        }
+        CountsOrigin::Azimuths { usual } => format!(
+            ", not {usual}{said}: with these the step from the last azimuth to the first is as the others"
+        ),
     };
     let size = radar.encoder_size;
     format!("{found}, {size} encoder counts per turn{counts}")
