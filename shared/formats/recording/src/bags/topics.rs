@@ -85,22 +85,40 @@ impl Topics {
     ) -> Result<Self, RecordingError> {
         let topics: BTreeSet<Topic> = channels.iter().filter_map(|c| Topic::of(c)).collect();
         let candidates = candidates(&topics, wished);
+        let refuse = |reason: String| Err(RecordingError::unreadable(path, reason));
         let scans = match (&candidates[..], wished) {
             ([one], _) => (*one).clone(),
-            ([], Some(wished)) => return Err(no_such_topic(path, &topics, wished)),
-            ([], None) => return Err(no_scans(path, channels)),
-            (several, _) => return Err(ambiguous(path, several)),
+            ([], Some(wished)) => {
+                let all = topics.iter().filter(|topic| topic.has_scans());
+                return refuse(format!(
+                    "has no scans on the topic {wished} (dataset.topic), but on: {}",
+                    names(all.map(|topic| topic.name.as_str()))
+                ));
+            }
+            ([], None) if channels.is_empty() => {
+                return refuse(
+                    "has no topics: it is empty, or damaged from its beginning".to_owned(),
+                );
+            }
+            ([], None) => {
+                return refuse(format!(
+                    "has no scans of a radar: none of its topics ({}) is of a type of Navtech's driver (RadarFftDataMsg, RadarBScanMsg)",
+                    names(channels.iter().map(|channel| channel.topic.as_str()))
+                ));
+            }
+            ([first, ..], _) => {
+                return refuse(format!(
+                    "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
+                    names(candidates.iter().map(|topic| topic.name.as_str())),
+                    first.name
+                ));
+            }
         };
-        let used = channels
-            .iter()
-            .filter(|channel| channel.topic == scans.name);
-        if let Some(channel) = used.into_iter().find(|channel| channel.encoding != "cdr") {
-            let encoding = quoted(&channel.encoding);
-            let reason = format!(
-                "has the messages of {} as {encoding}, expected `cdr`",
-                scans.name
-            );
-            return Err(RecordingError::unreadable(path, reason));
+        let mut used = channels.iter().filter(|it| it.topic == scans.name);
+        if let Some(channel) = used.find(|channel| channel.encoding != "cdr") {
+            let (name, encoding) = (&scans.name, quoted(&channel.encoding));
+            let reason = format!("has the messages of {name} as {encoding}, expected `cdr`");
+            return refuse(reason);
         }
         let near = |topic: &&Topic| common_prefix(&topic.name, &scans.name);
         let configurations = topics.iter().filter(|topic| !topic.has_scans());
@@ -147,35 +165,6 @@ fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     }
     let listed: Vec<&str> = names.into_iter().collect();
     listed.join(", ") + if more { ", ..." } else { "" }
-}
-
-fn no_scans(path: &Path, channels: &[&Channel]) -> RecordingError {
-    let reason = match channels.is_empty() {
-        true => "has no topics: it is empty, or damaged from its beginning".to_owned(),
-        false => format!(
-            "has no scans of a radar: none of its topics ({}) is of a type of Navtech's driver (RadarFftDataMsg, RadarBScanMsg)",
-            names(channels.iter().map(|channel| channel.topic.as_str()))
-        ),
-    };
-    RecordingError::unreadable(path, reason)
-}
-
-fn no_such_topic(path: &Path, topics: &BTreeSet<Topic>, wished: &str) -> RecordingError {
-    let all = topics.iter().filter(|topic| topic.has_scans());
-    let reason = format!(
-        "has no scans on the topic {wished} (dataset.topic), but on: {}",
-        names(all.map(|topic| topic.name.as_str()))
-    );
-    RecordingError::unreadable(path, reason)
-}
-
-fn ambiguous(path: &Path, several: &[&Topic]) -> RecordingError {
-    let reason = format!(
-        "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
-        names(several.iter().map(|topic| topic.name.as_str())),
-        several[0].name
-    );
-    RecordingError::unreadable(path, reason)
 }
 
 #[cfg(test)]

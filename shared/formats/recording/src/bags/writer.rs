@@ -66,26 +66,21 @@ impl BagWriter {
         require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let aside = path.with_file_name(format!(".{name}.tmp"));
-        let is_file = path
-            .extension()
-            .is_some_and(|extension| extension == "mcap");
+        let is_file = path.extension().is_some_and(|it| it == "mcap");
         let file_name = (!is_file).then(|| format!("{name}_0.mcap"));
-        if let Some(parent) = path
-            .parent()
-            .filter(|parent| !parent.as_os_str().is_empty())
-        {
-            fs::create_dir_all(parent).map_err(|e| unwritable(path, e.to_string()))?;
+        let failed = |error: io::Error| unwritable(path, error);
+        let parent = path.parent().unwrap_or(Path::new(""));
+        if !parent.as_os_str().is_empty() {
+            fs::create_dir_all(parent).map_err(failed)?;
         }
         let file = match &file_name {
             None => aside.clone(),
             Some(name) => aside.join(name),
         };
-        let file = create_aside(&aside, &file)
-            .map_err(|error| unwritable(path, error.to_string()))?
-            .ok_or_else(|| {
-                let reason = "another command is writing it; wait for that, or give another name";
-                unwritable(path, reason.to_owned())
-            })?;
+        let Some(file) = create_aside(&aside, &file).map_err(failed)? else {
+            let reason = "another command is writing it; wait for that, or give another name";
+            return Err(unwritable(path, reason));
+        };
         // Another command may have come to its end meanwhile.
         require_new(path)?;
         let options = WriteOptions::new()
@@ -100,7 +95,7 @@ impl BagWriter {
             path: path.to_owned(),
             aside,
             file_name,
-            mcap: mcap.map_err(|error| unwritable(path, error.to_string()))?,
+            mcap: mcap.map_err(|error| unwritable(path, error))?,
             topics: Vec::new(),
             times: None,
             committed: false,
@@ -121,7 +116,7 @@ impl BagWriter {
         };
         let channel = self
             .add_channel(&described, &definition.text())
-            .map_err(|error| unwritable(&self.path, error.to_string()))?;
+            .map_err(|error| unwritable(&self.path, error))?;
         self.topics.push(Written { channel, described });
         Ok(Topic {
             index: self.topics.len() - 1,
@@ -158,9 +153,8 @@ impl BagWriter {
         written.described.messages += 1;
         let (first, last) = self.times.unwrap_or((log_ns, log_ns));
         self.times = Some((first.min(log_ns), last.max(log_ns)));
-        self.mcap
-            .write_to_known_channel(&header, &data)
-            .map_err(|error| unwritable(&self.path, error.to_string()))
+        let written = self.mcap.write_to_known_channel(&header, &data);
+        written.map_err(|error| unwritable(&self.path, error))
     }
 
     /// Returns the names of the topics, and how many messages each has.
@@ -172,26 +166,28 @@ impl BagWriter {
     /// Ends the bag, and gives it its name.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
-        let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
-        self.mcap.finish().map_err(|error| failed(&error))?;
+        let failed = |error: io::Error| unwritable(&path, error);
+        self.mcap
+            .finish()
+            .map_err(|error| unwritable(&path, error))?;
         let mut files = Vec::new();
         if let Some(file) = &self.file_name {
             let topics: Vec<&Described> = self.topics.iter().map(|t| &t.described).collect();
             let text = metadata::text(file, &topics, self.times);
             let description = self.aside.join(METADATA);
-            fs::write(&description, text).map_err(|error| failed(&error))?;
+            fs::write(&description, text).map_err(failed)?;
             files.extend([self.aside.join(file), description]);
         }
         // A power failure leaves no name of a bag without its content.
         files.push(self.aside.clone());
         for file in files {
             let synchronised = File::open(file).and_then(|file| file.sync_all());
-            synchronised.map_err(|error| failed(&error))?;
+            synchronised.map_err(failed)?;
         }
-        fs::rename(&self.aside, &self.path).map_err(|error| failed(&error))?;
+        fs::rename(&self.aside, &self.path).map_err(failed)?;
         self.committed = true;
         let folder = self.path.parent().map_or(Ok(()), gyre_storage::sync_folder);
-        folder.map_err(|error| failed(&error))
+        folder.map_err(|error| unwritable(&path, error))
     }
 }
 
@@ -225,11 +221,9 @@ fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
 }
 
 fn require_new(path: &Path) -> Result<(), RecordingError> {
+    let there = "it exists; remove it, or give another name";
     match path.exists() {
-        true => Err(unwritable(
-            path,
-            "it exists; remove it, or give another name".to_owned(),
-        )),
+        true => Err(unwritable(path, there)),
         false => Ok(()),
     }
 }
@@ -239,9 +233,9 @@ fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }
 
-fn unwritable(path: &Path, reason: String) -> RecordingError {
+fn unwritable(path: &Path, reason: impl ToString) -> RecordingError {
     RecordingError::Unwritable {
         path: path.to_owned(),
-        reason,
+        reason: reason.to_string(),
     }
 }
