@@ -121,7 +121,9 @@ impl McapFile {
         let file = gyre_storage::open(path).map_err(failed)?;
         let bytes = file.metadata().map_err(failed)?.len();
         if number(&file, 0).map_err(failed)?.to_le_bytes() != MAGIC {
-            return Err(RecordingError::NoMcap(path.to_owned()));
+            let reason = "does not begin with the signature of MCAP: it is another file, or was not copied whole";
+            let path = path.display();
+            return Err(RecordingError::Other(format!("{path} {reason}")));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -224,11 +226,7 @@ impl McapFile {
             Ok(()) => Ok(messages),
             Err(error) => {
                 self.damage.insert(span.offset);
-                Err(RecordingError::Damaged {
-                    path: self.path.clone(),
-                    offset: span.offset,
-                    reason: error.to_string(),
-                })
+                Err(RecordingError::damaged(&self.path, span.offset, error))
             }
         }
     }
@@ -457,7 +455,8 @@ mod tests {
     fn other_files_are_refused() {
         for content in [&b"\x89PNG\r\n"[..], b""] {
             let refused = opened(content, content.len() as u64).unwrap_err();
-            assert!(matches!(refused, RecordingError::NoMcap(_)));
+            let refused = refused.to_string();
+            assert!(refused.contains("signature of MCAP"), "{refused}");
         }
     }
 }

@@ -8,6 +8,8 @@ use mcap::records::Metadata;
 
 /// The name of the record.
 const NAME: &str = "gyre.recording";
+/// The reason against a file without it.
+pub(crate) const NO_HEAD: &str = "it has no metadata `gyre.recording`";
 /// The version of everything that this crate writes beside the wire messages, which carry versions
 /// of their own.
 const FORMAT: &str = "1";

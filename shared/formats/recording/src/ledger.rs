@@ -92,10 +92,7 @@ impl Ledger {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        RecordingError::Io {
-            path: self.0.clone(),
-            source,
-        }
+        RecordingError::io(&self.0, source)
     }
 }
 

@@ -112,18 +112,16 @@ fn open_parts(
 
 /// Returns the options of the recorded run: the section `[dataset]` of its configuration.
 fn recorded_options(recording: &Recording) -> Result<DatasetOptions, OpenError> {
-    let invalid = |reason: String| {
+    let invalid = |error: toml::de::Error| {
+        let reason = error.message();
         OpenError::Recording(format!(
             "the configuration in the recording is not one of Gyre: {reason}"
         ))
     };
-    let table: Result<toml::Table, _> = recording.head().configuration.parse();
-    let mut table = table.map_err(|error| invalid(error.message().to_owned()))?;
-    let section = table
-        .remove("dataset")
-        .unwrap_or_else(|| toml::Table::new().into());
-    let options: Result<DatasetOptions, _> = section.try_into();
-    let options = options.map_err(|error: toml::de::Error| invalid(error.message().to_owned()))?;
+    let mut table: toml::Table = recording.head().configuration.parse().map_err(invalid)?;
+    let section = table.remove("dataset");
+    let section = section.unwrap_or_else(|| toml::Table::new().into());
+    let options: DatasetOptions = section.try_into().map_err(invalid)?;
     Ok(DatasetOptions {
         format: Some(Format::Mcap),
         ..options

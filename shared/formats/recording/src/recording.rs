@@ -13,6 +13,7 @@ use crate::{
     Entry, Head, RecordingError, exact_channel,
     file::{Channel, McapFile, Message, Span},
     generations::{self, Generations},
+    head::NO_HEAD,
     image::{Rows, read},
     table::Table,
     view::image_channel,
@@ -90,10 +91,8 @@ impl Recording {
                 false => recording.left_out.push(path.clone()),
             }
         }
-        recording.ok_or_else(|| RecordingError::Io {
-            path: PathBuf::new(),
-            source: std::io::ErrorKind::NotFound.into(),
-        })
+        let none = std::io::ErrorKind::NotFound.into();
+        recording.ok_or_else(|| RecordingError::io(Path::new(""), none))
     }
 
     /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:
@@ -201,22 +200,18 @@ impl Recording {
 
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
         let Some(place) = self.place(topic, seq) else {
-            return Err(RecordingError::Absent {
-                path: self.parts[0].file.path.clone(),
-                topic: topic.to_owned(),
-                seq,
-            });
+            let path = self.parts[0].file.path.display();
+            return Err(RecordingError::Other(format!(
+                "{path} has no message {seq} of topic `{topic}`: the recorder missed it, or the topic was not among its --topics"
+            )));
         };
         let kept = self.keep(place)?;
         let (messages, file) = (&self.kept[kept].messages, &self.parts[place.part].file);
         stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| {
-            RecordingError::Damaged {
-                path: file.path.clone(),
-                offset: place.chunk.offset,
-                reason: format!(
-                    "it has no complete message {seq} of topic `{topic}`, which its table lists"
-                ),
-            }
+            let reason = format!(
+                "it has no complete message {seq} of topic `{topic}`, which its table lists"
+            );
+            RecordingError::damaged(&file.path, place.chunk.offset, reason)
         })
     }
 
@@ -227,9 +222,9 @@ impl Recording {
         seq: u64,
     ) -> Result<H, RecordingError> {
         let stored = self.read(topic, seq)?;
-        read(&stored.header).ok_or_else(|| RecordingError::Foreign {
-            path: self.path_of(topic, seq).to_owned(),
-            reason: format!("its messages of topic `{topic}` are of another version"),
+        read(&stored.header).ok_or_else(|| {
+            let reason = format!("its messages of topic `{topic}` are of another version");
+            RecordingError::foreign(self.path_of(topic, seq), reason)
         })
     }
 
@@ -279,7 +274,7 @@ impl Part {
                 continue;
             };
             if let Some(read) = Head::of_metadata(&record) {
-                head = Some(read.map_err(|reason| part.foreign(reason))?);
+                head = Some(read.map_err(|reason| RecordingError::foreign(path, reason))?);
             } else if let Some(skipped) = generations::of_metadata(&record) {
                 part.skipped.push(skipped);
             } else if let Some(table) = Table::of_metadata(&record) {
@@ -292,14 +287,9 @@ impl Part {
                 part.file.damage.insert(span.offset);
             }
         }
-        let reason = "it has no metadata `gyre.recording`".to_owned();
         let head: Head = head.ok_or_else(|| match part.file.damage.first() {
-            None => part.foreign(reason),
-            Some(offset) => RecordingError::Damaged {
-                path: part.file.path.clone(),
-                offset: *offset,
-                reason,
-            },
+            None => RecordingError::foreign(path, NO_HEAD),
+            Some(offset) => RecordingError::damaged(path, *offset, NO_HEAD),
         })?;
         part.number = head.part;
         Ok((head, part, places))
@@ -308,15 +298,8 @@ impl Part {
     /// Learns the channels in a place, unless it is damaged.
     fn learn_channels(&mut self, span: Span) -> Result<(), RecordingError> {
         match self.file.read(span, |_| false) {
-            Err(RecordingError::Damaged { .. }) => Ok(()),
+            Err(RecordingError::Damaged(_)) => Ok(()),
             read => read.map(drop),
-        }
-    }
-
-    fn foreign(&self, reason: String) -> RecordingError {
-        RecordingError::Foreign {
-            path: self.file.path.clone(),
-            reason,
         }
     }
 }

@@ -11,7 +11,7 @@ use gyre_messages::{Message, Scan, ScanHeader};
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
-use crate::{Entry, Recording, RecordingError, Stored, image::read};
+use crate::{Entry, Recording, Stored, image::read};
 
 /// Scans of a drive of months; a larger number in a table is damaged.
 const MAX_SCANS: u64 = 50_000_000;
@@ -233,7 +233,7 @@ impl Dataset for Scans {
         let stored = self
             .recording
             .read(Scan::TOPIC, entry.seq)
-            .map_err(|error| failed(&path, error))?;
+            .map_err(|error| error.of_scan(&path))?;
         let damaged = || ReadError::Damaged {
             path: path.clone(),
             reason: format!("scan {index} does not fit its header and its table"),
@@ -278,16 +278,4 @@ fn copy<T: Copy>(from: &[T], to: &mut [T], what: &'static str) -> Result<(), Rea
     })?;
     to.copy_from_slice(from);
     Ok(())
-}
-
-/// A file that the disk does not give may be read later; a damaged one may not.
-fn failed(path: &Path, error: RecordingError) -> ReadError {
-    let path = path.to_owned();
-    match error {
-        RecordingError::Io { source, .. } => ReadError::Io { path, source },
-        other => ReadError::Damaged {
-            path,
-            reason: other.to_string(),
-        },
-    }
 }

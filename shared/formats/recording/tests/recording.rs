@@ -13,8 +13,8 @@ use gyre_datasets::{DatasetOptions, ReadError};
 use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::OwnedScan;
 use gyre_recording::{
-    Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
-    SplitWriter, file::McapFile, open, open_recording,
+    Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
+    file::McapFile, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record, op};
 
@@ -132,7 +132,7 @@ fn messages_are_read_byte_for_byte_and_what_was_missed_is_known() {
     }
     assert_eq!(recording.missed(), [("pose", 2 * SCANS)].into());
     let absent = recording.read("scan", SCANS);
-    assert!(matches!(absent, Err(RecordingError::Absent { .. })));
+    assert!(absent.unwrap_err().to_string().contains("missed it"));
     assert!(
         RecordingWriter::create(&path, &head("a", 1)).is_err(),
         "it is there"
@@ -337,7 +337,7 @@ fn a_number_that_was_given_anew_has_its_newest_message() {
     let stored = recording.read("motion", 2).unwrap();
     assert_eq!(stored.header, of(2, 2, 2, 14).header);
     let absent = recording.read("motion", 4);
-    assert!(matches!(absent, Err(RecordingError::Absent { .. })));
+    assert!(absent.unwrap_err().to_string().contains("missed it"));
 }
 
 #[test]

@@ -118,7 +118,7 @@ impl Bag {
             return Ok(Vec::new());
         };
         let messages = match self.files[placed.file].read(placed.span, wanted) {
-            Err(RecordingError::Damaged { .. }) => Vec::new(),
+            Err(RecordingError::Damaged(_)) => Vec::new(),
             read => read?,
         };
         if messages.iter().any(|it| it.data.starts_with(&ZSTD)) {

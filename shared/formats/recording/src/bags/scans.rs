@@ -272,13 +272,7 @@ impl Dataset for Scans {
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
         check_capacity(self.limits(), &slot)?;
         let path = self.file(index).to_owned();
-        let failed = |error| match error {
-            RecordingError::Io { path, source } => ReadError::Io { path, source },
-            error => ReadError::Damaged {
-                path: path.clone(),
-                reason: error.to_string(),
-            },
-        };
+        let failed = |error: RecordingError| error.of_scan(&path);
         if entry.is_damaged {
             let reason = self.why_damaged(&entry).map_err(failed)?;
             return Err(ReadError::Message {

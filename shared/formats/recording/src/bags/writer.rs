@@ -4,6 +4,7 @@ mod metadata;
 
 use std::{
     collections::BTreeMap,
+    fmt::Display,
     fs::{self, File},
     io::{self, BufWriter},
     marker::PhantomData,
@@ -141,7 +142,8 @@ impl BagWriter {
         log_ns: i64,
         message: &T,
     ) -> Result<(), RecordingError> {
-        let data = encode(message)?;
+        let data = encode(message)
+            .map_err(|error| RecordingError::Other(format!("cannot write a message: {error}")))?;
         let written = &mut self.topics[topic.index];
         let time = u64::try_from(log_ns).unwrap_or_default();
         let header = MessageHeader {
@@ -233,9 +235,6 @@ fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }
 
-fn unwritable(path: &Path, reason: impl ToString) -> RecordingError {
-    RecordingError::Unwritable {
-        path: path.to_owned(),
-        reason: reason.to_string(),
-    }
+fn unwritable(path: &Path, reason: impl Display) -> RecordingError {
+    RecordingError::Other(format!("cannot write {}: {reason}", path.display()))
 }
