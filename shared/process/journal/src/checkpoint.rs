@@ -21,7 +21,7 @@ use std::{
 };
 
 use gyre_messages::{MotionEstimate, PoseHeader};
-use gyre_scan_matching::{Keyframe, Refiner, TrackerState};
+use gyre_scan_matching::{Refiner, TrackerState};
 use gyre_storage::{Busy, DurableFile, File, GroupSync, Slots, StorageError};
 use thiserror::Error;
 
@@ -56,11 +56,7 @@ pub enum CheckpointError {
     #[error(
         "{path} does not have the state of the refinement before item {item}: start again with --fresh"
     )]
-    Missing {
-        path: PathBuf,
-        /// The item whose state is missing.
-        item: u64,
-    },
+    Missing { path: PathBuf, item: u64 },
     #[error(transparent)]
     Busy(#[from] Busy),
 }
@@ -77,7 +73,10 @@ pub struct Checkpoint {
     /// keyframes of the state before it.
     map: Vec<Name>,
     earlier_map: Vec<Name>,
-    buffers: Buffers,
+    /// Memory for the slot of a state, for the one that is in the file, and for a keyframe's.
+    state: Vec<u8>,
+    found: Vec<u8>,
+    keyframe: Vec<u8>,
 }
 
 /// The places of the two rings of a file.
@@ -87,16 +86,6 @@ struct Layout {
     keyframes: Slots,
     /// Number of slots for keyframes.
     count: usize,
-}
-
-/// Buffers for one slot each.
-#[derive(Debug)]
-struct Buffers {
-    state: Vec<u8>,
-    found: Vec<u8>,
-    keyframe: Vec<u8>,
-    /// The name of the keyframe in its buffer.
-    encoded: Option<Name>,
 }
 
 /// Returns the path of the checkpoint of the run that writes to `out`.
@@ -173,27 +162,19 @@ impl Checkpoint {
             keyframes: Vec::with_capacity(layout.count),
             map: Vec::with_capacity(max_keyframes),
             earlier_map: Vec::with_capacity(max_keyframes),
-            buffers: Buffers {
-                state: vec![0; layout.states.bytes],
-                found: vec![0; layout.states.bytes],
-                keyframe: vec![0; layout.keyframes.bytes],
-                encoded: None,
-            },
+            state: vec![0; layout.states.bytes],
+            found: vec![0; layout.states.bytes],
+            keyframe: vec![0; layout.keyframes.bytes],
         };
-        checkpoint.read_names()?;
-        Ok(checkpoint)
-    }
-
-    /// Reads the names of all keyframes.
-    fn read_names(&mut self) -> Result<(), StorageError> {
-        let Self { file, layout, .. } = self;
-        let bytes = &mut self.buffers.keyframe;
-        for slot in 0..layout.count {
-            let is_there = file.read(&layout.keyframes, slot as u64, bytes)?;
-            self.keyframes
-                .push(keyframe_name(bytes).filter(|_| is_there));
+        for slot in 0..layout.count as u64 {
+            let slots = &layout.keyframes;
+            let is_there = checkpoint
+                .file
+                .read(slots, slot, &mut checkpoint.keyframe)?;
+            let name = keyframe_name(&checkpoint.keyframe).filter(|_| is_there);
+            checkpoint.keyframes.push(name);
         }
-        Ok(())
+        Ok(checkpoint)
     }
 
     /// Writes the state after `item`, which led to a motion with this checksum: first the new
@@ -208,16 +189,16 @@ impl Checkpoint {
     ) -> Result<(), CheckpointError> {
         self.name_keyframes(item, refiner);
         let header = StateHeader { item, motion };
-        let (file, states, slot) = (&self.file, self.layout.states, slot_of(item));
-        let Buffers { state, found, .. } = &mut self.buffers;
-        encode_state(header, &self.map, refiner.state(), state);
-        let known = file.read(&states, slot, found)? && found == state;
+        let (states, slot) = (self.layout.states, slot_of(item));
+        encode_state(header, &self.map, refiner.state(), &mut self.state);
+        let is_there = self.file.read(&states, slot, &mut self.found)?;
+        let known = is_there && self.found == self.state;
         if !known {
             self.erase_keyframes_from(item)?;
         }
         self.write_keyframes(refiner)?;
         if !known {
-            self.file.write(&states, slot, &self.buffers.state)?;
+            self.file.write(&states, slot, &self.state)?;
             self.file.changed()?;
         }
         Ok(())
@@ -232,9 +213,8 @@ impl Checkpoint {
             let starts_map = k == 0 && keyframe.id.checked_add(1) == Some(item);
             let mut earlier = self.earlier_map.iter();
             let named = earlier.find(|name| name.id == keyframe.id && !starts_map);
-            let name = named
-                .copied()
-                .unwrap_or_else(|| self.buffers.encode(keyframe));
+            let name = named.copied();
+            let name = name.unwrap_or_else(|| encode_keyframe(keyframe, &mut self.keyframe));
             self.map.push(name);
         }
     }
@@ -246,14 +226,10 @@ impl Checkpoint {
             if self.keyframes.contains(&Some(name)) {
                 continue;
             }
-            if self.buffers.encoded != Some(name) {
-                self.buffers.encode(keyframe);
-            }
-            let slot = self.free_slot();
+            encode_keyframe(keyframe, &mut self.keyframe);
+            let (slots, slot) = (self.layout.keyframes, self.free_slot());
             self.keyframes[slot] = Some(name);
-            let keyframes = &self.layout.keyframes;
-            self.file
-                .write(keyframes, slot as u64, &self.buffers.keyframe)?;
+            self.file.write(&slots, slot as u64, &self.keyframe)?;
         }
         Ok(())
     }
@@ -263,8 +239,8 @@ impl Checkpoint {
         for slot in 0..self.keyframes.len() {
             let obsolete = |name: &Name| name.id >= item && !self.map.contains(name);
             if self.keyframes[slot].as_ref().is_some_and(obsolete) {
-                self.file
-                    .write(&self.layout.keyframes, slot as u64, &EMPTY)?;
+                let slots = &self.layout.keyframes;
+                self.file.write(slots, slot as u64, &EMPTY)?;
                 self.keyframes[slot] = None;
             }
         }
@@ -275,17 +251,13 @@ impl Checkpoint {
     /// restart.
     fn free_slot(&self) -> usize {
         let used = self.keyframes.iter().flatten().count();
-        let empty = self
-            .keyframes
-            .iter()
-            .position(Option::is_none)
-            .filter(|_| used < self.kept);
-        let oldest = || {
-            (0..self.keyframes.len())
-                .filter(|slot| self.keyframes[*slot].is_some())
-                .min_by_key(|slot| self.keyframes[*slot])
-        };
-        empty.or_else(oldest).unwrap_or(0)
+        let mut slots = self.keyframes.iter();
+        let empty = slots.position(Option::is_none);
+        let named = self.keyframes.iter().enumerate();
+        let oldest = named.filter(|(_, name)| name.is_some());
+        let oldest = oldest.min_by_key(|(_, name)| **name).map(|(slot, _)| slot);
+        let empty = empty.filter(|_| used < self.kept);
+        empty.or(oldest).unwrap_or(0)
     }
 
     /// Reads the state after `item` and the names of its keyframes; `None` if the file does not
@@ -294,9 +266,9 @@ impl Checkpoint {
         &mut self,
         item: u64,
     ) -> Result<Option<(StateHeader, TrackerState)>, StorageError> {
-        let (states, found) = (&self.layout.states, &mut self.buffers.found);
-        let whole = self.file.read(states, slot_of(item), found)?;
-        let state = decode_state(found, &mut self.map);
+        let states = &self.layout.states;
+        let whole = self.file.read(states, slot_of(item), &mut self.found)?;
+        let state = decode_state(&self.found, &mut self.map);
         Ok(state.filter(|(header, _)| whole && header.item == item))
     }
 
@@ -312,8 +284,7 @@ impl Checkpoint {
         let places: Vec<Option<u64>> = self.map.iter().map(|name| self.place_of(*name)).collect();
         let mut keyframes = self.map.iter().zip(places);
         let (file, slots) = (&self.file, &self.layout.keyframes);
-        let bytes = &mut self.buffers.keyframe;
-        self.buffers.encoded = None;
+        let bytes = &mut self.keyframe;
         refiner.restore(tracker, |keyframe| {
             let Some((name, Some(slot))) = keyframes.next() else {
                 return false;
@@ -333,13 +304,6 @@ impl Checkpoint {
         slot.map(|slot| slot as u64)
     }
 
-    /// Returns whether the whole state after a pose is in the file.
-    fn knows(&mut self, pose: &PoseHeader) -> Result<bool, StorageError> {
-        let state = self.read_state(pose.item.seq)?;
-        let led_to_it = state.is_some_and(|(header, _)| header.motion == checksum(&pose.motion));
-        Ok(led_to_it && self.map.iter().all(|name| self.place_of(*name).is_some()))
-    }
-
     /// Returns the newest of these poses, given newest first, that a run can continue from: the one
     /// whose whole state is in the file.
     pub fn newest_known<'a>(
@@ -347,18 +311,14 @@ impl Checkpoint {
         poses: impl IntoIterator<Item = &'a PoseHeader>,
     ) -> Result<Option<&'a PoseHeader>, CheckpointError> {
         for pose in poses {
-            if self.knows(pose)? {
+            let motion = checksum(&pose.motion);
+            let state = self.read_state(pose.item.seq)?;
+            if state.is_some_and(|(header, _)| header.motion == motion)
+                && self.map.iter().all(|name| self.place_of(*name).is_some())
+            {
                 return Ok(Some(pose));
             }
         }
         Ok(None)
-    }
-}
-
-impl Buffers {
-    fn encode(&mut self, keyframe: &Keyframe) -> Name {
-        let name = encode_keyframe(keyframe, &mut self.keyframe);
-        self.encoded = Some(name);
-        name
     }
 }
