@@ -210,13 +210,6 @@ fn another_programs_file_is_refused_and_left_as_it_is() {
 }
 
 #[test]
-fn two_processes_do_not_append_to_one_log() {
-    let (_folder, path) = log_of(2);
-    let _first = Log::open(&path, MAGIC).unwrap();
-    assert!(matches!(Log::open(&path, MAGIC), Err(LogError::Busy(_))));
-}
-
-#[test]
 fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
     let (_folder, path) = log_of(0);
     let mut log = Log::open(&path, MAGIC).unwrap();

@@ -34,18 +34,6 @@ fn with_older_configuration(mut messages: Messages, bin_size: f64) -> Messages {
 }
 
 #[test]
-fn the_depth_of_a_bin_of_older_drivers_is_a_double() {
-    for (bin_size, expected_m) in [(438.0, 0.0438), (0.0438, 0.0438)] {
-        let folder = Folder::new();
-        let path = folder.bag(&with_older_configuration(b_scans(4), bin_size));
-        let mut dataset = opened(&path);
-        let scan = read(dataset.as_mut(), 1).unwrap();
-        assert_eq!(scan.geometry.range_resolution_m, expected_m, "{bin_size}");
-        assert_has_turns(dataset.as_mut(), 4);
-    }
-}
-
-#[test]
 fn a_configuration_that_no_radar_has_is_refused_with_its_reason() {
     let folder = Folder::new();
     let path = folder.bag(&with_older_configuration(b_scans(4), 1e7));
@@ -61,23 +49,6 @@ fn a_configuration_that_no_radar_has_is_refused_with_its_reason() {
     assert_has_turns(dataset.as_mut(), 4);
     let notes = dataset.notes().join(" ");
     assert!(notes.contains("cannot be used"), "{notes}");
-}
-
-/// As FoMo's converter writes them.
-#[test]
-fn times_of_rows_in_microseconds_are_read() {
-    let messages = changed(24, |_, message| {
-        for stamp in &mut message.timestamps {
-            *stamp /= 1_000;
-        }
-    });
-    let folder = Folder::new();
-    let mut dataset = opened(&folder.bag(&messages));
-    assert_eq!(dataset.len(), 24);
-    let found = read(dataset.as_mut(), 20).unwrap();
-    let micros = |ns: &i64| ns / 1_000 * 1_000;
-    let expected: Vec<i64> = scan(20).stamp_ns.iter().map(micros).collect();
-    assert_eq!(found.stamp_ns, expected);
 }
 
 #[test]
