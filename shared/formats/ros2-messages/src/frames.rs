@@ -328,7 +328,7 @@ mod tests {
         let odometry = odometry(0, &Frames::default(), &UncertainMotion::identity(), None);
         assert_eq!(odometry.twist.twist, geometry_msgs::Twist::default());
         assert_eq!(odometry.twist.covariance, covariance(None));
-        assert_eq!(odometry.pose.covariance.at(0, 0), 0.0);
+        assert_eq!(odometry.pose.covariance.elements()[0], 0.0);
     }
 
     #[test]

@@ -22,12 +22,6 @@ pub const VALUES: usize = 6;
 impl Field for Covariance {}
 
 impl Covariance {
-    /// Returns the element of a row and a column, both below [`VALUES`].
-    pub fn at(&self, row: usize, column: usize) -> f64 {
-        assert!(row < VALUES && column < VALUES, "{row}, {column}");
-        self.0.as_flattened()[row * VALUES + column]
-    }
-
     /// Sets the element of a row and a column, both below [`VALUES`].
     pub fn set(&mut self, row: usize, column: usize, value: f64) {
         assert!(row < VALUES && column < VALUES, "{row}, {column}");

@@ -256,8 +256,8 @@ fn detections_of_another_writer_are_read_and_written_alike() {
     assert_eq!(result.hypothesis.class_id, "moving");
     assert_eq!(result.hypothesis.score, 1.0);
     assert_eq!(result.pose.pose, object.bbox.center);
-    let covariance = &result.pose.covariance;
-    let found = [(0, 0), (0, 1), (1, 1), (5, 5)].map(|(row, column)| covariance.at(row, column));
+    let covariance = result.pose.covariance.elements();
+    let found = [0, 1, 7, 35].map(|element| covariance[element]);
     assert_eq!(found, [0.25, 0.5, 0.75, 1e6]);
     let (at, size) = (object.bbox.center.position, object.bbox.size);
     assert_eq!([at.x, at.y, at.z], [1.0, 2.0, 0.0]);

@@ -60,21 +60,9 @@ pub(super) fn text(file: &str, topics: &[&Described], times: Option<(i64, i64)>)
     text
 }
 
-/// Returns a text as YAML between double quotes.
+/// Returns a text between double quotes, as JSON and YAML have it.
 fn quoted(text: &str) -> String {
-    let mut quoted = String::from('"');
-    for letter in text.chars() {
-        match letter {
-            '"' | '\\' => quoted.extend(['\\', letter]),
-            '\n' => quoted.push_str("\\n"),
-            letter if letter.is_control() => {
-                let _ = write!(quoted, "\\u{:04x}", letter as u32);
-            }
-            letter => quoted.push(letter),
-        }
-    }
-    quoted.push('"');
-    quoted
+    serde_json::Value::from(text).to_string()
 }
 
 #[cfg(test)]
