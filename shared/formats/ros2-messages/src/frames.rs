@@ -44,15 +44,7 @@ impl FromStr for Frames {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         let is_name = |name: &String| !name.is_empty() && !name.starts_with('/');
         match <[String; 4]>::try_from(names) {
-            Ok(names) if names.iter().all(is_name) => {
-                let [map, odom, base, radar] = names;
-                Ok(Self {
-                    map,
-                    odom,
-                    base,
-                    radar,
-                })
-            }
+            Ok(names) if names.iter().all(is_name) => Ok(Self::of(names)),
             _ => Err(
                 "four names without `/` before them are needed, as in map,odom,base_link,radar"
                     .to_owned(),
@@ -61,15 +53,21 @@ impl FromStr for Frames {
     }
 }
 
+impl Frames {
+    fn of([map, odom, base, radar]: [String; 4]) -> Self {
+        Self {
+            map,
+            odom,
+            base,
+            radar,
+        }
+    }
+}
+
 impl Default for Frames {
     /// Returns the names of REP-105.
     fn default() -> Self {
-        Self {
-            map: "map".to_owned(),
-            odom: "odom".to_owned(),
-            base: "base_link".to_owned(),
-            radar: "radar".to_owned(),
-        }
+        Self::of(["map", "odom", "base_link", "radar"].map(str::to_owned))
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{
     vision_msgs::{
         BoundingBox3D, Detection3D, Detection3DArray, ObjectHypothesis, ObjectHypothesisWithPose,
     },
-    visualization_msgs::{ADD, ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
+    visualization_msgs::{ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
 };
 
 /// The class of an object that moves.
@@ -45,22 +45,19 @@ pub fn detections(
     let detection = |object: &ListedObject| {
         let pose = frames::pose(&place(mounting, object));
         let class_id = if object.is_moving() { MOVING } else { STANDING };
+        let covariance = covariance(mounting, object);
+        let result = ObjectHypothesisWithPose {
+            hypothesis: ObjectHypothesis {
+                class_id: class_id.to_owned(),
+                score: 1.0,
+            },
+            pose: PoseWithCovariance { pose, covariance },
+        };
+        let (center, size) = (pose, size(object, 0.0));
         Detection3D {
             header: header.clone(),
-            results: vec![ObjectHypothesisWithPose {
-                hypothesis: ObjectHypothesis {
-                    class_id: class_id.to_owned(),
-                    score: 1.0,
-                },
-                pose: PoseWithCovariance {
-                    pose,
-                    covariance: covariance(mounting, object),
-                },
-            }],
-            bbox: BoundingBox3D {
-                center: pose,
-                size: size(object, 0.0),
-            },
+            results: vec![result],
+            bbox: BoundingBox3D { center, size },
             id: object.id.to_string(),
         }
     };
@@ -80,28 +77,21 @@ pub fn markers(
     objects: &[ListedObject],
 ) -> MarkerArray {
     let header = Header::new(stamp_ns, &frames.odom);
-    let drawn = objects.iter().zip(0..).flat_map(|(object, id)| {
-        let moving = object.is_moving().then(|| arrow(mounting, object));
-        let shapes = [cube(mounting, object), name(mounting, object)];
-        shapes.into_iter().chain(moving).map(move |shape| Marker {
-            id,
-            action: ADD,
-            ..shape
-        })
-    });
-    let remove_all = Marker {
+    let mut markers = vec![Marker {
         action: DELETEALL,
         ..Marker::default()
-    };
-    let all = [remove_all].into_iter().chain(drawn);
-    MarkerArray {
-        markers: all
-            .map(|shape| Marker {
-                header: header.clone(),
-                ..shape
-            })
-            .collect(),
+    }];
+    for (object, id) in objects.iter().zip(0..) {
+        let moving = object.is_moving().then(|| arrow(mounting, object));
+        let shapes = [cube(mounting, object), name(mounting, object)];
+        let shapes = shapes.into_iter().chain(moving);
+        // Their action is `ADD`, the default.
+        markers.extend(shapes.map(|shape| Marker { id, ..shape }));
     }
+    for marker in &mut markers {
+        marker.header = header.clone();
+    }
+    MarkerArray { markers }
 }
 
 fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {

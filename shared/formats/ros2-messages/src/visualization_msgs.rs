@@ -14,9 +14,7 @@ pub const ARROW: i32 = 0;
 pub const CUBE: i32 = 1;
 /// The type of a marker that is a text, whose letters are as high as `scale.z`.
 pub const TEXT_VIEW_FACING: i32 = 9;
-/// The action of a marker that is drawn.
-pub const ADD: i32 = 0;
-/// The action that removes all markers of the topic.
+/// The action that removes all markers of the topic; that of a marker which is drawn is zero.
 pub const DELETEALL: i32 = 3;
 
 package! { visualization_msgs:

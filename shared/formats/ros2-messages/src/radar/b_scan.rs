@@ -56,12 +56,11 @@ impl RadarBScanMsg {
         };
         let places = encoders.iter().zip(stamps).enumerate();
         let places = places.map(|(row, (encoder, stamp))| (row, *encoder, *stamp));
-        Ok(places
-            .filter(written)
-            .map(move |(row, encoder, stamp)| TimedAzimuth {
-                azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
-                arrived_ns: time.arrived_ns(encoder),
-            }))
+        let rows = places.filter(written);
+        Ok(rows.map(move |(row, encoder, stamp)| TimedAzimuth {
+            azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
+            arrived_ns: time.arrived_ns(encoder),
+        }))
     }
 }
 
