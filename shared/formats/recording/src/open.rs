@@ -17,9 +17,7 @@ pub fn is_recording(path: &Path) -> bool {
     if is_bag(path) {
         return false;
     }
-    let is_named = path
-        .extension()
-        .is_some_and(|extension| extension == "mcap");
+    let is_named = path.extension().is_some_and(|it| it == "mcap");
     is_named || first_part_in(path).is_some()
 }
 
@@ -54,10 +52,8 @@ pub fn reopen(
         Format::Ros2Bag => return bags::reopen(root, options, &files),
         _ => return gyre_datasets::reopen(root, options, format, files),
     }
-    let paths: Vec<PathBuf> = (0..files.len())
-        .filter_map(|index| files.get(index))
-        .map(Path::to_owned)
-        .collect();
+    let paths = (0..files.len()).filter_map(|index| files.get(index));
+    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
     open_parts(&paths, root, options)
 }
 
@@ -82,10 +78,8 @@ pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
 
 fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> {
     if paths.is_empty() {
-        return Err(OpenError::Recording(format!(
-            "there is no recording {}",
-            root.display()
-        )));
+        let reason = format!("there is no recording {}", root.display());
+        return Err(OpenError::Recording(reason));
     }
     Recording::open(paths).map_err(|error| match error {
         RecordingError::Io { path, source } => OpenError::Io { path, source },

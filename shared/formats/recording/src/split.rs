@@ -47,7 +47,9 @@ impl SplitWriter {
         ledger: Option<Ledger>,
         positions: Positions,
     ) -> Result<Self, RecordingError> {
-        note(ledger.as_ref(), &to, &head, &positions)?;
+        if let Some(ledger) = &ledger {
+            ledger.note(&to, &head, &positions)?;
+        }
         Ok(Self {
             writer: RecordingWriter::create(&part(&to, head.part), &head)?,
             to,
@@ -85,10 +87,11 @@ impl SplitWriter {
     fn go_on(&mut self) -> Result<(), RecordingError> {
         self.writer.end()?;
         self.head.part = next_part(&self.to, self.head.part);
-        note(self.ledger.as_ref(), &self.to, &self.head, &self.positions)?;
-        let missed = self
-            .writer
-            .go_on(&part(&self.to, self.head.part), &self.head)?;
+        if let Some(ledger) = &self.ledger {
+            ledger.note(&self.to, &self.head, &self.positions)?;
+        }
+        let next = part(&self.to, self.head.part);
+        let missed = self.writer.go_on(&next, &self.head)?;
         add(&mut self.missed, missed);
         Ok(())
     }
@@ -114,21 +117,11 @@ impl SplitWriter {
     }
 
     /// Ends the recording, and returns the number of messages missed, by topic.
-    pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
-        let missed = self.writer.finish()?;
-        add(&mut self.missed, missed);
-        Ok(self.missed)
+    pub fn finish(self) -> Result<BTreeMap<String, u64>, RecordingError> {
+        let mut sum = self.missed;
+        add(&mut sum, self.writer.finish()?);
+        Ok(sum)
     }
-}
-
-/// Notes in the ledger, if there is one, that a part is begun.
-fn note(
-    ledger: Option<&Ledger>,
-    to: &Path,
-    head: &Head,
-    positions: &Positions,
-) -> Result<(), RecordingError> {
-    ledger.map_or(Ok(()), |ledger| ledger.note(to, head, positions))
 }
 
 fn add(sum: &mut BTreeMap<String, u64>, missed: BTreeMap<String, u64>) {

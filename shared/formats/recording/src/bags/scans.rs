@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_colossus::{Constants, SweepAssembler};
+use gyre_colossus::{Azimuth, Constants, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     OpenError, ReadError, check_capacity, turn_ns,
@@ -88,9 +88,8 @@ impl Scans {
         let topics = Topics::choose(path, &bag.channels(), wished)?;
         let (described, origin) = bag.describe(&topics, options)?;
         let constants = Constants::from(options);
-        let assembler = SweepAssembler::new(&described.radar, constants);
-        let assembler = assembler.map_err(|error| {
-            RecordingError::unreadable(path, format!("cannot be read: {error}"))
+        let assembler = SweepAssembler::new(&described.radar, constants).map_err(|error| {
+            RecordingError::unreadable(path, format_args!("cannot be read: {error}"))
         })?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
         if let Some(reason) = index.why_none_can_be_read(&topics.scans.name) {
@@ -111,10 +110,6 @@ impl Scans {
             index,
             kept: (None, BTreeMap::new()),
         })
-    }
-
-    fn assembler(&self) -> Option<SweepAssembler> {
-        SweepAssembler::new(&self.described.radar, self.constants).ok()
     }
 
     /// Reads the messages of scans of some spans, unless they are there.
@@ -147,12 +142,12 @@ impl Scans {
         entry: &Entry,
         mut slot: ScanSlot<'_>,
     ) -> Result<Option<SweepGeometry>, RecordingError> {
-        let Some(mut assembler) = self.assembler() else {
+        let assembler = SweepAssembler::new(&self.described.radar, self.constants);
+        let Ok(mut assembler) = assembler else {
             return Ok(None);
         };
         self.keep(&entry.spans)?;
-        let mut clock = self.index.clock(index);
-        let mut found = None;
+        let (mut clock, mut found) = (self.index.clock(index), None);
         for (key, message) in self.kept.1.range(entry.start.message..) {
             if self.index.repeated.contains(key) {
                 continue;
@@ -161,23 +156,19 @@ impl Scans {
                 true => entry.start.row,
                 false => 0,
             };
+            let each = |azimuth: Azimuth<'_>, received_ns| {
+                if skipped > 0 {
+                    skipped -= 1;
+                    return;
+                }
+                for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
+                    if found.is_none() {
+                        found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                    }
+                }
+            };
             // A damaged one between was left out of the index, too.
-            let _ = azimuths(
-                self.topics.scans.kind,
-                message,
-                &self.described,
-                |azimuth, received_ns| {
-                    if skipped > 0 {
-                        skipped -= 1;
-                        return;
-                    }
-                    for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
-                        if found.is_none() {
-                            found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
-                        }
-                    }
-                },
-            );
+            let _ = azimuths(self.topics.scans.kind, message, &self.described, each);
             if found.is_some() {
                 break;
             }

@@ -3,7 +3,10 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use crate::bags::{Message, RecordingError, bag::Bag};
+use crate::bags::{
+    Message, RecordingError,
+    bag::{Bag, Key},
+};
 
 /// Makes a measurement of a message.
 pub(crate) type Decode<T> = fn(&Message) -> Result<T, String>;
@@ -38,19 +41,14 @@ impl<T> Sensor<T> {
             return Ok(None);
         };
         let (mut measurements, mut refused) = (Vec::new(), None);
-        bag.read_in_order(
-            |channel| channel.topic == topic,
-            |_, _, message| match decode(message) {
-                Ok(measurement) => {
-                    measurements.push(measurement);
-                    true
-                }
-                Err(reason) => {
-                    refused = Some(reason);
-                    false
-                }
-            },
-        )?;
+        let each = |_: &Bag, _: Key, message: &Message| {
+            match decode(message) {
+                Ok(measurement) => measurements.push(measurement),
+                Err(reason) => refused = Some(reason),
+            }
+            refused.is_none()
+        };
+        bag.read_in_order(|channel| channel.topic == topic, each)?;
         if let Some(reason) = refused {
             let of = self.measurements;
             let reason = format!("has messages on {topic} that are no {of}: {reason}");

@@ -69,14 +69,13 @@ impl Index {
         assembler: SweepAssembler,
     ) -> Result<Self, RecordingError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
-        bag.read_in_order(
-            |channel| channel.topic == topics.scans.name,
-            |_, key, message| {
-                indexing.add(key, message);
-                true
-            },
-        )?;
-        Ok(indexing.finish())
+        let add = |_: &Bag, key: Key, message: &Message| {
+            indexing.add(key, message);
+            true
+        };
+        bag.read_in_order(|channel| channel.topic == topics.scans.name, add)?;
+        indexing.index.counters = indexing.assembler.counters();
+        Ok(indexing.index)
     }
 
     /// Returns the clock as it was at the beginning of a scan.
@@ -92,22 +91,20 @@ impl Index {
             return None;
         }
         let (lost, azimuths) = (&self.counters, self.azimuths);
-        let broken = lost.broken_sweeps;
+        let (invalid, incomplete) = (lost.invalid_azimuths, lost.incomplete_sweeps);
         Some(match &self.first_damage {
             Some(reason) if azimuths == 0 => {
                 format!("has messages on {topic}, of which none can be decoded: {reason}")
             }
             _ if azimuths == 0 => format!("has no messages on {topic} that can be read"),
-            _ if broken > 0 => format!(
+            _ if lost.broken_sweeps > 0 => format!(
                 "has {azimuths} azimuths on {topic}, but their times do not advance as the radar turns, by its encoder and its rotation"
             ),
-            _ if lost.invalid_azimuths > 0 => format!(
-                "has {azimuths} azimuths on {topic}, of which {} have encoder values beyond a turn: set dataset.encoder_counts",
-                lost.invalid_azimuths
+            _ if invalid > 0 => format!(
+                "has {azimuths} azimuths on {topic}, of which {invalid} have encoder values beyond a turn: set dataset.encoder_counts"
             ),
             _ => format!(
-                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {} turns of which more than half is missing",
-                lost.incomplete_sweeps
+                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {incomplete} turns of which more than half is missing"
             ),
         })
     }
@@ -144,11 +141,8 @@ impl Index {
                 "azimuths have more bins than the radar says, and are cut.",
             ),
         ];
-        for (count, what) in losses {
-            if count > 0 {
-                notes.push(format!("{count} {what}"));
-            }
-        }
+        let losses = losses.into_iter().filter(|(count, _)| *count > 0);
+        notes.extend(losses.map(|(count, what)| format!("{count} {what}")));
         notes
     }
 }
@@ -309,11 +303,6 @@ impl Indexing {
                 is_damaged: true,
             });
         }
-    }
-
-    fn finish(mut self) -> Index {
-        self.index.counters = self.assembler.counters();
-        self.index
     }
 }
 
