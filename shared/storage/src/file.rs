@@ -261,20 +261,4 @@ mod tests {
         fs::rename(folder.path().join("away"), &path).unwrap();
         file.require_name().unwrap();
     }
-
-    #[test]
-    fn a_lock_is_waited_for_while_its_owner_goes_and_refused_while_it_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let owner = File::open_or_create(&path).unwrap();
-        assert!(owner.lock().unwrap());
-        let other = File::open_or_create(&path).unwrap();
-        assert!(!other.lock().unwrap());
-        let going = thread::spawn(move || {
-            thread::sleep(Duration::from_millis(50));
-            drop(owner);
-        });
-        assert!(other.lock().unwrap());
-        going.join().unwrap();
-    }
 }

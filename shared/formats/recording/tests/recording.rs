@@ -10,10 +10,10 @@ use std::{
 
 use bytemuck::{Zeroable, bytes_of};
 use gyre_datasets::{DatasetOptions, ReadError};
-use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
+use gyre_messages::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::OwnedScan;
 use gyre_recording::{
-    Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
+    Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
     file::McapFile, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record, op};
@@ -221,43 +221,6 @@ fn a_part_is_as_long_as_it_is_to_be_although_poses_lag_behind_the_scans() {
     );
 }
 
-#[test]
-fn a_ledger_knows_what_is_in_the_parts_that_were_moved_away() {
-    let folder = tempfile::tempdir().unwrap();
-    let to = folder.path().join("drive.mcap");
-    let ledger = Ledger::of(&folder.path().join("out"));
-    assert_eq!(ledger.read(&to).unwrap(), None);
-    // Two messages a part.
-    let split = Split {
-        bytes: None,
-        span_ns: Some(1),
-    };
-    let positions = Positions::new();
-    let mut writer = SplitWriter::create(
-        to.clone(),
-        head("a", 1),
-        split,
-        Some(ledger.clone()),
-        positions,
-    )
-    .unwrap();
-    (0..5).for_each(|seq| writer.add(&pose(seq)).unwrap());
-    writer.finish().unwrap();
-    let begun = || {
-        let begun = ledger.read(&to).unwrap().unwrap();
-        assert_eq!((begun.id.as_str(), begun.part), ("a", 3));
-        begun.positions["pose"].next
-    };
-    assert_eq!(begun(), 5);
-    for part in gyre_recording::parts(&to) {
-        fs::remove_file(part).unwrap();
-    }
-    assert_eq!(begun(), 4, "what the newest part had counts as missed");
-    assert_eq!(gyre_recording::next_part(&to, 3), 4);
-    let other = folder.path().join("other.mcap");
-    assert_eq!(ledger.read(&other).unwrap(), None);
-}
-
 /// A message of a generation that gives numbers from `numbered_from` on; `scan` distinguishes it
 /// from others of its number.
 fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
@@ -323,38 +286,6 @@ fn a_number_that_was_given_anew_has_its_newest_message() {
     assert_eq!(stored.header, of(2, 2, 2, 14).header);
     let absent = recording.read("motion", 4);
     assert!(absent.unwrap_err().to_string().contains("missed it"));
-}
-
-#[test]
-fn what_a_generation_without_messages_gave_anew_is_void() {
-    let folder = tempfile::tempdir().unwrap();
-    let paths = ["a.mcap", "a.2.mcap"].map(|name| folder.path().join(name));
-    let head = |part| Head {
-        topics: vec!["motion".to_owned()],
-        ..head("a", part)
-    };
-    let mut first = RecordingWriter::create(&paths[0], &head(1)).unwrap();
-    for seq in 0..8 {
-        first.add(&of(1, 0, seq, 10 + seq)).unwrap();
-    }
-    first.finish().unwrap();
-    // Generation 2 reused 4 and 5, and was gone before the second recorder was there.
-    let mut second = RecordingWriter::create(&paths[1], &head(2)).unwrap();
-    let anew = Incoming {
-        skipped: Some(GivenAnew {
-            generation: 2,
-            first: 4,
-        }),
-        missed: 2,
-        ..of(3, 6, 6, 30)
-    };
-    second.add(&anew).unwrap();
-    second.finish().unwrap();
-    let recording = Recording::open(&paths).unwrap();
-    let entries = recording.entries("motion");
-    let scans: Vec<(u64, u64)> = entries.map(|entry| (entry.seq, entry.scan)).collect();
-    assert_eq!(scans, [(0, 10), (1, 11), (2, 12), (3, 13), (6, 30)]);
-    assert_eq!(recording.missed(), [("motion", 2)].into());
 }
 
 #[test]

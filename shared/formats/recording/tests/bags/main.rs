@@ -230,25 +230,6 @@ fn scans_of_both_forms_come_back_in_any_order() {
 }
 
 #[test]
-fn a_bag_of_several_files_is_one_recording() {
-    let folder = Folder::new();
-    let bag = folder.path("drive");
-    fs::create_dir(&bag).unwrap();
-    let mut all = azimuths(12, |_, _, message| Some(message)).0;
-    for part in [0, 1, 10] {
-        // Not at the ends of turns.
-        let rest = all.split_off(all.len().min(170));
-        Messages(all).write(&bag.join(format!("drive_{part}.mcap")), uncompressed());
-        all = rest;
-    }
-    assert!(is_bag(&bag));
-    let mut dataset = opened(&bag);
-    assert_eq!(dataset.files().len(), 3);
-    assert_has_turns(dataset.as_mut(), 12);
-    assert_eq!(dataset.file(11), bag.join("drive_10.mcap"));
-}
-
-#[test]
 fn a_written_bag_is_read_and_never_overwritten() {
     let folder = Folder::new();
     for name in ["bag", "bag.mcap"] {
