@@ -2,8 +2,7 @@
 
 use std::{
     ffi::OsString,
-    fs,
-    io::{self, BufWriter, Write},
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -26,29 +25,11 @@ const BUFFER: usize = 1 << 18;
 pub struct Draft {
     path: PathBuf,
     aside: PathBuf,
-    writer: BufWriter<Appended>,
-    committed: bool,
-}
-
-/// A file that is written from its start to its end.
-#[derive(Debug)]
-struct Appended {
     file: File,
-    length: u64,
-}
-
-impl Write for Appended {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file
-            .write_at(bytes, self.length)
-            .map_err(|error| error.source)?;
-        self.length += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+    /// Bytes in the file, and those that are not written yet.
+    written: u64,
+    buffer: Vec<u8>,
+    committed: bool,
 }
 
 impl Draft {
@@ -61,7 +42,9 @@ impl Draft {
                 return Ok(Self {
                     path: path.to_owned(),
                     aside,
-                    writer: BufWriter::with_capacity(BUFFER, Appended { file, length: 0 }),
+                    file,
+                    written: 0,
+                    buffer: Vec::with_capacity(BUFFER),
                     committed: false,
                 });
             }
@@ -77,19 +60,28 @@ impl Draft {
 
     /// Adds text or bytes at the end.
     pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
-        self.writer
-            .write_all(bytes.as_ref())
-            .map_err(StorageError::at("write", &self.path))
+        self.buffer.extend_from_slice(bytes.as_ref());
+        match self.buffer.len() >= BUFFER {
+            true => self.flush(),
+            false => Ok(()),
+        }
+    }
+
+    fn flush(&mut self) -> Result<(), StorageError> {
+        let written = self.file.write_at(&self.buffer, self.written);
+        written.map_err(|error| StorageError::at("write", &self.path)(error.source))?;
+        self.written += self.buffer.len() as u64;
+        self.buffer.clear();
+        Ok(())
     }
 
     /// Makes the draft the content of the file: after a kill or a power failure the file has the
     /// whole of the old or of the new content. The new one is sure to survive once the folder is
     /// synchronised too ([`sync_folder`]).
     pub fn commit(mut self) -> Result<(), StorageError> {
-        let failed = StorageError::at("write", &self.path);
-        self.writer.flush().map_err(&failed)?;
-        self.writer.get_ref().file.sync()?;
-        fs::rename(&self.aside, &self.path).map_err(&failed)?;
+        self.flush()?;
+        self.file.sync()?;
+        fs::rename(&self.aside, &self.path).map_err(StorageError::at("write", &self.path))?;
         self.committed = true;
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::Rename {

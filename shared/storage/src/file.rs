@@ -58,11 +58,8 @@ impl File {
         options.read(true).write(true);
         let file = match options.open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let file = options
-                    .create(true)
-                    .truncate(false)
-                    .open(path)
-                    .map_err(failed)?;
+                let created = options.create(true).truncate(false).open(path);
+                let file = created.map_err(failed)?;
                 #[cfg(feature = "record")]
                 record::push(path, || Operation::Create(path.to_owned()));
                 path.parent().map_or(Ok(()), sync_folder)?;
@@ -111,13 +108,10 @@ impl File {
 
     /// Returns another handle of the same file.
     pub fn try_clone(&self) -> Result<Self, StorageError> {
-        let file = self
-            .file
-            .try_clone()
-            .map_err(StorageError::at("read", &self.path))?;
+        let file = self.file.try_clone();
         Ok(Self {
             path: self.path.clone(),
-            file,
+            file: file.map_err(StorageError::at("read", &self.path))?,
         })
     }
 
@@ -156,10 +150,8 @@ impl File {
 
     /// Returns the length, bytes.
     pub fn length(&self) -> Result<u64, StorageError> {
-        let metadata = self
-            .file
-            .metadata()
-            .map_err(StorageError::at("read", &self.path))?;
+        let metadata = self.file.metadata();
+        let metadata = metadata.map_err(StorageError::at("read", &self.path))?;
         Ok(metadata.len())
     }
 
@@ -190,23 +182,21 @@ impl File {
             return Ok(());
         }
         self.unless_full(self.file.write_all_at(bytes, offset), "write")?;
-        if was_full() {
-            return Ok(());
-        }
         #[cfg(feature = "record")]
-        record::push(&self.path, || Operation::Write {
-            path: self.path.clone(),
-            offset,
-            bytes: bytes.to_vec(),
-        });
+        if !was_full() {
+            record::push(&self.path, || Operation::Write {
+                path: self.path.clone(),
+                offset,
+                bytes: bytes.to_vec(),
+            });
+        }
         Ok(())
     }
 
     /// Cuts the file, or extends it by zeros.
     pub fn set_length(&self, length: u64) -> Result<(), StorageError> {
-        self.file
-            .set_len(length)
-            .map_err(StorageError::at("write", &self.path))?;
+        let set = self.file.set_len(length);
+        set.map_err(StorageError::at("write", &self.path))?;
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::SetLength {
             path: self.path.clone(),

@@ -2,7 +2,7 @@
 //! device, which never ends or never begins.
 
 use std::{
-    fs::{File, FileType, OpenOptions},
+    fs::{File, OpenOptions},
     io::{self, Read},
     os::unix::fs::{FileTypeExt, OpenOptionsExt},
     path::Path,
@@ -26,21 +26,14 @@ pub fn open(path: &Path) -> io::Result<File> {
         .custom_flags(OFlags::NONBLOCK.bits() as i32)
         .open(path)?;
     let kind = file.metadata()?.file_type();
-    match kind.is_file() {
-        true => Ok(file),
-        false => {
-            let reason = format!("it is {}, not a file", name(kind));
-            Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
-        }
-    }
-}
-
-fn name(kind: FileType) -> &'static str {
-    match kind.is_dir() {
-        true => "a folder",
+    let name = match kind.is_file() {
+        true => return Ok(file),
+        false if kind.is_dir() => "a folder",
         false if kind.is_fifo() => "a pipe",
         false => "a device",
-    }
+    };
+    let reason = format!("it is {name}, not a file");
+    Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
 }
 
 /// Reads a text of at most `limit` bytes, without a byte order mark before it.

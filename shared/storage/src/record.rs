@@ -16,25 +16,21 @@ pub enum Operation {
     /// Bytes written at an offset.
     Write {
         path: PathBuf,
-        /// The place of the first byte.
         offset: u64,
         bytes: Vec<u8>,
     },
     /// A file cut or extended.
     SetLength {
         path: PathBuf,
-        /// The new length, bytes.
         length: u64,
     },
     SyncBegins {
         path: PathBuf,
-        /// The number of the synchronisation.
         id: u64,
     },
     /// It has ended: writes before its begin survive.
     SyncEnds {
         path: PathBuf,
-        /// The number of the synchronisation.
         id: u64,
     },
     /// A file renamed, in place of an existing one.

@@ -323,16 +323,12 @@ impl LogReader {
 
     /// Returns the error for a record that its reader cannot decode.
     pub fn malformed(&self, record: usize) -> LogError {
-        LogError::Malformed {
-            path: self.path.clone(),
-            record,
-        }
+        let path = self.path.clone();
+        LogError::Malformed { path, record }
     }
 
     fn damaged(&self, record: usize) -> LogError {
-        LogError::Damaged {
-            path: self.path.clone(),
-            record,
-        }
+        let path = self.path.clone();
+        LogError::Damaged { path, record }
     }
 }
