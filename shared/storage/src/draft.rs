@@ -33,7 +33,6 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Creates the draft of the file at `path`.
     pub fn create(path: &Path) -> Result<Self, StorageError> {
         let failed = StorageError::at("write", path);
         for writer in 0..WRITERS {
@@ -53,7 +52,6 @@ impl Draft {
         Err(failed(io::Error::new(io::ErrorKind::ResourceBusy, reason)))
     }
 
-    /// Returns the path of the file whose next content this is.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -7,7 +7,6 @@ use thiserror::Error;
 
 use crate::{File, GroupSync, StorageError, create_folder};
 
-/// Another process changes the file.
 #[derive(Debug, Error)]
 #[error("another process is writing to {path}")]
 pub struct Busy {
@@ -83,7 +82,6 @@ pub fn may_begin(found: &[u8], magic: &[u8; 16]) -> bool {
 /// Places of equal size in a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots {
-    /// The offset of the first one.
     pub start: u64,
     pub bytes: usize,
 }
@@ -105,9 +103,6 @@ pub enum Checksum {
 
 impl Checksum {
     /// Puts the checksum into its place.
-    ///
-    /// # Panics
-    /// The slot is shorter than its checksum.
     pub fn seal(self, slot: &mut [u8]) {
         match self {
             Self::First => {
@@ -121,7 +116,6 @@ impl Checksum {
         }
     }
 
-    /// Returns whether the checksum matches the content.
     #[must_use]
     pub fn is_right(self, slot: &[u8]) -> bool {
         match self {

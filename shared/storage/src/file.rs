@@ -106,7 +106,6 @@ impl File {
         &self.path
     }
 
-    /// Returns another handle of the same file.
     pub fn try_clone(&self) -> Result<Self, StorageError> {
         let file = self.file.try_clone();
         Ok(Self {
@@ -148,7 +147,6 @@ impl File {
         }
     }
 
-    /// Returns the length, bytes.
     pub fn length(&self) -> Result<u64, StorageError> {
         let metadata = self.file.metadata();
         let metadata = metadata.map_err(StorageError::at("read", &self.path))?;

@@ -28,7 +28,6 @@ struct Shared {
     changed: Condvar,
 }
 
-/// Counts of changes, and how the thread stands.
 #[derive(Debug, Default)]
 struct Progress {
     made: u64,

@@ -18,7 +18,6 @@ const MARK: &str = "\u{feff}";
 /// The marks before UTF-16, of both byte orders.
 const UTF_16: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
 
-/// Opens a file to read it.
 pub fn open(path: &Path) -> io::Result<File> {
     // Without waiting: a pipe that nobody writes to would never be opened.
     let file = OpenOptions::new()

@@ -46,7 +46,6 @@ fn lock(path: &Path, create: bool) -> io::Result<Attempt> {
     attempt(&file, path)
 }
 
-/// Locks an open file, without waiting.
 pub(crate) fn attempt(file: &File, path: &Path) -> io::Result<Attempt> {
     match flock(file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) if is_at(file, path)? => Ok(Attempt::Locked(file.try_clone()?)),

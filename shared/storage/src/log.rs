@@ -50,12 +50,10 @@ pub enum LogError {
     Busy(#[from] Busy),
 }
 
-/// A log open for appending.
 #[derive(Debug)]
 pub struct Log {
     file: DurableFile,
     records: LogReader,
-    /// Number of changes that were counted.
     changes: u64,
     /// Their number when the last record was appended.
     appended: u64,
@@ -140,9 +138,6 @@ impl Log {
     }
 
     /// Reads a record, which replaces the content of `bytes`.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
     }

@@ -8,7 +8,6 @@ use std::{
     },
 };
 
-/// A change of a file or folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Operation {
     CreateFolder(PathBuf),
@@ -68,7 +67,6 @@ impl Recorder {
         Self(root.to_owned())
     }
 
-    /// Returns the changes so far.
     pub fn operations(&self) -> Vec<Operation> {
         let all = recordings();
         let ours = all.iter().find(|recording| recording.root == self.0);

@@ -10,7 +10,6 @@ use std::{
 /// The longest time for which a chunk is not synchronised. A power failure loses at most this much.
 const SYNC_PERIOD: Duration = Duration::from_secs(1);
 
-/// The call that synchronises a file.
 pub(crate) type Synchronise = Arc<dyn Fn(&File) -> io::Result<()> + Send + Sync>;
 
 /// The file of a writer, beside the one that the library writes to.
@@ -33,7 +32,6 @@ impl Disk {
         }
     }
 
-    /// Notes that a table is complete.
     pub fn complete(&mut self) -> io::Result<()> {
         // The file of the library and this one have one position.
         self.complete_bytes = self.file.stream_position()?;

@@ -34,13 +34,11 @@ impl RecordingError {
         Self::Damaged(format!("{path} is damaged at byte {offset}: {reason}"))
     }
 
-    /// A file that is no recording, or one of another version.
     pub(crate) fn foreign(path: &Path, reason: impl Display) -> Self {
         let path = path.display();
         Self::Other(format!("{path} is not a recording of Gyre: {reason}"))
     }
 
-    /// A bag that cannot be read as it is.
     pub(crate) fn unreadable(path: &Path, reason: impl Display) -> Self {
         Self::Other(format!("the bag {} {reason}", path.display()))
     }

@@ -51,14 +51,12 @@ const MESSAGE_TIME: Range<usize> = 15..23;
 /// The place of records in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
-    /// Position of the first opcode.
     pub offset: u64,
     /// Bytes of the records with their opcodes and lengths.
     pub bytes: u64,
 }
 
 impl Span {
-    /// Returns the position behind the records.
     pub fn end(self) -> u64 {
         self.offset + self.bytes
     }
@@ -67,7 +65,6 @@ impl Span {
 /// A first and last time, ns since 1970; `None` without messages.
 pub(crate) type Times = Option<(u64, u64)>;
 
-/// Returns the times of both.
 pub(crate) fn joined(times: Times, others: Times) -> Times {
     match (times, others) {
         (Some((first, last)), Some(other)) => Some((first.min(other.0), last.max(other.1))),
@@ -75,14 +72,12 @@ pub(crate) fn joined(times: Times, others: Times) -> Times {
     }
 }
 
-/// A channel of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Channel {
     pub topic: String,
     /// The type, such as `nav_msgs/msg/Odometry`.
     pub type_name: String,
     pub schema: String,
-    /// The encoding of its messages.
     pub encoding: String,
 }
 
@@ -110,7 +105,6 @@ pub struct McapFile {
     /// The positions of the damaged places so far, at most [`MAX_PLACES`].
     pub(crate) damage: BTreeSet<u64>,
     schemas: BTreeMap<u16, (String, String)>,
-    /// The channels so far.
     pub(crate) channels: BTreeMap<u16, Channel>,
 }
 
@@ -186,7 +180,6 @@ impl McapFile {
         }
     }
 
-    /// Returns the times that are in a record.
     pub(crate) fn times_ns(&self, opcode: u8, span: Span) -> Result<Times, RecordingError> {
         let place = match opcode {
             op::CHUNK => CHUNK_TIMES,
@@ -231,7 +224,6 @@ impl McapFile {
         }
     }
 
-    /// Learns channels, and returns a message that is wanted.
     fn learn(&mut self, record: Record<'_>, wanted: &impl Fn(&Channel) -> bool) -> Option<Message> {
         match record {
             Record::Schema { header, data }

@@ -6,7 +6,6 @@ use gyre_messages::topic;
 use gyre_storage::quoted;
 use mcap::records::Metadata;
 
-/// The name of the record.
 const NAME: &str = "gyre.recording";
 /// The reason against a file without it.
 pub(crate) const NO_HEAD: &str = "it has no metadata `gyre.recording`";
@@ -19,11 +18,9 @@ const FORMAT: &str = "1";
 pub struct Head {
     /// Identifies the recording: all its parts have the same identifier.
     pub id: String,
-    /// The number of the part, from 1.
     pub part: usize,
     /// The resolved configuration of the run, TOML.
     pub configuration: String,
-    /// The topics that are recorded.
     pub topics: Vec<String>,
     /// Bytes of the run's largest scan.
     pub scan_bytes: usize,

@@ -6,14 +6,11 @@ use gyre_messages::{Masked, MaskedHeader, Message, Scan, ScanHeader};
 /// The rows of an image in a payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
-    /// Position of the first row.
     pub first: usize,
     /// Bytes from one row to the next.
     pub stride: usize,
-    /// Bytes of a row.
     pub width: usize,
     pub count: usize,
-    /// Bytes of a cell.
     pub cell: usize,
     /// The encoding of the cells, as viewers name it.
     pub encoding: &'static str,

@@ -20,17 +20,13 @@ use crate::{
 /// The newest part of a recording, and what all parts before it hold.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Begun {
-    /// The first file.
     to: PathBuf,
-    /// See [`Head::id`].
     pub id: String,
-    /// The number of the newest part.
     pub part: usize,
     /// The positions behind the parts before it.
     pub positions: Positions,
 }
 
-/// The ledger of a run.
 #[derive(Clone, Debug)]
 pub struct Ledger(PathBuf);
 

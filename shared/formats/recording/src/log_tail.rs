@@ -13,7 +13,6 @@ use crate::LogLine;
 /// The most that is read at once, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A position in the log.
 pub struct LogTail {
     path: PathBuf,
     offset: u64,

@@ -9,13 +9,11 @@ use crate::Entry;
 /// The place behind the newest message of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
-    /// The number of the next message.
     pub next: u64,
     /// The generation of the newest one.
     pub generation: u32,
 }
 
-/// The positions of the topics of a recording.
 pub type Positions = BTreeMap<String, Position>;
 
 impl Position {

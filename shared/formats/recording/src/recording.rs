@@ -31,7 +31,6 @@ pub struct Stored {
     pub payload: Vec<u8>,
 }
 
-/// An open recording with all its parts.
 pub struct Recording {
     head: Head,
     parts: Vec<Part>,
@@ -43,9 +42,7 @@ pub struct Recording {
     kept: Vec<Kept>,
 }
 
-/// A file of a recording.
 struct Part {
-    /// See [`Head::part`].
     number: usize,
     file: McapFile,
     missed: BTreeMap<String, u64>,
@@ -53,7 +50,6 @@ struct Part {
     skipped: Vec<(String, GivenAnew)>,
 }
 
-/// The place of a message.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     entry: Entry,
@@ -64,7 +60,6 @@ struct Place {
 /// The messages of a part by topic, and the chunk that they are in.
 type Places = Vec<(String, Vec<Entry>, Span)>;
 
-/// The messages of a chunk in memory.
 struct Kept {
     part: usize,
     chunk: Span,
@@ -136,7 +131,6 @@ impl Recording {
         }
     }
 
-    /// Returns the run that it is of.
     pub fn head(&self) -> &Head {
         &self.head
     }
@@ -215,7 +209,6 @@ impl Recording {
         })
     }
 
-    /// Reads the header of a message.
     pub fn read_header<H: bytemuck::AnyBitPattern>(
         &mut self,
         topic: &str,
@@ -304,7 +297,6 @@ impl Part {
     }
 }
 
-/// Puts a message together.
 fn stored(
     messages: &[Message],
     channels: &BTreeMap<u16, Channel>,

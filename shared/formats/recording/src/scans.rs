@@ -20,7 +20,6 @@ const MAX_SCANS: u64 = 50_000_000;
 pub(crate) struct Scans {
     recording: Recording,
     files: FileList,
-    /// The scans by their number.
     entries: BTreeMap<usize, Entry>,
     first: SweepGeometry,
     period_ns: i64,
@@ -31,7 +30,6 @@ pub(crate) struct Scans {
 }
 
 impl Scans {
-    /// Opens the scans of a recording.
     pub fn open(mut recording: Recording) -> Result<Self, OpenError> {
         let entries: BTreeMap<usize, Entry> = recording
             .entries(Scan::TOPIC)

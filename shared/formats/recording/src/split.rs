@@ -23,7 +23,6 @@ pub struct Split {
     pub span_ns: Option<i64>,
 }
 
-/// Writes the files of a recording.
 pub struct SplitWriter {
     /// The first part.
     to: PathBuf,
@@ -61,7 +60,6 @@ impl SplitWriter {
         })
     }
 
-    /// Returns the file that is being written.
     pub fn path(&self) -> &Path {
         &self.writer.path
     }
@@ -101,17 +99,14 @@ impl SplitWriter {
         self.writer.missed(topic, missed);
     }
 
-    /// Adds a line of the log.
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         self.writer.add_log(line)
     }
 
-    /// Adds the health of the run.
     pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
         self.writer.add_health(json, now_ns)
     }
 
-    /// Writes a chunk if one is due.
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         self.writer.flush_if_due()
     }

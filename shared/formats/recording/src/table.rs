@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, fmt::Write};
 use gyre_messages::{GivenAnew, Item};
 use mcap::records::Metadata;
 
-/// The name of the record.
 const NAME: &str = "gyre.table";
 /// Before the name of a topic: the number of its messages that were missed, since the file was
 /// begun.
@@ -19,14 +18,11 @@ pub struct Entry {
     pub scan: u64,
     /// The time of its scan, ns since 1970.
     pub stamp_ns: i64,
-    /// See [`Item::generation`].
     pub generation: u32,
-    /// See [`Item::numbered_from`].
     pub numbered_from: u64,
 }
 
 impl Entry {
-    /// Returns its generation.
     pub(crate) fn given_anew(&self) -> GivenAnew {
         GivenAnew {
             generation: self.generation,
@@ -34,7 +30,6 @@ impl Entry {
         }
     }
 
-    /// Describes a message about an item.
     pub(crate) fn of(item: &Item) -> Self {
         Self {
             seq: item.seq,

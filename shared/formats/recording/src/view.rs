@@ -45,13 +45,9 @@ const RADAR: &str = "radar";
 const PREVIOUS: &str = "previous_scan";
 /// Display height of objects, m: a radar in the plane does not measure it.
 const OBJECT_HEIGHT_M: f64 = 1.6;
-/// Length of the head of an arrow, m.
 const ARROW_HEAD_M: f64 = 1.0;
-/// The channel of log lines.
 pub const LOG: &str = "/log";
-/// The channel of the trajectory.
 pub const TRAJECTORY: &str = "/trajectory";
-/// The channel of points.
 pub const POINTS: &str = "/points";
 
 /// A line of the log of a run.
@@ -61,9 +57,7 @@ pub struct LogLine {
     pub written_ns: i64,
     /// `ERROR`, `WARN`, `INFO` or `DEBUG`.
     pub level: String,
-    /// The process.
     pub stage: String,
-    /// The message with its fields.
     pub message: String,
 }
 
@@ -71,7 +65,6 @@ pub struct LogLine {
 #[derive(Clone, Debug)]
 pub struct View {
     pub channel: &'static str,
-    /// Returns the schema of the message.
     pub schema: fn() -> Option<Schema>,
     /// The message in protobuf.
     pub data: Vec<u8>,
@@ -82,7 +75,6 @@ pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
     pub name: &'static str,
-    /// Returns the schema of its messages.
     pub schema: fn() -> Option<Schema>,
 }
 
@@ -132,7 +124,6 @@ impl View {
         Some(Self::image(image_channel(topic)?, &rows, image, stamp_ns))
     }
 
-    /// Returns the image of a message.
     pub(crate) fn image(channel: &'static str, rows: &Rows, image: Vec<u8>, stamp_ns: i64) -> Self {
         let message = RawImage {
             timestamp: Some(timestamp(stamp_ns)),
@@ -180,7 +171,6 @@ impl View {
         Self::of(TRAJECTORY, &message)
     }
 
-    /// Returns a line of the log.
     pub fn log(line: &LogLine) -> Self {
         let level = match line.level.as_str() {
             "ERROR" => Level::Error,
@@ -243,7 +233,6 @@ fn views_of(topic: &str, header: &[u8]) -> Option<Vec<View>> {
     })
 }
 
-/// The last poses.
 #[derive(Default)]
 pub(crate) struct Recent {
     places: VecDeque<[f64; 3]>,
@@ -307,7 +296,6 @@ fn cube(object: &ListedObject) -> CubePrimitive {
     }
 }
 
-/// The way of an object in a second.
 fn arrow(object: &ListedObject) -> ArrowPrimitive {
     let (way_m, heading_rad) = (object.speed_mps(), object.vy_mps.atan2(object.vx_mps));
     ArrowPrimitive {
@@ -390,7 +378,6 @@ fn timestamp(ns: i64) -> Timestamp {
     Timestamp::new(seconds, (ns % 1_000_000_000) as u32)
 }
 
-/// The channel of a topic's image.
 pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
     match topic {
         Scan::TOPIC => Some("/scan"),

@@ -33,7 +33,6 @@ const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
 
-/// The encoding of messages for viewers.
 const PROTOBUF: &str = "protobuf";
 /// The channel of the run's health, and its schema: any JSON object.
 const HEALTH: &str = "/health";
@@ -43,7 +42,6 @@ const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 #[derive(Clone, Debug)]
 pub struct Incoming {
     pub topic: &'static str,
-    /// The bytes of the header.
     pub header: Vec<u8>,
     /// The bytes of the payload that the header describes.
     pub payload: Vec<u8>,
@@ -55,7 +53,6 @@ pub struct Incoming {
     pub skipped: Option<GivenAnew>,
 }
 
-/// Writes one file of a recording.
 pub struct RecordingWriter {
     pub(crate) path: PathBuf,
     /// `None` after a failure.
@@ -64,7 +61,6 @@ pub struct RecordingWriter {
     channels: BTreeMap<String, u16>,
     recent: Recent,
     table: Table,
-    /// The skipped generations since the last table.
     skipped: Vec<(&'static str, GivenAnew)>,
     /// Bytes of the messages since the last table, and when the first of them came.
     pending: (usize, Option<Instant>),
@@ -234,7 +230,6 @@ impl RecordingWriter {
         })
     }
 
-    /// Returns the bytes in the file.
     pub(crate) fn bytes(&self) -> u64 {
         self.disk.complete_bytes
     }
@@ -332,7 +327,6 @@ impl RecordingWriter {
         Ok(before.table.missed)
     }
 
-    /// Writes the remaining messages and the summary.
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         self.checked(|writer| {

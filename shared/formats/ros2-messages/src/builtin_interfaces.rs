@@ -30,7 +30,6 @@ impl Time {
         }
     }
 
-    /// Returns the time in ns since 1970.
     pub fn ns(self) -> i64 {
         i64::from(self.sec) * SECOND_NS + i64::from(self.nanosec)
     }

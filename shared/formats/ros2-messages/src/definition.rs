@@ -1,6 +1,5 @@
 //! Definitions of messages: names and fields, as ROS 2 writes them.
 
-/// The definition of a message type.
 #[derive(Debug)]
 pub struct Definition {
     /// The package, such as `nav_msgs`.
@@ -41,7 +40,6 @@ impl Definition {
         text
     }
 
-    /// Adds all types in this one, each once.
     fn collect(&self, parts: &mut Vec<&'static Definition>) {
         for part in self.parts.iter().copied().flatten() {
             if !parts.iter().any(|known| std::ptr::eq(*known, part)) {
@@ -52,7 +50,6 @@ impl Definition {
     }
 }
 
-/// A message of ROS 2.
 pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
     const DEFINITION: &'static Definition;
 }

@@ -80,7 +80,6 @@ impl Domain {
         self.interface.is_none_or(|address| !address.is_loopback())
     }
 
-    /// Returns the address of this machine on the only network that is used; `None`: all networks.
     pub fn interface(&self) -> Option<Ipv4Addr> {
         self.interface
     }

@@ -30,9 +30,7 @@ pub struct Frames {
     pub map: String,
     /// The frame of continuous odometry.
     pub odom: String,
-    /// The vehicle's frame.
     pub base: String,
-    /// The radar's frame.
     pub radar: String,
 }
 
@@ -65,7 +63,6 @@ impl Frames {
 }
 
 impl Default for Frames {
-    /// Returns the names of REP-105.
     fn default() -> Self {
         Self::of(["map", "odom", "base_link", "radar"].map(str::to_owned))
     }
@@ -77,7 +74,6 @@ pub struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
     pub motion: UncertainMotion,
-    /// The duration, ns.
     pub duration_ns: i64,
     /// True if it was measured, not predicted from earlier motions.
     pub is_measured: bool,

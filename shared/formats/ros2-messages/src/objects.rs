@@ -18,7 +18,6 @@ use crate::{
     visualization_msgs::{ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
 };
 
-/// The class of an object that moves.
 pub const MOVING: &str = "moving";
 /// The class of an object that moved, and stands now.
 pub const STANDING: &str = "standing";
@@ -105,7 +104,6 @@ fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {
     }
 }
 
-/// The way of an object in a second.
 fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
     let at = place(mounting, object).translation.vector;
     let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);

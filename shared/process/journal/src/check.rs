@@ -10,7 +10,6 @@ use crate::{JournalError, Records, record::RECORDS};
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;
 
-/// The content of a journal.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
     pub poses: u64,

@@ -35,7 +35,6 @@ const MAGIC: [u8; 16] = *b"gyre map v9     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
 /// continued with a different window.
 const MAX_WINDOW: usize = 66;
-/// Number of states in the ring.
 const STATES: usize = look_back(MAX_WINDOW);
 /// Bytes of the file's header: the start, the numbers of slots of both rings, the sizes of a
 /// state's and a keyframe's slot.
@@ -79,12 +78,10 @@ pub struct Checkpoint {
     keyframe: Vec<u8>,
 }
 
-/// The places of the two rings of a file.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     states: Slots,
     keyframes: Slots,
-    /// Number of slots for keyframes.
     count: usize,
 }
 
@@ -98,7 +95,6 @@ pub fn checksum(motion: &MotionEstimate) -> u64 {
     crc32fast::hash(bytemuck::bytes_of(motion)).into()
 }
 
-/// Returns the slot of the state after an item.
 fn slot_of(item: u64) -> u64 {
     item % STATES as u64
 }
@@ -272,7 +268,6 @@ impl Checkpoint {
         Ok(state.filter(|(header, _)| whole && header.item == item))
     }
 
-    /// Restores the state after `item`.
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
             path: self.file.file().path().to_owned(),
@@ -298,7 +293,6 @@ impl Checkpoint {
         }
     }
 
-    /// Returns the slot of a keyframe, if it is in the file.
     fn place_of(&self, name: Name) -> Option<u64> {
         let slot = self.keyframes.iter().position(|slot| *slot == Some(name));
         slot.map(|slot| slot as u64)

@@ -13,7 +13,6 @@ use thiserror::Error;
 
 use crate::JournalError;
 
-/// An error of the keyframes of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
     #[error(transparent)]
@@ -29,7 +28,6 @@ pub enum KeyframesError {
 pub struct Keyframes {
     log: RecordLog<Keyframe>,
     builder: KeyframeBuilder,
-    /// Memory for the points of a keyframe.
     points: Vec<SparsePoint>,
 }
 

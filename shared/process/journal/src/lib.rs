@@ -31,7 +31,6 @@ pub use gyre_storage::continue_when_full;
 use record::{MAGIC, RECORD, RECORDS, Record};
 pub use records::{Records, records, records_from};
 
-/// A journal open for appending.
 #[derive(Debug)]
 pub struct Journal {
     file: DurableFile,

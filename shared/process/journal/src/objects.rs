@@ -15,11 +15,8 @@ use crate::record::split;
 pub struct LoggedObjects {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
-    /// The sensor's own number of the scan.
     pub scan: u64,
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
-    /// The objects, in the frame of the odometry.
     pub objects: Vec<Object>,
 }
 
@@ -46,7 +43,6 @@ fn packed(matrix: &Matrix2<f64>) -> [f64; 3] {
     [matrix.m11, matrix.m12, matrix.m22]
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -55,7 +51,6 @@ struct Fixed {
     stamp_ns: i64,
 }
 
-/// An object in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct FixedObject {

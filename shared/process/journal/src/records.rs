@@ -14,7 +14,6 @@ use crate::{
     record::{ANY_VERSION, MAGIC, RECORD, RECORDS, Record},
 };
 
-/// Bytes that are read at once.
 const BUFFER: usize = 1 << 20;
 
 /// The records of a journal, oldest first. An incomplete one at the end is left out.
@@ -24,7 +23,6 @@ pub struct Records {
     reader: BufReader<File>,
     bytes: Box<[u8; RECORD]>,
     pub(crate) next: u64,
-    /// True if the header is whole.
     pub(crate) has_header: bool,
 }
 

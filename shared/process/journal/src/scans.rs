@@ -17,7 +17,6 @@ use crate::record::split;
 pub struct LoggedScan {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
-    /// The sensor's own number of the scan.
     pub scan: u64,
     /// Time of the scan, the middle of the sweep, ns.
     pub stamp_ns: i64,
@@ -25,11 +24,9 @@ pub struct LoggedScan {
     pub pose: Pose,
     /// Velocity of the sensor, from the motion into the scan; zero where the chain starts.
     pub twist: Twist,
-    /// The points as measured.
     pub points: Vec<SparsePoint>,
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -94,7 +91,6 @@ impl Record for LoggedScan {
     }
 }
 
-/// An error of the scans of a run.
 #[derive(Debug, Error)]
 pub enum ScansError {
     #[error(transparent)]

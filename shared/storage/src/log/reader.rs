@@ -10,7 +10,6 @@ use std::{
 use super::{LogError, LogMagic, MAX_BYTES};
 use crate::{GroupSync, StorageError, may_begin};
 
-/// Bytes of a record's header.
 const HEADER: usize = 20;
 /// A record begins at a multiple of so many bytes.
 const ALIGNMENT: usize = 4;
@@ -25,7 +24,6 @@ const IN_DANGER: usize = GroupSync::LIMIT as usize + 1;
 /// The most bytes that a death or a power failure can leave behind the complete records.
 const LONGEST_END: u64 = (IN_DANGER * (MAX_BYTES + MARGIN)) as u64;
 
-/// The header of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     index: u64,
@@ -56,7 +54,6 @@ impl Header {
         (valid && header.length as usize <= MAX_BYTES).then_some(header)
     }
 
-    /// Returns the bytes of the record with its header.
     fn record(&self) -> u64 {
         (HEADER + (self.length as usize).next_multiple_of(ALIGNMENT)) as u64
     }
@@ -86,11 +83,9 @@ pub struct LogReader {
     /// True if the file has its whole magic.
     pub(super) has_magic: bool,
     places: Vec<Place>,
-    /// Number of the first records that were the same before the last refresh.
     unchanged: usize,
 }
 
-/// The place of a record.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     end: u64,
@@ -151,7 +146,6 @@ impl LogReader {
         }
     }
 
-    /// Adds a record at the end.
     pub(super) fn push(&mut self, header: Header) {
         self.places.push(Place {
             end: self.end() + header.record(),
@@ -267,9 +261,6 @@ impl LogReader {
     }
 
     /// Reads a record, which replaces the content of `bytes`.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         let header = self.read_start(index, usize::MAX, bytes)?;
         bytes.truncate(header.length as usize);
@@ -281,9 +272,6 @@ impl LogReader {
 
     /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`.
     /// They are not checked: the checksum covers the whole record.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
     pub fn read_start(
         &self,
         index: usize,

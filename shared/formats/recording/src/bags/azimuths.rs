@@ -21,7 +21,6 @@ pub(crate) struct Described {
     pub azimuth_offset: u16,
 }
 
-/// Returns the description in a message of a topic of configurations.
 pub(crate) fn described(form: Form, message: &Message) -> Result<Described, String> {
     match form {
         Form::Numbers => {

@@ -22,7 +22,6 @@ use crate::{
 /// The description that a radar gives of itself, or why that cannot be used.
 type OwnDescription = Result<Described, String>;
 
-/// The files of a bag, and the spans of the messages in them.
 pub(crate) struct Bag {
     path: PathBuf,
     pub files: Vec<McapFile>,
@@ -30,7 +29,6 @@ pub(crate) struct Bag {
     spans: Vec<Placed>,
 }
 
-/// A span of a file.
 struct Placed {
     file: usize,
     span: Span,
@@ -44,7 +42,6 @@ struct Placed {
 pub(crate) struct Key {
     /// When the message was received, ns.
     ns: i64,
-    /// The number of its span.
     pub span: u32,
     /// The number in the span, among those that are wanted.
     number: u32,
@@ -58,7 +55,6 @@ const OVERLAP_NS: u64 = 1_000_000_000;
 /// The start of what zstd has compressed. No message in CDR begins so.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// A file with the spans of its messages and the times of all.
 type Timed = (McapFile, Vec<TimedSpan>, Times);
 
 impl Bag {
@@ -101,7 +97,6 @@ impl Bag {
         Ok(bag)
     }
 
-    /// Returns the file of a span.
     pub fn file_of(&self, span: u32) -> Option<&McapFile> {
         self.files.get(self.spans.get(span as usize)?.file)
     }
@@ -285,7 +280,6 @@ fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), Re
     Err(RecordingError::unreadable(folder, reason))
 }
 
-/// The sources of the description of a radar.
 pub(crate) struct Origin {
     /// True if it is the radar's own description, false if it follows from azimuths and options.
     pub is_own: bool,
@@ -294,7 +288,6 @@ pub(crate) struct Origin {
     pub counts: CountsOrigin,
 }
 
-/// The source of the encoder counts per turn.
 pub(crate) enum CountsOrigin {
     Configured,
     /// The radar's own counts, or the usual ones of most radars.

@@ -15,11 +15,9 @@ use crate::{
     file::{next, parse},
 };
 
-/// The description of a bag in its folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
 /// The key that a bag's description begins with.
 const INFORMATION: &str = "rosbag2_bagfile_information";
-/// The MCAP profile of bags.
 pub(crate) const PROFILE: &str = "ros2";
 /// The largest description that is read, bytes.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
@@ -80,7 +78,6 @@ struct Information {
     compression_mode: String,
 }
 
-/// The files of a bag.
 #[derive(Debug)]
 pub(crate) struct Files {
     pub paths: Vec<PathBuf>,
@@ -88,7 +85,6 @@ pub(crate) struct Files {
     pub are_in_order: bool,
 }
 
-/// Returns the files of a bag.
 pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
     let is_described = path.is_dir() && has_metadata(path);
     let paths = match path.is_dir() {
@@ -170,7 +166,6 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The error of a bag whose messages or files are compressed.
 pub(crate) fn compressed(path: &Path) -> RecordingError {
     RecordingError::unreadable(
         path,

@@ -24,7 +24,6 @@ pub fn fixes(path: &Path, topic: Option<&str>) -> Result<Option<BagFixes>, OpenE
     Ok(read(&mut bag, path, topic)?)
 }
 
-/// As [`fixes`], of an open bag.
 pub(crate) fn read(
     bag: &mut Bag,
     path: &Path,

@@ -23,7 +23,6 @@ pub(crate) const MAX_SAMPLES: usize = 2000;
 /// The rotation of Navtech's radars, turns per 1000 s, where the times do not show it.
 const ROTATION_MHZ: u16 = 4000;
 
-/// The properties of the radar that a message shows.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     encoder: u16,
@@ -37,7 +36,6 @@ struct Sample {
 pub(crate) struct Survey {
     kind: Kind,
     samples: Vec<Sample>,
-    /// Rows of whole turns.
     turns: Vec<Vec<RowShown>>,
 }
 
@@ -170,7 +168,6 @@ impl Survey {
         Some((usize::from(encoder_size) + step / 2) / step)
     }
 
-    /// Returns the rotation from the receive times of messages.
     fn rotation_mhz(&self, azimuths: usize) -> u16 {
         let measured = || {
             let (first, last) = (self.samples.first()?, self.samples.last()?);

@@ -28,7 +28,6 @@ use crate::bags::{
 use index::{Entry, Index};
 use notes::notes;
 
-/// Opens the scans in a bag.
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_files(path, &files(path)?, options)
@@ -65,7 +64,6 @@ fn open_files(
     Ok(Box::new(Scans::open(path, files, options)?))
 }
 
-/// The scans of a bag.
 struct Scans {
     path: PathBuf,
     bag: Bag,

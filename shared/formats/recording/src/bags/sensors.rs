@@ -8,7 +8,6 @@ use crate::bags::{
     bag::{Bag, Key},
 };
 
-/// Makes a measurement of a message.
 pub(crate) type Decode<T> = fn(&Message) -> Result<T, String>;
 
 /// A sensor, and how its messages become measurements.
@@ -17,11 +16,9 @@ pub(crate) struct Sensor<T: 'static> {
     pub section: &'static str,
     /// The measurements in words, such as `samples of the gyro`.
     pub measurements: &'static str,
-    /// The types of its messages.
     pub types: &'static [(&'static str, Decode<T>)],
 }
 
-/// The measurements on a topic.
 pub(crate) struct Measured<T> {
     pub topic: String,
     /// In the order of their log times.
@@ -101,7 +98,6 @@ impl<T> Sensor<T> {
         Err(RecordingError::unreadable(path, reason))
     }
 
-    /// Returns the reason why a topic of this name cannot be read.
     fn why_not(&self, wished: &str, topics: &BTreeMap<String, Decode<T>>) -> String {
         let names: Vec<&str> = self.types.iter().map(|(name, _)| *name).collect();
         let (names, section) = (names.join(" or "), self.section);

@@ -13,13 +13,11 @@ const PLAIN_BYTES: u64 = 4 << 20;
 /// The spans of a file: chunks, or records that are read together.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Spans {
-    /// Those with messages.
     pub messages: Vec<TimedSpan>,
     /// Those with the names of all channels, at the end of the file.
     pub summary: Vec<Span>,
 }
 
-/// A span with messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimedSpan {
     pub span: Span,
@@ -27,7 +25,6 @@ pub(crate) struct TimedSpan {
     pub times_ns: Times,
 }
 
-/// Finds the spans of a file.
 pub(crate) fn spans(file: &mut McapFile) -> Result<Spans, RecordingError> {
     let mut found = Spans::default();
     // Records outside of chunks.

@@ -6,7 +6,6 @@ use gyre_storage::quoted;
 
 use crate::bags::{Channel, RecordingError};
 
-/// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Azimuths(Form),
@@ -14,20 +13,17 @@ pub(crate) enum Kind {
     BScans,
     /// Whole turns as images alone.
     Images,
-    /// The radar's description of itself.
     Configuration(Form),
 }
 
 /// The number format of Navtech's driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Form {
-    /// As numbers.
     Numbers,
     /// As arrays of their bytes: the older form, which some have kept under the newer name.
     Bytes,
 }
 
-/// A topic of a radar.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Topic {
     pub name: String,
@@ -68,7 +64,6 @@ impl Topic {
     }
 }
 
-/// The topics that are read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Topics {
     pub scans: Topic,
@@ -128,7 +123,6 @@ impl Topics {
         })
     }
 
-    /// Returns whether a channel is one of them.
     pub fn has(&self, channel: &Channel) -> bool {
         let configuration = self.configuration.as_ref();
         channel.topic == self.scans.name

@@ -29,14 +29,12 @@ const LEVEL: u32 = 1;
 /// For whom `ros2 bag play` keeps the last message of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept {
-    /// For nobody: durability `volatile`.
     ForNobody,
     /// For subscribers that come later: durability `transient_local`, as `/tf_static` and maps have
     /// it.
     ForLater,
 }
 
-/// A topic of a bag that is written.
 #[derive(Debug)]
 pub struct Topic<T> {
     index: usize,
@@ -48,7 +46,6 @@ pub struct Topic<T> {
 pub struct BagWriter {
     path: PathBuf,
     aside: PathBuf,
-    /// The file within the folder.
     file_name: Option<String>,
     mcap: Writer<BufWriter<File>>,
     topics: Vec<Written>,
@@ -165,7 +162,6 @@ impl BagWriter {
         topics.map(|topic| (topic.name.as_str(), topic.messages))
     }
 
-    /// Ends the bag, and gives it its name.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
         let failed = |error: io::Error| unwritable(&path, error);
@@ -194,7 +190,6 @@ impl BagWriter {
 }
 
 impl Drop for BagWriter {
-    /// Removes a bag that is not complete.
     fn drop(&mut self) {
         if !self.committed {
             remove(&self.aside);

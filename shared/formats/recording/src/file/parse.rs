@@ -101,7 +101,6 @@ pub(super) enum Field {
 }
 
 impl Field {
-    /// Continues behind the field; `None` if the bytes end in it.
     fn skip(self, rest: &mut &[u8]) -> Option<()> {
         let bytes = match self {
             Self::Bytes(bytes) => bytes,

@@ -6,7 +6,6 @@ use crate::{navtech_msgs::RadarBScanMsg, sensor_msgs::Image};
 
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedAzimuth<'a> {
     pub azimuth: Azimuth<'a>,
@@ -115,7 +114,6 @@ fn azimuth(encoder: u16, stamp: u64, powers: &[u8]) -> Azimuth<'_> {
     }
 }
 
-/// The rows of an image of powers.
 #[derive(Clone, Copy)]
 struct PowerImage<'a> {
     data: &'a [u8],
@@ -161,7 +159,6 @@ impl<'a> PowerImage<'a> {
     }
 }
 
-/// Times of receipt within a turn.
 #[derive(Clone, Copy)]
 struct TurnTime {
     end_ns: i64,

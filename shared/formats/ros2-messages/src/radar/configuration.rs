@@ -20,7 +20,6 @@ const DEPTHS_M: RangeInclusive<f64> = 1e-3..=5.0;
 const MAX_TURNS_PER_S: u16 = 50;
 
 impl RadarConfigurationMsg {
-    /// Returns the radar's description of itself.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         Ok(Configuration {
             azimuth_samples: self.azimuth_samples,
@@ -51,7 +50,6 @@ impl RadarConfigurationMsg {
 }
 
 impl RadarConfigurationMessage {
-    /// Returns the radar's description of itself.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         let short = |field, bytes: &[u8]| number::<Self, 2>(field, bytes).map(u16::from_be_bytes);
         // Unlike the others: the driver copies the double as its computer has it.

@@ -18,7 +18,6 @@ const ROUNDING_RAD: f64 = 2e-6;
 /// The counts of an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
-    /// Counts per turn.
     pub counts: u16,
     /// True if the angles of the scan are such counts, but for rounding.
     pub is_exact: bool,
@@ -65,7 +64,6 @@ fn is_near_count(azimuth_rad: f32, counts: u16) -> bool {
     apart.abs() < ROUNDING_RAD || (TAU - apart.abs()).abs() < ROUNDING_RAD
 }
 
-/// Writes scans as messages of Navtech's driver.
 #[derive(Clone, Debug)]
 pub struct ScanMessages {
     radar: Configuration,
@@ -83,7 +81,6 @@ impl ScanMessages {
         }
     }
 
-    /// Returns the radar's description of itself.
     pub fn configuration(&self, stamp_ns: i64) -> RadarConfigurationMsg {
         RadarConfigurationMsg::of(&self.radar, self.header(stamp_ns))
     }

@@ -25,12 +25,10 @@ pub(super) const fn state_bytes(max_keyframes: usize) -> usize {
     8 * (STATE_WORDS + NAME_WORDS * max_keyframes)
 }
 
-/// The header of a state's slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StateHeader {
     /// The item after which the state was written.
     pub item: u64,
-    /// The checksum of the item's motion.
     pub motion: u64,
 }
 
@@ -38,7 +36,6 @@ pub(super) struct StateHeader {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
     pub id: u64,
-    /// The checksum of the slot.
     pub check: u64,
 }
 

@@ -20,7 +20,6 @@ use crate::bags::{
 /// Turns among which one of the same time is looked for.
 const RECENT: usize = 8;
 
-/// Place of an azimuth in a bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
     pub message: Key,
@@ -28,14 +27,12 @@ pub(super) struct Place {
     pub row: u32,
 }
 
-/// A scan.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
     /// The azimuth before its first one, which shows the assembler where the scan begins.
     pub start: Place,
     /// The azimuth that completes it.
     pub end: Place,
-    /// The spans of its messages.
     pub spans: RangeInclusive<u32>,
     pub stamp_ns: i64,
     pub logged_ns: i64,
@@ -52,9 +49,7 @@ pub(super) struct Index {
     counters: Counters,
     /// Messages of turns that others have too.
     pub repeated: BTreeSet<Key>,
-    /// Messages that cannot be decoded.
     damaged_messages: u64,
-    /// Why the first of these messages cannot be decoded.
     first_damage: Option<String>,
     /// Azimuths in those that can be.
     azimuths: u64,
@@ -147,7 +142,6 @@ impl Index {
     }
 }
 
-/// An index that is being made.
 struct Indexing {
     kind: Kind,
     described: Described,
@@ -158,11 +152,9 @@ struct Indexing {
     /// Azimuths that the clock holds back.
     held: Vec<Place>,
     previous: Option<Place>,
-    /// The start of the next scan.
     start: Option<Place>,
     /// The spans of its azimuths so far.
     spans: RangeInclusive<u32>,
-    /// The newest turns.
     recent: VecDeque<u64>,
     index: Index,
 }
@@ -277,7 +269,6 @@ impl Indexing {
         self.keep_clock();
     }
 
-    /// Keeps the clock where it has changed.
     fn keep_clock(&mut self) {
         if self.clock.found() == self.found {
             return;
@@ -306,12 +297,10 @@ impl Indexing {
     }
 }
 
-/// Returns the span of a place.
 fn only(place: Place) -> RangeInclusive<u32> {
     place.message.span..=place.message.span
 }
 
-/// Returns the spans, extended by the span of a place.
 fn joined(spans: &RangeInclusive<u32>, place: Place) -> RangeInclusive<u32> {
     let span = place.message.span;
     span.min(*spans.start())..=span.max(*spans.end())

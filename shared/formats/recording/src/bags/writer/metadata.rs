@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use super::Kept;
 
-/// A topic of a bag.
 pub(super) struct Described {
     pub name: String,
     pub type_name: String,
