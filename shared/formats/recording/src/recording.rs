@@ -2,6 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -31,19 +32,21 @@ pub struct Stored {
     pub payload: Vec<u8>,
 }
 
+/// An open recording: at least one part.
+#[derive(Default)]
 pub struct Recording {
-    head: Head,
     parts: Vec<Part>,
     /// The messages of each topic by their sequence number.
     places: BTreeMap<String, BTreeMap<u64, Place>>,
     generations: BTreeMap<NumberedBy, Generations>,
     /// Files of other recordings.
     left_out: Vec<PathBuf>,
-    kept: Vec<Kept>,
+    /// The messages of some chunks, and the parts that they are in.
+    kept: Vec<(usize, Span, Vec<Message>)>,
 }
 
 struct Part {
-    number: usize,
+    head: Head,
     file: McapFile,
     missed: BTreeMap<String, u64>,
     /// The generations of a topic without a recorded message.
@@ -60,44 +63,36 @@ struct Place {
 /// The messages of a part by topic, and the chunk that they are in.
 type Places = Vec<(String, Vec<Entry>, Span)>;
 
-struct Kept {
-    part: usize,
-    chunk: Span,
-    messages: Vec<Message>,
-}
-
 impl Recording {
     /// Opens the files of a recording, in order. Files of a different recording than the first are
     /// left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
-        let mut recording: Option<Self> = None;
+        let mut recording = Self::default();
         for path in paths {
-            let (head, part, places) = Part::open(path)?;
-            let recording = recording.get_or_insert_with(|| Self {
-                head: head.clone(),
-                parts: Vec::new(),
-                places: BTreeMap::new(),
-                generations: BTreeMap::new(),
-                left_out: Vec::new(),
-                kept: Vec::new(),
-            });
-            match head.id == recording.head.id {
+            let (part, places) = Part::open(path)?;
+            let mut parts = recording.parts.iter();
+            match parts.all(|other| other.head.id == part.head.id) {
                 true => recording.add(part, places),
                 false => recording.left_out.push(path.clone()),
             }
         }
-        let none = std::io::ErrorKind::NotFound.into();
-        recording.ok_or_else(|| RecordingError::io(Path::new(""), none))
+        match recording.parts.is_empty() {
+            true => Err(RecordingError::io(
+                Path::new(""),
+                io::ErrorKind::NotFound.into(),
+            )),
+            false => Ok(recording),
+        }
     }
 
     /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:
     /// the first message of a generation makes earlier ones void.
-    fn add(&mut self, part: Part, places: Places) {
-        let number = self.parts.len();
-        for (topic, skipped) in &part.skipped {
+    fn add(&mut self, added: Part, places: Places) {
+        let part = self.parts.len();
+        for (topic, skipped) in &added.skipped {
             self.note(NumberedBy::of(topic), *skipped);
         }
-        self.parts.push(part);
+        self.parts.push(added);
         for (topic, entries, chunk) in places {
             let by = NumberedBy::of(&topic);
             for entry in &entries {
@@ -105,14 +100,9 @@ impl Recording {
             }
             let generations = self.generations.entry(by).or_default();
             let places = self.places.entry(topic).or_default();
-            for entry in entries {
-                if !generations.makes_void(&entry) {
-                    places.entry(entry.seq).or_insert(Place {
-                        entry,
-                        part: number,
-                        chunk,
-                    });
-                }
+            for entry in entries.into_iter().filter(|it| !generations.makes_void(it)) {
+                let place = Place { entry, part, chunk };
+                places.entry(entry.seq).or_insert(place);
             }
         }
     }
@@ -132,7 +122,7 @@ impl Recording {
     }
 
     pub fn head(&self) -> &Head {
-        &self.head
+        &self.parts[0].head
     }
 
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
@@ -168,7 +158,7 @@ impl Recording {
 
     /// Returns the numbers of the parts that are not there, as far as later ones are.
     pub fn absent_parts(&self) -> Vec<usize> {
-        let there: BTreeSet<usize> = self.parts.iter().map(|part| part.number).collect();
+        let there: BTreeSet<usize> = self.parts.iter().map(|part| part.head.part).collect();
         let last = there.last().copied().unwrap_or_default();
         // A damaged head may have any number.
         let absent = (1..last).filter(|number| !there.contains(number));
@@ -200,7 +190,7 @@ impl Recording {
             )));
         };
         let kept = self.keep(place)?;
-        let (messages, file) = (&self.kept[kept].messages, &self.parts[place.part].file);
+        let ((_, _, messages), file) = (&self.kept[kept], &self.parts[place.part].file);
         stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| {
             let reason = format!(
                 "it has no complete message {seq} of topic `{topic}`, which its table lists"
@@ -224,8 +214,9 @@ impl Recording {
     /// Returns the position of a chunk among those in memory, and reads it first if it is not
     /// there.
     fn keep(&mut self, place: Place) -> Result<usize, RecordingError> {
-        let is_it = |kept: &Kept| (kept.part, kept.chunk) == (place.part, place.chunk);
-        if let Some(index) = self.kept.iter().position(is_it) {
+        let mut kept = self.kept.iter();
+        let wanted = (place.part, place.chunk);
+        if let Some(index) = kept.position(|(part, chunk, _)| (*part, *chunk) == wanted) {
             return Ok(index);
         }
         if self.kept.len() == KEPT {
@@ -233,20 +224,16 @@ impl Recording {
         }
         let file = &mut self.parts[place.part].file;
         let messages = file.read(place.chunk, |_| true)?;
-        self.kept.push(Kept {
-            part: place.part,
-            chunk: place.chunk,
-            messages,
-        });
+        self.kept.push((place.part, place.chunk, messages));
         Ok(self.kept.len() - 1)
     }
 }
 
 impl Part {
     /// Opens a file: its head, and where its messages are.
-    fn open(path: &Path) -> Result<(Head, Self, Places), RecordingError> {
+    fn open(path: &Path) -> Result<(Self, Places), RecordingError> {
         let mut part = Self {
-            number: 0,
+            head: Head::default(),
             file: McapFile::open(path)?,
             missed: BTreeMap::new(),
             skipped: Vec::new(),
@@ -280,12 +267,11 @@ impl Part {
                 part.file.damage.insert(span.offset);
             }
         }
-        let head: Head = head.ok_or_else(|| match part.file.damage.first() {
+        part.head = head.ok_or_else(|| match part.file.damage.first() {
             None => RecordingError::foreign(path, NO_HEAD),
             Some(offset) => RecordingError::damaged(path, *offset, NO_HEAD),
         })?;
-        part.number = head.part;
-        Ok((head, part, places))
+        Ok((part, places))
     }
 
     /// Learns the channels in a place, unless it is damaged.
