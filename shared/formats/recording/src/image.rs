@@ -101,23 +101,29 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    fn rows(first: usize, stride: usize, width: usize, count: usize) -> Rows {
+        Rows {
+            first,
+            stride,
+            width,
+            count,
+            cell: 1,
+            encoding: "mono8",
+        }
+    }
+
     #[test]
     fn a_payload_is_put_together_as_it_was_taken_apart() {
         let payload: Vec<u8> = (0..=255).collect();
-        for (first, stride, width, count) in
-            [(0, 8, 8, 4), (11, 20, 9, 3), (3, 64, 64, 1), (5, 7, 1, 30)]
-        {
-            let rows = Rows {
-                first,
-                stride,
-                width,
-                count,
-                cell: 1,
-                encoding: "mono8",
-            };
+        for rows in [
+            rows(0, 8, 8, 4),
+            rows(11, 20, 9, 3),
+            rows(3, 64, 64, 1),
+            rows(5, 7, 1, 30),
+        ] {
             let (image, rest) = rows.split(&payload).unwrap();
-            assert_eq!(image.len(), width * count);
-            assert_eq!(image[0], first as u8);
+            assert_eq!(image.len(), rows.width * rows.count);
+            assert_eq!(image[0], rows.first as u8);
             assert_eq!(image.len() + rest.len(), payload.len());
             assert_eq!(rows.join(&image, &rest).unwrap(), payload, "{rows:?}");
             assert_eq!(rows.join(&image[1..], &rest), None);
@@ -126,20 +132,8 @@ mod tests {
 
     #[test]
     fn an_image_beyond_its_payload_is_none() {
-        let rows = Rows {
-            first: 0,
-            stride: 10,
-            width: 10,
-            count: 3,
-            cell: 1,
-            encoding: "mono8",
-        };
-        assert_eq!(rows.split(&[0; 29]), None);
-        let absurd = Rows {
-            first: usize::MAX,
-            stride: usize::MAX,
-            ..rows
-        };
+        assert_eq!(rows(0, 10, 10, 3).split(&[0; 29]), None);
+        let absurd = rows(usize::MAX, usize::MAX, 10, 3);
         assert_eq!(absurd.split(&[0; 29]), None);
         assert_eq!(absurd.join(&[0; 30], &[]), None);
     }

@@ -61,32 +61,6 @@ fn messages_come_back() {
     });
 }
 
-/// The bytes of a message with an empty frame, counted by hand: CDR aligns numbers to their size,
-/// from behind the first four bytes.
-#[test]
-fn numbers_are_aligned_from_behind_the_encapsulation() {
-    let message = RadarFftDataMsg {
-        header: Header::new(2_000_000_003, "r"),
-        angle: 1.0,
-        azimuth: 0x0102,
-        sweep_counter: 3,
-        ntp_seconds: 4,
-        ntp_split_seconds: 5,
-        data: vec![6, 7, 8],
-        data_length: 3,
-    };
-    let expected = [
-        &[0, 1, 0, 0][..],
-        &[2, 0, 0, 0, 3, 0, 0, 0],
-        &[2, 0, 0, 0, b'r', 0, 0, 0],
-        &1.0_f64.to_le_bytes(),
-        &[2, 1, 3, 0, 4, 0, 0, 0, 5, 0, 0, 0],
-        &[3, 0, 0, 0, 6, 7, 8, 0],
-        &[3, 0],
-    ];
-    assert_eq!(encode(&message).unwrap(), expected.concat());
-}
-
 #[test]
 fn big_endian_messages_are_read() {
     let bytes = [

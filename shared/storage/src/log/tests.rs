@@ -45,19 +45,6 @@ fn corrupt(path: &Path, index: usize, byte: usize) {
 }
 
 #[test]
-fn appended_records_are_read_back_and_appended_to() {
-    let (_folder, path) = log_of(50);
-    require_records(&path, 50);
-    let mut log = Log::open(&path, MAGIC).unwrap();
-    assert_eq!(log.len(), 50);
-    log.append(&record(50)).unwrap();
-    require_records(&path, 51);
-    let mut bytes = Vec::new();
-    log.read(50, &mut bytes).unwrap();
-    assert_eq!(bytes, record(50));
-}
-
-#[test]
 fn an_incomplete_record_at_the_end_is_not_seen_and_cut_off_whatever_its_length() {
     let (_folder, path) = log_of(4);
     let complete = fs::read(&path).unwrap();
