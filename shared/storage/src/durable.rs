@@ -16,8 +16,8 @@ pub struct Busy {
 /// A file that one process at a time changes in place, and that a thread synchronises.
 #[derive(Debug)]
 pub struct DurableFile {
-    file: File,
-    sync: GroupSync,
+    pub file: File,
+    pub sync: GroupSync,
 }
 
 impl DurableFile {
@@ -40,34 +40,15 @@ impl DurableFile {
         })
     }
 
-    pub fn file(&self) -> &File {
-        &self.file
-    }
-
     /// Fills `bytes` with the content of a slot; false if the file ends before.
     /// [`Checksum::is_right`] checks whether it is whole.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
 
-    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts the writes.
+    /// Writes `bytes` at the start of a slot. [`GroupSync::changed`] counts the writes.
     pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
         self.file.write_at(bytes, slots.offset(slot))
-    }
-
-    /// As [`GroupSync::changed`].
-    pub fn changed(&self) -> Result<(), StorageError> {
-        self.sync.changed()
-    }
-
-    /// As [`GroupSync::finish`].
-    pub fn finish(&self) -> Result<(), StorageError> {
-        self.sync.finish()
-    }
-
-    /// As [`GroupSync::safe`].
-    pub fn safe(&self) -> Option<u64> {
-        self.sync.safe()
     }
 }
 
@@ -180,7 +161,7 @@ mod tests {
         let open = || DurableFile::open::<TestError>(&path, |_| Ok(()));
         let (file, slots) = (open().unwrap(), Slots { start: 3, bytes: 5 });
         file.write(&slots, 2, b"whole").unwrap();
-        file.changed().unwrap();
+        file.sync.changed().unwrap();
         let mut bytes = [0; 5];
         assert!(file.read(&slots, 2, &mut bytes).unwrap() && bytes == *b"whole");
         assert!(!file.read(&slots, 3, &mut bytes).unwrap());

@@ -104,13 +104,11 @@ impl Log {
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
-            return Err(StorageError::at("write", self.file.file().path())(too_long).into());
+            return Err(StorageError::at("write", self.file.file.path())(too_long).into());
         }
         let header = encode(self.len(), record, &mut self.buffer);
-        self.file
-            .file()
-            .write_at(&self.buffer, self.records.end())?;
-        self.file.file().require_name()?;
+        self.file.file.write_at(&self.buffer, self.records.end())?;
+        self.file.file.require_name()?;
         self.records.push(header);
         self.appended = self.changes + 1;
         self.count()
@@ -120,7 +118,7 @@ impl Log {
     /// most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of them are made before the records
     /// survive a power failure.
     pub fn rely(&mut self) -> Result<(), LogError> {
-        match self.file.safe() >= Some(self.appended) {
+        match self.file.sync.safe() >= Some(self.appended) {
             true => Ok(()),
             false => self.count(),
         }
@@ -128,13 +126,13 @@ impl Log {
 
     fn count(&mut self) -> Result<(), LogError> {
         self.changes += 1;
-        Ok(self.file.changed()?)
+        Ok(self.file.sync.changed()?)
     }
 
     /// Makes all records survive a power failure.
     pub fn sync(&self) -> Result<(), LogError> {
-        self.file.file().require_name()?;
-        Ok(self.file.finish()?)
+        self.file.file.require_name()?;
+        Ok(self.file.sync.finish()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.
@@ -152,8 +150,8 @@ impl Log {
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         if records < self.len() {
             self.records.truncate(records);
-            self.file.file().set_length(self.records.end())?;
-            self.file.file().sync()?;
+            self.file.file.set_length(self.records.end())?;
+            self.file.file.sync()?;
         }
         Ok(())
     }

@@ -195,7 +195,7 @@ impl Checkpoint {
         self.write_keyframes(refiner)?;
         if !known {
             self.file.write(&states, slot, &self.state)?;
-            self.file.changed()?;
+            self.file.sync.changed()?;
         }
         Ok(())
     }
@@ -270,7 +270,7 @@ impl Checkpoint {
 
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
-            path: self.file.file().path().to_owned(),
+            path: self.file.file.path().to_owned(),
             item: item.saturating_add(1),
         };
         let Some((_, tracker)) = self.read_state(item)? else {

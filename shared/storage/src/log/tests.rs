@@ -203,7 +203,7 @@ fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
     log.append(&record(1)).unwrap();
     for _ in 0..10 * LIMIT {
         log.rely().unwrap();
-        let safe = log.file.safe().unwrap_or(0);
+        let safe = log.file.sync.safe().unwrap_or(0);
         assert!(log.changes - safe <= GroupSync::LIMIT);
     }
     // The record is safe, and nothing more is counted.
