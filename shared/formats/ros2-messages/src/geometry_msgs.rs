@@ -131,6 +131,12 @@ package! { geometry_msgs:
     }
 }
 
+impl Vector3 {
+    pub(crate) fn new(x: f64, y: f64, z: f64) -> Self {
+        Self { x, y, z }
+    }
+}
+
 impl TwistStamped {
     /// Returns the speed ahead as a sample of the wheels, on the driver's clock: see
     /// [`Header::stamp_or`].

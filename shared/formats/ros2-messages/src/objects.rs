@@ -112,11 +112,7 @@ fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
         ns: "velocities".to_owned(),
         r#type: ARROW,
         pose: lifted(&ahead, DRAWN_HEIGHT_M),
-        scale: Vector3 {
-            x: object.speed_mps(),
-            y: ARROW_M,
-            z: ARROW_M,
-        },
+        scale: Vector3::new(object.speed_mps(), ARROW_M, ARROW_M),
         color: colour(object, 1.0),
         ..Marker::default()
     }
@@ -127,10 +123,7 @@ fn name(mounting: &Mounting, object: &ListedObject) -> Marker {
         ns: "identities".to_owned(),
         r#type: TEXT_VIEW_FACING,
         pose: lifted(&place(mounting, object), DRAWN_HEIGHT_M + LETTER_M),
-        scale: Vector3 {
-            z: LETTER_M,
-            ..Vector3::default()
-        },
+        scale: Vector3::new(0.0, 0.0, LETTER_M),
         color: colour(object, 1.0),
         text: object.id.to_string(),
         ..Marker::default()
@@ -158,11 +151,7 @@ fn lifted(place: &Pose, height_m: f64) -> geometry_msgs::Pose {
 }
 
 fn size(object: &ListedObject, height_m: f64) -> Vector3 {
-    Vector3 {
-        x: object.length_m,
-        y: object.width_m,
-        z: height_m,
-    }
+    Vector3::new(object.length_m, object.width_m, height_m)
 }
 
 /// Returns the covariance of the centre, turned by the mounting.

@@ -41,7 +41,7 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
         let index = places.next - 1;
         // However long the file is, the answer is known here.
         if let Some(first) = first_invalid.filter(|first| index > first + GroupSync::LIMIT) {
-            return Err(damaged(path, first));
+            return Err(JournalError::damaged(path, first));
         }
         match (place?, first_invalid) {
             // Nothing follows the end of the stream.
@@ -62,20 +62,13 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
         }
     }
     match first_invalid {
-        Some(first) if known_safe > first => Err(damaged(path, first)),
+        Some(first) if known_safe > first => Err(JournalError::damaged(path, first)),
         _ => Ok(Content {
             poses: valid - u64::from(ended),
             ended,
             torn: places.next - valid,
             last,
         }),
-    }
-}
-
-fn damaged(path: &Path, pose: u64) -> JournalError {
-    JournalError::Damaged {
-        path: path.to_owned(),
-        pose,
     }
 }
 
@@ -87,10 +80,9 @@ pub fn cut(path: &Path, records: u64) -> Result<(), JournalError> {
         let path = path.to_owned();
         return Err(Busy { path }.into());
     }
-    file.set_length(if records == 0 {
-        0
-    } else {
-        RECORDS.offset(records)
+    file.set_length(match records {
+        0 => 0,
+        _ => RECORDS.offset(records),
     })?;
     Ok(file.sync()?)
 }

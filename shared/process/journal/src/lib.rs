@@ -84,12 +84,8 @@ impl Journal {
             }
             let whole = self.file.read(&RECORDS, index, &mut bytes)?;
             let record = Record::decode(&bytes, index).filter(|_| whole);
-            let pose = record
-                .map(|record| record.pose)
-                .ok_or_else(|| JournalError::Damaged {
-                    path: self.file.file.path().to_owned(),
-                    pose: index,
-                })?;
+            let damaged = || JournalError::damaged(self.file.file.path(), index);
+            let pose = record.ok_or_else(damaged)?.pose;
             match pose.item.is(flag::END) {
                 true => ended = true,
                 false => poses.push(pose),

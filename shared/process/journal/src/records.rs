@@ -46,13 +46,10 @@ impl Iterator for Records {
     type Item = Result<PoseHeader, JournalError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let pose = self.next;
-        Some(self.read()?.and_then(|record| match record {
-            Some(record) => Ok(record.pose),
-            None => Err(JournalError::Damaged {
-                path: self.path.clone(),
-                pose,
-            }),
+        let index = self.next;
+        Some(self.read()?.and_then(|record| {
+            let record = record.ok_or_else(|| JournalError::damaged(&self.path, index))?;
+            Ok(record.pose)
         }))
     }
 }

@@ -42,10 +42,9 @@ impl RadarBScanMsg {
         let has_turned = encoders.iter().any(|encoder| *encoder != 0);
         let mut last = None;
         let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
-            let is_written = if has_clock {
-                *stamp != 0
-            } else {
-                *encoder != 0 || (*row == 0 && has_turned)
+            let is_written = match has_clock {
+                true => *stamp != 0,
+                false => *encoder != 0 || (*row == 0 && has_turned),
             };
             let follows = last.is_none_or(|last| last < *encoder);
             if is_written && follows {
@@ -76,9 +75,8 @@ fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
     let apart = |unit: &u64| (advance * *unit as f64 / expected_ns).ln().abs();
     // Of times that do not advance all are equally far: they are as they should be.
     let units = [1, 1_000, 1_000_000].into_iter();
-    units
-        .min_by(|a, b| apart(a).total_cmp(&apart(b)))
-        .unwrap_or(1)
+    let nearest = units.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.unwrap_or(1)
 }
 
 impl Image {
