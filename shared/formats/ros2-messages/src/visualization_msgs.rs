@@ -14,7 +14,7 @@ pub const ARROW: i32 = 0;
 pub const CUBE: i32 = 1;
 /// The type of a marker that is a text, whose letters are as high as `scale.z`.
 pub const TEXT_VIEW_FACING: i32 = 9;
-/// The action that removes all markers of the topic; that of a marker which is drawn is zero.
+/// The action that removes all markers of the topic. Zero draws a marker.
 pub const DELETEALL: i32 = 3;
 
 package! { visualization_msgs:
