@@ -55,11 +55,8 @@ pub(crate) fn to_metadata(topic: &str, skipped: GivenAnew) -> Metadata {
 }
 
 pub(crate) fn of_metadata(record: &Metadata) -> Option<(String, GivenAnew)> {
-    let of = record.metadata.first_key_value()?;
-    let ((topic, value), true) = (of, record.name == NAME) else {
-        return None;
-    };
-    let (generation, first) = value.split_once(':')?;
+    let (topic, value) = record.metadata.first_key_value()?;
+    let (generation, first) = value.split_once(':').filter(|_| record.name == NAME)?;
     let skipped = GivenAnew {
         generation: generation.parse().ok()?,
         first: first.parse().ok()?,

@@ -20,37 +20,35 @@ impl Rows {
     /// Returns the image of a message; `None` for a topic without one, or a header without rows.
     pub fn of(topic: &str, header: &[u8]) -> Option<Self> {
         let rows = match topic {
-            Scan::TOPIC => Self::of_scan(&read(header)?),
-            Masked::TOPIC => Self::of_raster(&read(header)?),
+            // The powers, azimuth x range bin.
+            Scan::TOPIC => {
+                let header: ScanHeader = read(header)?;
+                Self {
+                    first: header.first_byte as usize,
+                    // Of a single row it has no meaning.
+                    stride: header.stride.max(header.bins) as usize,
+                    width: header.bins as usize,
+                    count: header.azimuths as usize,
+                    cell: 1,
+                    encoding: "mono8",
+                }
+            }
+            // The first raster, n x n.
+            Masked::TOPIC => {
+                let count = read::<MaskedHeader>(header)?.n as usize;
+                let width = count * size_of::<f32>();
+                Self {
+                    first: 0,
+                    stride: width,
+                    width,
+                    count,
+                    cell: size_of::<f32>(),
+                    encoding: "32FC1",
+                }
+            }
             _ => return None,
         };
         (rows.count > 0 && rows.width > 0 && rows.width <= rows.stride).then_some(rows)
-    }
-
-    /// The powers, azimuth x range bin.
-    fn of_scan(header: &ScanHeader) -> Self {
-        Self {
-            first: header.first_byte as usize,
-            // Of a single row it has no meaning.
-            stride: header.stride.max(header.bins) as usize,
-            width: header.bins as usize,
-            count: header.azimuths as usize,
-            cell: 1,
-            encoding: "mono8",
-        }
-    }
-
-    /// The first raster, n x n.
-    fn of_raster(header: &MaskedHeader) -> Self {
-        let width = header.n as usize * size_of::<f32>();
-        Self {
-            first: 0,
-            stride: width,
-            width,
-            count: header.n as usize,
-            cell: size_of::<f32>(),
-            encoding: "32FC1",
-        }
     }
 
     /// Returns the image and the rest of a payload, in order; `None` if the payload is shorter than

@@ -46,10 +46,8 @@ impl LogTail {
         };
         let rest = self.begun.split_off(end + 1);
         let lines = std::mem::replace(&mut self.begun, rest);
-        lines
-            .split(|byte| *byte == b'\n')
-            .filter_map(|line| parse(line, now_ns))
-            .collect()
+        let lines = lines.split(|byte| *byte == b'\n');
+        lines.filter_map(|line| parse(line, now_ns)).collect()
     }
 
     fn appended(&mut self) -> Option<Vec<u8>> {

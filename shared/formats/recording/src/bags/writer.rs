@@ -48,14 +48,9 @@ pub struct BagWriter {
     aside: PathBuf,
     file_name: Option<String>,
     mcap: Writer<BufWriter<File>>,
-    topics: Vec<Written>,
+    topics: Vec<Described>,
     times: Option<(i64, i64)>,
     committed: bool,
-}
-
-struct Written {
-    channel: u16,
-    described: Described,
 }
 
 impl BagWriter {
@@ -106,16 +101,16 @@ impl BagWriter {
         kept: Kept,
     ) -> Result<Topic<T>, RecordingError> {
         let definition = T::DEFINITION;
-        let described = Described {
+        let mut described = Described {
+            channel: 0,
             name: name.to_owned(),
             type_name: definition.type_name(),
             qualities: metadata::qualities(kept),
             messages: 0,
         };
-        let channel = self
-            .add_channel(&described, &definition.text())
-            .map_err(|error| unwritable(&self.path, error))?;
-        self.topics.push(Written { channel, described });
+        let channel = self.add_channel(&described, &definition.text());
+        described.channel = channel.map_err(|error| unwritable(&self.path, error))?;
+        self.topics.push(described);
         Ok(Topic {
             index: self.topics.len() - 1,
             message: PhantomData,
@@ -123,10 +118,8 @@ impl BagWriter {
     }
 
     fn add_channel(&mut self, topic: &Described, schema: &str) -> Result<u16, McapError> {
-        let type_name = &topic.type_name;
-        let schema = self
-            .mcap
-            .add_schema(type_name, "ros2msg", schema.as_bytes())?;
+        let (name, schema) = (&topic.type_name, schema.as_bytes());
+        let schema = self.mcap.add_schema(name, "ros2msg", schema)?;
         let qualities = ("offered_qos_profiles".to_owned(), topic.qualities.clone());
         let metadata = BTreeMap::from([qualities]);
         self.mcap.add_channel(schema, &topic.name, "cdr", &metadata)
@@ -141,15 +134,15 @@ impl BagWriter {
     ) -> Result<(), RecordingError> {
         let data = encode(message)
             .map_err(|error| RecordingError::Other(format!("cannot write a message: {error}")))?;
-        let written = &mut self.topics[topic.index];
+        let topic = &mut self.topics[topic.index];
         let time = u64::try_from(log_ns).unwrap_or_default();
         let header = MessageHeader {
-            channel_id: written.channel,
-            sequence: written.described.messages as u32,
+            channel_id: topic.channel,
+            sequence: topic.messages as u32,
             log_time: time,
             publish_time: time,
         };
-        written.described.messages += 1;
+        topic.messages += 1;
         let (first, last) = self.times.unwrap_or((log_ns, log_ns));
         self.times = Some((first.min(log_ns), last.max(log_ns)));
         let written = self.mcap.write_to_known_channel(&header, &data);
@@ -158,7 +151,7 @@ impl BagWriter {
 
     /// Returns the names of the topics, and how many messages each has.
     pub fn counts(&self) -> impl Iterator<Item = (&str, u64)> {
-        let topics = self.topics.iter().map(|topic| &topic.described);
+        let topics = self.topics.iter();
         topics.map(|topic| (topic.name.as_str(), topic.messages))
     }
 
@@ -170,8 +163,7 @@ impl BagWriter {
             .map_err(|error| unwritable(&path, error))?;
         let mut files = Vec::new();
         if let Some(file) = &self.file_name {
-            let topics: Vec<&Described> = self.topics.iter().map(|t| &t.described).collect();
-            let text = metadata::text(file, &topics, self.times);
+            let text = metadata::text(file, &self.topics, self.times);
             let description = self.aside.join(METADATA);
             fs::write(&description, text).map_err(failed)?;
             files.extend([self.aside.join(file), description]);

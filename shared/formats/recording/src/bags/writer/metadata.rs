@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::Kept;
 
 pub(super) struct Described {
+    pub channel: u16,
     pub name: String,
     pub type_name: String,
     /// The qualities of service, as YAML.
@@ -30,7 +31,7 @@ pub(super) fn qualities(kept: Kept) -> String {
 
 /// Returns the description of a bag with one file, from the first to the last time in it, ns
 /// since 1970.
-pub(super) fn text(file: &str, topics: &[&Described], times: Option<(i64, i64)>) -> String {
+pub(super) fn text(file: &str, topics: &[Described], times: Option<(i64, i64)>) -> String {
     let (first_ns, last_ns) = times.unwrap_or_default();
     let duration_ns = last_ns - first_ns;
     let messages: u64 = topics.iter().map(|topic| topic.messages).sum();
