@@ -113,24 +113,4 @@ mod tests {
             assert_eq!(read_text(&file, SETTINGS).unwrap(), read);
         }
     }
-
-    #[test]
-    fn what_is_no_file_is_refused_at_once_with_what_it_is() {
-        let folder = tempfile::tempdir().unwrap();
-        let pipe = folder.path().join("pipe");
-        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
-        rustix::fs::mknodat(rustix::fs::CWD, &pipe, kind, mode, 0).unwrap();
-        let link = folder.path().join("link");
-        std::os::unix::fs::symlink(&pipe, &link).unwrap();
-        for (path, expected) in [
-            (folder.path(), "it is a folder, not a file"),
-            (&pipe, "it is a pipe, not a file"),
-            (&link, "it is a pipe, not a file"),
-            (Path::new("/dev/zero"), "it is a device, not a file"),
-        ] {
-            let refused = open(path).unwrap_err().to_string();
-            assert_eq!(refused, expected);
-            assert_eq!(read_text(path, 1).unwrap_err().to_string(), expected);
-        }
-    }
 }

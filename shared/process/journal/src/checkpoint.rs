@@ -12,8 +12,6 @@
 //! and the run continues from there.
 
 mod codec;
-#[cfg(test)]
-mod tests;
 
 use std::{
     mem,

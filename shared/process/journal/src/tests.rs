@@ -209,15 +209,3 @@ fn the_files_of_other_programs_and_versions_are_refused_and_left_as_they_are() {
         assert_eq!(fs::read(&path).unwrap(), theirs);
     }
 }
-
-#[test]
-fn an_impossibly_long_file_is_refused_at_once() {
-    let (_folder, path) = journal_of(3);
-    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(1 << 40).unwrap();
-    let error = check(&path).unwrap_err();
-    assert!(
-        matches!(error, JournalError::Damaged { pose: 3, .. }),
-        "{error}"
-    );
-}

@@ -211,18 +211,6 @@ fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
 }
 
 #[test]
-fn an_impossibly_long_file_is_refused_at_once() {
-    let (_folder, path) = log_of(3);
-    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(1 << 40).unwrap();
-    let error = LogReader::open(&path, MAGIC).unwrap_err();
-    assert!(
-        matches!(error, LogError::Damaged { record: 3, .. }),
-        "{error}"
-    );
-}
-
-#[test]
 fn a_record_of_an_impossible_length_is_not_read() {
     let (_folder, path) = log_of(3);
     let mut header = fs::read(&path).unwrap()[offset(2)..offset(2) + 20].to_vec();
