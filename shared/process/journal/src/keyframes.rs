@@ -1,9 +1,6 @@
 //! The keyframes of a run: selected among its poses, and logged before those are journalled.
 
-use std::{
-    mem,
-    path::{Path, PathBuf},
-};
+use std::{mem, path::Path};
 
 use gyre_geometry::SparsePoint;
 use gyre_messages::PoseHeader;
@@ -13,14 +10,16 @@ use thiserror::Error;
 
 use crate::JournalError;
 
+/// An error of the keyframes or of the scans of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
     #[error(transparent)]
     Log(#[from] LogError),
     #[error(transparent)]
     Journal(#[from] JournalError),
-    #[error("{path} lacks the keyframe of pose {pose}: the same command computes it anew")]
-    Missing { path: PathBuf, pose: u64 },
+    /// They are fewer than the poses of the journal need.
+    #[error("{0}")]
+    Missing(String),
 }
 
 /// The keyframes of a run, open for appending.
@@ -48,10 +47,13 @@ impl Keyframes {
                 builder,
                 points: Vec::new(),
             }),
-            (_, Some(pose)) => Err(KeyframesError::Missing {
-                path: records_path::<Keyframe>(out),
-                pose,
-            }),
+            (_, Some(pose)) => {
+                let path = records_path::<Keyframe>(out);
+                Err(KeyframesError::Missing(format!(
+                    "{} lacks the keyframe of pose {pose}: the same command computes it anew",
+                    path.display()
+                )))
+            }
         }
     }
 

@@ -1,15 +1,15 @@
 //! The scans of a run with their poses and points, logged before those poses are journalled: for
 //! followers that need each scan, and not only keyframes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
 use gyre_messages::PoseHeader;
 use gyre_slam::{Record, RecordLog, RecordReader, records_path};
 use gyre_storage::{LogError, LogMagic};
-use thiserror::Error;
 
+pub use crate::keyframes::KeyframesError as ScansError;
 use crate::record::split;
 
 /// A scan with its pose and its points.
@@ -91,18 +91,6 @@ impl Record for LoggedScan {
     }
 }
 
-#[derive(Debug, Error)]
-pub enum ScansError {
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error("{path} has {scans} scans of {poses} poses: the same command computes them anew")]
-    Missing {
-        path: PathBuf,
-        scans: u64,
-        poses: u64,
-    },
-}
-
 /// The scans of a run, open for appending.
 #[derive(Debug)]
 pub struct Scans {
@@ -119,7 +107,10 @@ impl Scans {
         let scans = log.len() as u64;
         if scans < poses {
             let path = records_path::<LoggedScan>(out);
-            return Err(ScansError::Missing { path, scans, poses });
+            return Err(ScansError::Missing(format!(
+                "{} has {scans} scans of {poses} poses: the same command computes them anew",
+                path.display()
+            )));
         }
         // The end of the scans is before the end of the journal.
         if !ended {
