@@ -225,28 +225,3 @@ impl File {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_file_that_has_lost_its_name_is_noticed() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let file = File::open_or_create(&path).unwrap();
-        file.require_name().unwrap();
-        let lost = || {
-            let sentence = file.require_name().unwrap_err().to_string();
-            let begin = format!("cannot keep {}: another program", path.display());
-            assert!(sentence.starts_with(&begin), "{sentence}");
-        };
-        fs::rename(&path, folder.path().join("away")).unwrap();
-        lost();
-        fs::write(&path, "another").unwrap();
-        lost();
-        fs::rename(folder.path().join("away"), &path).unwrap();
-        file.require_name().unwrap();
-    }
-}

@@ -175,52 +175,42 @@ mod tests {
         }
     }
 
-    fn choose(channels: &[Channel], wished: Option<&str>) -> Result<Topics, String> {
+    fn choose(topics: &[(&str, &str)]) -> Result<Topics, RecordingError> {
+        let channels = topics.iter().map(|(topic, of)| channel(topic, of));
+        let channels: Vec<Channel> = channels.collect();
         let channels: Vec<&Channel> = channels.iter().collect();
-        Topics::choose(Path::new("b"), &channels, wished).map_err(|error| error.to_string())
+        Topics::choose(Path::new("b"), &channels, None)
     }
 
     #[test]
     fn topics_are_found_by_type_whatever_their_package_is() {
-        let topics = choose(
-            &[
-                channel("/camera", "sensor_msgs/msg/Image"),
-                channel("/odom", "nav_msgs/msg/Odometry"),
-                channel(
-                    "/left/configuration_data",
-                    "navtech_msgs/msg/RadarConfigurationMsg",
-                ),
-                channel(
-                    "/right/configuration_data",
-                    "navtech_msgs/msg/RadarConfigurationMsg",
-                ),
-                channel("/right/b_scan_msg", "vtr_radar_msgs/msg/RadarBScanMsg"),
-            ],
-            None,
-        )
-        .unwrap();
+        let configuration = "navtech_msgs/msg/RadarConfigurationMsg";
+        let topics = choose(&[
+            ("/camera", "sensor_msgs/msg/Image"),
+            ("/odom", "nav_msgs/msg/Odometry"),
+            ("/left/configuration_data", configuration),
+            ("/right/configuration_data", configuration),
+            ("/right/b_scan_msg", "vtr_radar_msgs/msg/RadarBScanMsg"),
+        ]);
+        let topics = topics.unwrap();
         assert_eq!(topics.scans.kind, Kind::BScans);
-        assert_eq!(
-            topics.configuration.unwrap().name,
-            "/right/configuration_data"
-        );
+        let nearest = topics.configuration.unwrap().name;
+        assert_eq!(nearest, "/right/configuration_data");
     }
 
     #[test]
     fn numbers_as_bytes_are_told_by_the_definition() {
         let mut newer = channel("/fft", "nav_messages/msg/RadarFftDataMsg");
-        assert_eq!(
-            Topic::of(&newer).unwrap().kind,
-            Kind::Azimuths(Form::Numbers)
-        );
+        let kind = |newer: &Channel| Topic::of(newer).unwrap().kind;
+        assert_eq!(kind(&newer), Kind::Azimuths(Form::Numbers));
         newer.schema = "uint8[] angle\nuint8[] azimuth\n".to_owned();
-        assert_eq!(Topic::of(&newer).unwrap().kind, Kind::Azimuths(Form::Bytes));
+        assert_eq!(kind(&newer), Kind::Azimuths(Form::Bytes));
     }
 
     #[test]
     fn images_are_a_radars_if_the_driver_names_them_so() {
-        assert!(choose(&[channel("/camera", "sensor_msgs/msg/Image")], None).is_err());
-        let image = [channel("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];
-        assert_eq!(choose(&image, None).unwrap().scans.kind, Kind::Images);
+        assert!(choose(&[("/camera", "sensor_msgs/msg/Image")]).is_err());
+        let image = [("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];
+        assert_eq!(choose(&image).unwrap().scans.kind, Kind::Images);
     }
 }

@@ -19,10 +19,10 @@ use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middl
 use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
-    Ros2Message, encode,
+    Ros2Message, decode, encode,
     messages::RadarFftDataMessage,
     nav_msgs::Odometry,
-    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    navtech_msgs::{RadarBScanMsg, RadarFftDataMsg},
     radar::ScanMessages,
 };
 use mcap::{Compression, WriteOptions};
@@ -235,19 +235,16 @@ fn a_written_bag_is_read_and_never_overwritten() {
     for name in ["bag", "bag.mcap"] {
         let path = folder.path(name);
         let mut bag = BagWriter::create(&path).unwrap();
-        let configurations = bag
-            .topic::<RadarConfigurationMsg>(CONFIGURATION, Kept::ForLater)
-            .unwrap();
-        let scans = bag
-            .topic::<RadarBScanMsg>(B_SCANS, Kept::ForNobody)
-            .unwrap();
+        let configurations = bag.topic(CONFIGURATION, Kept::ForLater).unwrap();
+        let scans = bag.topic(B_SCANS, Kept::ForNobody).unwrap();
         let messages = ScanMessages::new(radar(), "radar");
-        bag.write(&configurations, START_NS, &messages.configuration(START_NS))
+        let configuration = messages.configuration(START_NS);
+        bag.write(&configurations, START_NS, &configuration)
             .unwrap();
         for turn in 0..3 {
             let log_ns = START_NS + TURN_NS * turn as i64;
-            bag.write(&scans, log_ns, &messages.b_scan(scan(turn).view()))
-                .unwrap();
+            let message = messages.b_scan(scan(turn).view());
+            bag.write(&scans, log_ns, &message).unwrap();
         }
         assert!(!path.exists());
         bag.finish().unwrap();
@@ -273,12 +270,11 @@ fn azimuths_of_the_older_form_are_read_under_both_names() {
     ] {
         let mut older = Messages::default();
         for (topic, type_name, text, log_ns, data) in &newer.0 {
-            let Some(message) = (topic == AZIMUTH_DATA)
-                .then(|| gyre_ros2_messages::decode::<RadarFftDataMsg>(data).unwrap())
-            else {
+            if topic != AZIMUTH_DATA {
                 older.add_bytes(topic, (type_name, text), *log_ns, data.clone());
                 continue;
-            };
+            }
+            let message: RadarFftDataMsg = decode(data).unwrap();
             let older_message = RadarFftDataMessage {
                 header: message.header,
                 angle: vec![0, 0],
@@ -290,12 +286,8 @@ fn azimuths_of_the_older_form_are_read_under_both_names() {
                 data: message.data,
             };
             let text = RadarFftDataMessage::DEFINITION.text();
-            older.add_bytes(
-                topic,
-                (name, &text),
-                *log_ns,
-                encode(&older_message).unwrap(),
-            );
+            let bytes = encode(&older_message).unwrap();
+            older.add_bytes(topic, (name, &text), *log_ns, bytes);
         }
         let folder = Folder::new();
         assert_has_turns(opened(&folder.bag(&older)).as_mut(), 3);
@@ -329,11 +321,7 @@ fn bags_that_cannot_be_used_say_why_in_one_sentence() {
     let mut both = b_scans(3);
     both.0.extend(azimuths(3, |_, _, message| Some(message)).0);
     let path = folder.bag(&both);
-    assert!(
-        refused(&path).contains("--set dataset.topic=/radar_data"),
-        "{}",
-        refused(&path)
-    );
+    assert!(refused(&path).contains("--set dataset.topic=/radar_data"));
     let chosen = DatasetOptions {
         topic: Some(B_SCANS.try_into().unwrap()),
         ..DatasetOptions::default()
@@ -353,11 +341,8 @@ fn bags_that_cannot_be_used_say_why_in_one_sentence() {
     let path = folder.path("empty.mcap");
     fs::write(&path, []).unwrap();
     assert!(refused(&path).contains("signature of MCAP"));
-    let gone = folder.path("gone.mcap");
-    assert!(matches!(
-        open(&gone, &DatasetOptions::default()),
-        Err(OpenError::Io { .. })
-    ));
+    let gone = open(&folder.path("gone.mcap"), &DatasetOptions::default());
+    assert!(matches!(gone, Err(OpenError::Io { .. })));
 }
 
 #[test]
