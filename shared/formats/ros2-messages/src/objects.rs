@@ -18,9 +18,9 @@ use crate::{
     visualization_msgs::{ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
 };
 
-pub const MOVING: &str = "moving";
+const MOVING: &str = "moving";
 /// The class of an object that moved, and stands now.
-pub const STANDING: &str = "standing";
+const STANDING: &str = "standing";
 
 /// Height for drawing objects, m: a radar in the plane does not measure it.
 const DRAWN_HEIGHT_M: f64 = 1.6;
@@ -29,7 +29,7 @@ const ARROW_M: f64 = 0.9;
 /// Height of a letter, m.
 const LETTER_M: f64 = 1.2;
 
-/// Returns the objects of a scan as detections of the class [`MOVING`] or [`STANDING`].
+/// Returns the objects of a scan as detections of the class `moving` or `standing`.
 ///
 /// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
 /// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
