@@ -24,8 +24,8 @@ use gyre_storage::{Busy, DurableFile, File, GroupSync, Slots, StorageError};
 use thiserror::Error;
 
 use codec::{
-    EMPTY, KEYFRAME_WORDS, Name, StateHeader, decode_keyframe, decode_state, encode_keyframe,
-    encode_state, keyframe_name, state_bytes,
+    EMPTY, KEYFRAME_WORDS, Name, decode_keyframe, decode_state, encode_keyframe, encode_state,
+    keyframe_name, state_bytes,
 };
 
 /// The start of the file, with the version of the slots.
@@ -182,9 +182,8 @@ impl Checkpoint {
         refiner: &Refiner,
     ) -> Result<(), CheckpointError> {
         self.name_keyframes(item, refiner);
-        let header = StateHeader { item, motion };
         let (states, slot) = (self.layout.states, slot_of(item));
-        encode_state(header, &self.map, refiner.state(), &mut self.state);
+        encode_state((item, motion), &self.map, refiner.state(), &mut self.state);
         let is_there = self.file.read(&states, slot, &mut self.found)?;
         let known = is_there && self.found == self.state;
         if !known {
@@ -254,16 +253,14 @@ impl Checkpoint {
         empty.or(oldest).unwrap_or(0)
     }
 
-    /// Reads the state after `item` and the names of its keyframes; `None` if the file does not
-    /// have it whole.
-    fn read_state(
-        &mut self,
-        item: u64,
-    ) -> Result<Option<(StateHeader, TrackerState)>, StorageError> {
+    /// Reads the state after `item` with the checksum of its motion, and the names of its keyframes;
+    /// `None` if the file does not have it whole.
+    fn read_state(&mut self, item: u64) -> Result<Option<(u64, TrackerState)>, StorageError> {
         let states = &self.layout.states;
         let whole = self.file.read(states, slot_of(item), &mut self.found)?;
         let state = decode_state(&self.found, &mut self.map);
-        Ok(state.filter(|(header, _)| whole && header.item == item))
+        let state = state.filter(|((of, _), _)| whole && *of == item);
+        Ok(state.map(|((_, motion), tracker)| (motion, tracker)))
     }
 
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
@@ -305,7 +302,7 @@ impl Checkpoint {
         for pose in poses {
             let motion = checksum(&pose.motion);
             let state = self.read_state(pose.item.seq)?;
-            if state.is_some_and(|(header, _)| header.motion == motion)
+            if state.is_some_and(|(led_to, _)| led_to == motion)
                 && self.map.iter().all(|name| self.place_of(*name).is_some())
             {
                 return Ok(Some(pose));

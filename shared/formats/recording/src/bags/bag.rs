@@ -156,36 +156,34 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Describes the radar by its first configuration, or else by its azimuths and the options.
-    /// Also returns notes on the description.
+    /// Describes the radar by its first configuration, or else by its azimuths and the options. Also
+    /// returns where the description is from, to follow the topic in a sentence.
     pub fn describe(
         &mut self,
         topics: &Topics,
         options: &DatasetOptions,
-    ) -> Result<(Described, Origin), RecordingError> {
+    ) -> Result<(Described, String), RecordingError> {
         let (survey, own) = self.survey(topics)?;
         let usual = match &own {
             Some(Ok(own)) => own.radar.encoder_size,
             _ => ENCODER_COUNTS,
         };
         let is_own = matches!(own, Some(Ok(_)));
+        let said = if is_own { " as it says" } else { "" };
         let shown = survey.other_counts(usual, is_own);
         let (size, counts) = match (options.encoder_counts, shown) {
-            (Some(size), _) => (size, CountsOrigin::Configured),
-            (None, Some(size)) => (size, CountsOrigin::Azimuths { usual }),
-            (None, None) => (usual, CountsOrigin::Usual),
-        };
-        let mut origin = Origin {
-            is_own,
-            refused: None,
-            counts,
+            (Some(size), _) => (size, " as configured".to_owned()),
+            (None, Some(size)) => {
+                let step =
+                    "with these the step from the last azimuth to the first is as the others";
+                (size, format!(", not {usual}{said}: {step}"))
+            }
+            (None, None) if is_own => (usual, " as it says too".to_owned()),
+            (None, None) => (usual, " as most radars have".to_owned()),
         };
         let resolution_m = options.range_resolution_m;
-        match own {
-            Some(Ok(mut described)) => {
-                described.radar.encoder_size = size;
-                return Ok((described, origin));
-            }
+        let ((mut described, before), after) = match own {
+            Some(Ok(own)) => ((own, ", ".to_owned()), "as the radar says of itself"),
             Some(Err(reason)) if resolution_m.is_none() => {
                 let reason = format!(
                     "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
@@ -193,11 +191,23 @@ impl Bag {
                 );
                 return Err(RecordingError::unreadable(&self.path, reason));
             }
-            Some(Err(reason)) => origin.refused = Some(reason),
-            None => {}
-        }
-        let described = survey.describe(&self.path, resolution_m, size)?;
-        Ok((described, origin))
+            refused => {
+                let before = match refused.and_then(Result::err) {
+                    Some(reason) => {
+                        format!("what the radar says of itself cannot be used ({reason})")
+                    }
+                    None => "the radar does not describe itself in the bag".to_owned(),
+                };
+                let described = survey.describe(&self.path, resolution_m, size)?;
+                ((described, format!("; {before}: ")), "are as found")
+            }
+        };
+        let radar = &mut described.radar;
+        radar.encoder_size = size;
+        let (azimuths, bins) = (radar.azimuth_samples, radar.range_in_bins);
+        let found = format!("{azimuths} azimuths of {bins} bins {after}");
+        let note = format!("{before}{found}, {size} encoder counts per turn{counts}");
+        Ok((described, note))
     }
 
     /// Looks at the first messages with scans, and for the first configuration that can be used, or
@@ -247,19 +257,15 @@ impl Bag {
 /// damage, which may hide one, is read as a whole.
 fn timed(path: &Path) -> Result<Timed, RecordingError> {
     let mut file = McapFile::open(path)?;
-    let found = spans(&mut file)?;
-    for span in found.summary {
-        file.read(span, |_| false)?;
-    }
+    let spans = spans(&mut file)?;
     if file.channels.is_empty() || !file.damage.is_empty() {
-        for span in &found.messages {
+        for span in &spans {
             // Damaged spans have no channels.
             let _ = file.read(span.span, |_| false);
         }
     }
-    let times = found.messages.iter().map(|span| span.times_ns);
-    let times = times.fold(None, joined);
-    Ok((file, found.messages, times))
+    let times = spans.iter().map(|span| span.times_ns).fold(None, joined);
+    Ok((file, spans, times))
 }
 
 fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), RecordingError> {
@@ -278,22 +284,4 @@ fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), Re
         name(earlier).display()
     );
     Err(RecordingError::unreadable(folder, reason))
-}
-
-pub(crate) struct Origin {
-    /// True if it is the radar's own description, false if it follows from azimuths and options.
-    pub is_own: bool,
-    /// Why its own description cannot be used, if there is one.
-    pub refused: Option<String>,
-    pub counts: CountsOrigin,
-}
-
-pub(crate) enum CountsOrigin {
-    Configured,
-    /// The radar's own counts, or the usual ones of most radars.
-    Usual,
-    /// The azimuths, which are no turn with the usual ones.
-    Azimuths {
-        usual: u16,
-    },
 }

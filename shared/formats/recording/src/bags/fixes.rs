@@ -29,14 +29,14 @@ pub(crate) fn read(
     path: &Path,
     wished: Option<&str>,
 ) -> Result<Option<BagFixes>, RecordingError> {
-    let Some(found) = RECEIVER.read(bag, path, wished)? else {
+    let Some((topic, messages)) = RECEIVER.read(bag, path, wished)? else {
         return Ok(None);
     };
-    let messages = found.measurements.len();
-    let fixes: Vec<RawFix> = found.measurements.into_iter().flatten().collect();
+    let count = messages.len();
+    let fixes: Vec<RawFix> = messages.into_iter().flatten().collect();
     Ok(Some(BagFixes {
-        topic: found.topic,
-        without_fix: messages - fixes.len(),
+        topic,
+        without_fix: count - fixes.len(),
         fixes,
     }))
 }

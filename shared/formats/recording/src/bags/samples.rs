@@ -49,7 +49,7 @@ pub(crate) fn read(
         require_no_speeds(bag, path)?;
     }
     let found = sensor.read(bag, path, wished)?;
-    Ok(found.map(|found| found.measurements))
+    Ok(found.map(|(_, samples)| samples))
 }
 
 fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), RecordingError> {

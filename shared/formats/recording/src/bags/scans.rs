@@ -1,7 +1,6 @@
 //! The scans of a bag as a dataset.
 
 mod index;
-mod notes;
 
 use std::{
     collections::BTreeMap,
@@ -26,7 +25,6 @@ use crate::bags::{
     topics::Topics,
 };
 use index::{Entry, Index};
-use notes::notes;
 
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
@@ -84,7 +82,7 @@ impl Scans {
         let mut bag = Bag::open(path, files)?;
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
-        let (described, origin) = bag.describe(&topics, options)?;
+        let (described, source) = bag.describe(&topics, options)?;
         let constants = Constants::from(options);
         let assembler = SweepAssembler::new(&described.radar, constants).map_err(|error| {
             RecordingError::unreadable(path, format_args!("cannot be read: {error}"))
@@ -94,11 +92,15 @@ impl Scans {
             return Err(RecordingError::unreadable(path, reason));
         }
         let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
-        let mut damage = bag.files.iter().filter_map(|file| file.damage(true));
+        let damages = bag.files.iter().filter_map(|file| file.damage(true));
+        let damages: Vec<String> = damages.collect();
+        let mut notes = vec![format!("Scans are on {}{source}.", topics.scans.name)];
+        notes.extend(index.notes());
+        notes.extend(damages.iter().map(|sentence| format!("{sentence}.")));
         Ok(Self {
-            damage: damage.next(),
+            damage: damages.into_iter().next(),
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
-            notes: notes(&bag, &topics, &described, &origin, &index),
+            notes,
             files: bag.files.iter().map(|file| file.path.clone()).collect(),
             path: path.to_owned(),
             bag,

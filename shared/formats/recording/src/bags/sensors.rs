@@ -19,11 +19,8 @@ pub(crate) struct Sensor<T: 'static> {
     pub types: &'static [(&'static str, Decode<T>)],
 }
 
-pub(crate) struct Measured<T> {
-    pub topic: String,
-    /// In the order of their log times.
-    pub measurements: Vec<T>,
-}
+/// The topic of measurements, and those in the order of their log times.
+pub(crate) type Measured<T> = (String, Vec<T>);
 
 impl<T> Sensor<T> {
     /// Reads all measurements on the topic of this name, else on the only topic of the sensor's
@@ -51,10 +48,7 @@ impl<T> Sensor<T> {
             let reason = format!("has messages on {topic} that are no {of}: {reason}");
             return Err(RecordingError::unreadable(path, reason));
         }
-        Ok(Some(Measured {
-            topic,
-            measurements,
-        }))
+        Ok(Some((topic, measurements)))
     }
 
     /// Returns the names of the topics that may be of the sensor, in a sentence.

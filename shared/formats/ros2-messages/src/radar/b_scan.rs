@@ -36,7 +36,7 @@ impl RadarBScanMsg {
                 stamps.len()
             ));
         }
-        let time = TurnTime::new(radar, arrived_ns);
+        let arrival_ns = arrival(radar, arrived_ns);
         let unit_ns = unit_ns(radar, encoders, stamps);
         let has_clock = stamps.iter().any(|stamp| *stamp != 0);
         let has_turned = encoders.iter().any(|encoder| *encoder != 0);
@@ -57,7 +57,7 @@ impl RadarBScanMsg {
         let rows = places.filter(written);
         Ok(rows.map(move |(row, encoder, stamp)| TimedAzimuth {
             azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
-            arrived_ns: time.arrived_ns(encoder),
+            arrived_ns: arrival_ns(encoder),
         }))
     }
 }
@@ -89,13 +89,13 @@ impl Image {
         arrived_ns: i64,
     ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, String> {
         let image = PowerImage::of(self, azimuth_offset)?;
-        let time = TurnTime::new(radar, arrived_ns);
+        let arrival_ns = arrival(radar, arrived_ns);
         let encoder_size = u64::from(radar.encoder_size);
         Ok((0..image.height).map(move |row| {
             let encoder = (row as u64 * encoder_size / image.height as u64) as u16;
             TimedAzimuth {
                 azimuth: azimuth(encoder, 0, image.row(row)),
-                arrived_ns: time.arrived_ns(encoder),
+                arrived_ns: arrival_ns(encoder),
             }
         }))
     }
@@ -157,24 +157,13 @@ impl<'a> PowerImage<'a> {
     }
 }
 
-#[derive(Clone, Copy)]
-struct TurnTime {
-    end_ns: i64,
-    encoder_size: f64,
-    period_ns: f64,
-}
-
-impl TurnTime {
-    fn new(radar: &Configuration, end_ns: i64) -> Self {
-        Self {
-            end_ns,
-            encoder_size: f64::from(radar.encoder_size.max(1)),
-            period_ns: radar.period_ns() as f64,
-        }
-    }
-
-    fn arrived_ns(&self, encoder: u16) -> i64 {
-        let left = 1.0 - f64::from(encoder) / self.encoder_size;
-        self.end_ns.saturating_sub((left * self.period_ns) as i64)
+/// Returns the time of receipt, ns, of an azimuth of an encoder count in a turn that has ended at
+/// `end_ns`.
+fn arrival(radar: &Configuration, end_ns: i64) -> impl Fn(u16) -> i64 + use<> {
+    let counts = f64::from(radar.encoder_size.max(1));
+    let period_ns = radar.period_ns() as f64;
+    move |encoder| {
+        let left = 1.0 - f64::from(encoder) / counts;
+        end_ns.saturating_sub((left * period_ns) as i64)
     }
 }

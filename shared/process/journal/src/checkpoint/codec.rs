@@ -25,13 +25,6 @@ pub(super) const fn state_bytes(max_keyframes: usize) -> usize {
     8 * (STATE_WORDS + NAME_WORDS * max_keyframes)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct StateHeader {
-    /// The item after which the state was written.
-    pub item: u64,
-    pub motion: u64,
-}
-
 /// The name of a keyframe's content: two keyframes of one scan can differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
@@ -191,9 +184,10 @@ impl<F: FnMut(&mut u64)> Words<F> {
     }
 }
 
-/// Fills the slot of a state with these keyframes, oldest first.
+/// Fills the slot of the state after an item, whose motion has this checksum, with these keyframes,
+/// oldest first.
 pub(super) fn encode_state(
-    header: StateHeader,
+    (item, motion): (u64, u64),
     keyframes: &[Name],
     state: &TrackerState,
     slot: &mut [u8],
@@ -204,7 +198,7 @@ pub(super) fn encode_state(
         at += 1;
         set_word(slot, at, word);
     };
-    let head = [header.item, header.motion, keyframes.len() as u64];
+    let head = [item, motion, keyframes.len() as u64];
     head.into_iter().for_each(&mut put);
     Words(|word: &mut u64| put(*word)).tracker(&mut state);
     let names = keyframes.iter().flat_map(|name| [name.id, name.check]);
@@ -212,12 +206,12 @@ pub(super) fn encode_state(
     Checksum::First.seal(slot);
 }
 
-/// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
+/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
 /// first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,
-) -> Option<(StateHeader, TrackerState)> {
+) -> Option<((u64, u64), TrackerState)> {
     if !Checksum::First.is_right(slot) {
         return None;
     }
@@ -236,7 +230,7 @@ pub(super) fn decode_state(
         id: word(slot, STATE_WORDS + NAME_WORDS * k),
         check: word(slot, STATE_WORDS + NAME_WORDS * k + 1),
     }));
-    Some((StateHeader { item, motion }, state))
+    Some(((item, motion), state))
 }
 
 /// Fills the slot of a keyframe, and returns the name of its content.
