@@ -25,21 +25,3 @@ impl Position {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_position_is_behind_the_newest_message_of_the_newest_generation() {
-        let mut position = Position::default();
-        for (generation, seq, next) in [(0, 4, 5), (0, 2, 5), (3, 2, 3), (2, 9, 3), (3, 3, 4)] {
-            position.pass(&Entry {
-                seq,
-                generation,
-                ..Entry::default()
-            });
-            assert_eq!(position.next, next, "after {seq} of {generation}");
-        }
-    }
-}

@@ -319,16 +319,4 @@ mod tests {
             );
         }
     }
-
-    #[test]
-    fn a_grid_lies_along_the_axes_of_its_frame() {
-        let corner_m = Vector2::new(-128.0, 0.0);
-        let grid = occupancy_grid(5_000_000_000, "map", 0.5, [2, 1], corner_m, vec![100, 255]);
-        assert_eq!((grid.info.width, grid.info.height), (2, 1));
-        assert_eq!(grid.info.resolution, 0.5);
-        let origin = grid.info.origin;
-        assert_eq!((origin.position.x, origin.position.y), (-128.0, 0.0));
-        assert_eq!((origin.orientation.z, origin.orientation.w), (0.0, 1.0));
-        assert_eq!((grid.header.stamp.sec, &*grid.header.frame_id), (5, "map"));
-    }
 }

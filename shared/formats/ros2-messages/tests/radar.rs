@@ -181,15 +181,8 @@ fn configurations_of_both_forms_are_the_same() {
 
 #[test]
 fn depths_of_bins_come_back_to_the_bit() {
-    for resolution_m in [
-        0.0438,
-        0.0596,
-        0.04381,
-        100.0 / 576.0,
-        200.0 / 3360.0,
-        0.175,
-        1.0 / 3.0,
-    ] {
+    let others = [100.0 / 576.0, 200.0 / 3360.0, 1.0 / 3.0];
+    for resolution_m in [0.0438, 0.0596, 0.04381, 0.175].into_iter().chain(others) {
         let radar = Configuration {
             range_resolution_m: Some(resolution_m),
             ..radar()
