@@ -46,44 +46,37 @@ pub enum Operation {
 #[derive(Debug)]
 pub struct Recorder(PathBuf);
 
-struct Recording {
-    root: PathBuf,
-    operations: Vec<Operation>,
-}
+/// The roots of recorders, and the changes below each.
+static RECORDINGS: Mutex<Vec<(PathBuf, Vec<Operation>)>> = Mutex::new(Vec::new());
 
-static RECORDINGS: Mutex<Vec<Recording>> = Mutex::new(Vec::new());
-
-fn recordings() -> MutexGuard<'static, Vec<Recording>> {
+fn recordings() -> MutexGuard<'static, Vec<(PathBuf, Vec<Operation>)>> {
     RECORDINGS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Recorder {
     /// Starts to record the changes below `root`.
     pub fn start(root: &Path) -> Self {
-        recordings().push(Recording {
-            root: root.to_owned(),
-            operations: Vec::new(),
-        });
+        recordings().push((root.to_owned(), Vec::new()));
         Self(root.to_owned())
     }
 
     pub fn operations(&self) -> Vec<Operation> {
         let all = recordings();
-        let ours = all.iter().find(|recording| recording.root == self.0);
-        ours.map_or(Vec::new(), |recording| recording.operations.clone())
+        let ours = all.iter().find(|(root, _)| *root == self.0);
+        ours.map_or(Vec::new(), |(_, operations)| operations.clone())
     }
 }
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        recordings().retain(|recording| recording.root != self.0);
+        recordings().retain(|(root, _)| *root != self.0);
     }
 }
 
 pub(crate) fn push(path: &Path, operation: impl Fn() -> Operation) {
-    for recording in recordings().iter_mut() {
-        if path.starts_with(&recording.root) {
-            recording.operations.push(operation());
+    for (root, operations) in recordings().iter_mut() {
+        if path.starts_with(root) {
+            operations.push(operation());
         }
     }
 }

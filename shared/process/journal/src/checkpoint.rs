@@ -20,7 +20,7 @@ use std::{
 
 use gyre_messages::{MotionEstimate, PoseHeader};
 use gyre_scan_matching::{Refiner, TrackerState};
-use gyre_storage::{Busy, DurableFile, File, GroupSync, Slots, StorageError};
+use gyre_storage::{Busy, DurableFile, GroupSync, Slots, StorageError};
 use thiserror::Error;
 
 use codec::{
@@ -123,17 +123,6 @@ impl Layout {
         }
         header
     }
-
-    /// Replaces a file of another layout by an empty one.
-    fn require(&self, file: &File) -> Result<(), StorageError> {
-        let mut header = [0; HEADER_BYTES];
-        let matches = file.read_at(&mut header, 0)? && header == self.header();
-        if !matches {
-            file.set_length(0)?;
-            file.write_at(&self.header(), 0)?;
-        }
-        Ok(())
-    }
 }
 
 impl Checkpoint {
@@ -147,7 +136,13 @@ impl Checkpoint {
     ) -> Result<Self, CheckpointError> {
         let layout = Layout::of(max_keyframes, cells);
         let file = DurableFile::open(path, |file| {
-            Ok::<(), CheckpointError>(layout.require(file)?)
+            let (header, mut found) = (layout.header(), [0; HEADER_BYTES]);
+            // A file of another layout becomes an empty one.
+            if !file.read_at(&mut found, 0)? || found != header {
+                file.set_length(0)?;
+                file.write_at(&header, 0)?;
+            }
+            Ok::<(), CheckpointError>(())
         })?;
         let mut checkpoint = Self {
             file,
