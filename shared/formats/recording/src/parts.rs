@@ -99,10 +99,7 @@ mod tests {
         let head = Head {
             id: "a".to_owned(),
             part: number,
-            configuration: String::new(),
-            topics: Vec::new(),
-            scan_bytes: 0,
-            mode: String::new(),
+            ..Head::default()
         };
         let writer = RecordingWriter::create(path, &head).unwrap();
         writer.finish().unwrap();

@@ -106,6 +106,13 @@ fn history(world: u64, items: u64) -> Vec<String> {
     history
 }
 
+/// A process that continues from the state after an item.
+fn resumed(path: &Path, item: u64) -> (Refiner, Checkpoint) {
+    let (mut refinement, mut checkpoint) = (refinement(), open(path));
+    checkpoint.restore(item, &mut refinement).unwrap();
+    (refinement, checkpoint)
+}
+
 fn restored(path: &Path, item: u64) -> Result<String, CheckpointError> {
     let mut refinement = refinement();
     open(path)
@@ -142,9 +149,7 @@ fn a_truncated_file_loses_only_the_last_write() {
     let (_folder, path) = checkpoint_of(4);
     let before = fs::read(&path).unwrap();
     // Item 4 makes a keyframe, whose slot is at the file's end.
-    let mut refinement = refinement();
-    let mut checkpoint = open(&path);
-    checkpoint.restore(3, &mut refinement).unwrap();
+    let (mut refinement, mut checkpoint) = resumed(&path, 3);
     process(&mut refinement, &mut checkpoint, 1, 4..6);
     drop(checkpoint);
     let after = fs::read(&path).unwrap();
@@ -179,8 +184,7 @@ fn corrupt_bytes_in_the_newest_slots_lose_only_those() {
     let history = history(1, 31);
     let (_folder, path) = checkpoint_of(30);
     let before = fs::read(&path).unwrap();
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    checkpoint.restore(29, &mut refinement).unwrap();
+    let (mut refinement, mut checkpoint) = resumed(&path, 29);
     process(&mut refinement, &mut checkpoint, 1, 30..31);
     drop(checkpoint);
     let after = fs::read(&path).unwrap();
@@ -325,8 +329,7 @@ fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_
     let poses: Vec<_> = (0..30).map(|item| pose(item, 1.0)).collect();
     let known = newest_known(&path, &poses).unwrap();
     assert!((20..29).contains(&known), "{known}");
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    checkpoint.restore(known, &mut refinement).unwrap();
+    let (mut refinement, mut checkpoint) = resumed(&path, known);
     for item in known + 1..30 {
         step(&mut refinement, 1, item);
         let motion = checkpoint::checksum(&pose(item, 1.0).motion);
@@ -342,8 +345,7 @@ fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_
 #[test]
 fn a_keyframe_does_not_replace_another_one_of_the_same_scan() {
     let (_folder, path) = checkpoint_of(30);
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    checkpoint.restore(29, &mut refinement).unwrap();
+    let (mut refinement, mut checkpoint) = resumed(&path, 29);
     let keyframe = refinement
         .keyframes()
         .map(|keyframe| keyframe.id)

@@ -16,7 +16,7 @@ use std::{
 
 use gyre_colossus::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
-use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
 use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
     Ros2Message, decode, encode,
@@ -63,12 +63,9 @@ fn scan(turn: usize) -> OwnedScan {
         azimuths: AZIMUTHS,
         bins: BINS,
         stride: BINS,
-        first_byte: 0,
         range_resolution_m: 0.0438,
-        range_offset_m: 0.0,
-        doppler_s: 0.0,
-        sense: Sense::Clockwise,
         stamp_ns: middle_ns(scan.stamp_ns[0], scan.stamp_ns[AZIMUTHS - 1]),
+        ..scan.geometry
     };
     scan
 }
