@@ -230,9 +230,9 @@ mod tests {
         assert_eq!("map, odom,car/base,radar_top".parse(), Ok(frames));
         for text in [
             "",
-            "map,odom,base_link",
+            "map,odom,base",
             "map,odom,,radar",
-            "/map,odom,base_link,radar",
+            "/map,odom,base,radar",
         ] {
             assert!(text.parse::<Frames>().is_err(), "{text}");
         }

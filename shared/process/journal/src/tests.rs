@@ -119,14 +119,6 @@ fn the_end_of_the_stream_is_no_pose_and_what_follows_it_is_cut_off() {
 }
 
 #[test]
-fn a_journal_that_does_not_exist_is_empty() {
-    let folder = tempfile::tempdir().unwrap();
-    let content = check(&path(folder.path())).unwrap();
-    assert_eq!((content.poses, content.ended, content.torn), (0, false, 0));
-    assert!(records(&path(folder.path())).unwrap().is_none());
-}
-
-#[test]
 fn an_incomplete_record_is_cut_off_whatever_its_length() {
     let (_folder, path) = journal_of(2);
     let complete = fs::read(&path).unwrap();
