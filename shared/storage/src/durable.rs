@@ -7,7 +7,6 @@ use thiserror::Error;
 
 use crate::{File, GroupSync, StorageError, create_folder};
 
-/// Another process changes the file.
 #[derive(Debug, Error)]
 #[error("another process is writing to {path}")]
 pub struct Busy {
@@ -17,8 +16,8 @@ pub struct Busy {
 /// A file that one process at a time changes in place, and that a thread synchronises.
 #[derive(Debug)]
 pub struct DurableFile {
-    file: File,
-    sync: GroupSync,
+    pub file: File,
+    pub sync: GroupSync,
 }
 
 impl DurableFile {
@@ -41,44 +40,29 @@ impl DurableFile {
         })
     }
 
-    pub fn file(&self) -> &File {
-        &self.file
-    }
-
     /// Fills `bytes` with the content of a slot; false if the file ends before.
     /// [`Checksum::is_right`] checks whether it is whole.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
 
-    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts the writes.
+    /// Writes `bytes` at the start of a slot. [`GroupSync::changed`] counts the writes.
     pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
         self.file.write_at(bytes, slots.offset(slot))
     }
+}
 
-    /// Counts a change that has been made. Waits while [`GroupSync::LIMIT`] are in danger.
-    /// Fails if an earlier synchronisation has failed, because changes may be lost.
-    pub fn changed(&self) -> Result<(), StorageError> {
-        self.sync.changed()
-    }
-
-    /// Waits until all changes that were counted survive a power failure.
-    /// Fails if an earlier synchronisation has failed, because changes may be lost.
-    pub fn finish(&self) -> Result<(), StorageError> {
-        self.sync.finish()
-    }
-
-    /// Returns the number of changes that survive a power failure; `None` until the first
-    /// synchronisation has ended.
-    pub fn safe(&self) -> Option<u64> {
-        self.sync.safe()
-    }
+/// Returns whether a file with these first bytes may be one that begins with `magic`: a death or a
+/// power failure leaves a beginning of it, and zeros behind it.
+pub fn may_begin(found: &[u8], magic: &[u8; 16]) -> bool {
+    let bytes = found.iter().zip(magic);
+    let mut other = bytes.skip_while(|(found, magic)| found == magic);
+    other.all(|(found, _)| *found == 0)
 }
 
 /// Places of equal size in a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots {
-    /// The offset of the first one.
     pub start: u64,
     pub bytes: usize,
 }
@@ -100,9 +84,6 @@ pub enum Checksum {
 
 impl Checksum {
     /// Puts the checksum into its place.
-    ///
-    /// # Panics
-    /// The slot is shorter than its checksum.
     pub fn seal(self, slot: &mut [u8]) {
         match self {
             Self::First => {
@@ -116,7 +97,6 @@ impl Checksum {
         }
     }
 
-    /// Returns whether the checksum matches the content.
     #[must_use]
     pub fn is_right(self, slot: &[u8]) -> bool {
         match self {
@@ -181,7 +161,7 @@ mod tests {
         let open = || DurableFile::open::<TestError>(&path, |_| Ok(()));
         let (file, slots) = (open().unwrap(), Slots { start: 3, bytes: 5 });
         file.write(&slots, 2, b"whole").unwrap();
-        file.changed().unwrap();
+        file.sync.changed().unwrap();
         let mut bytes = [0; 5];
         assert!(file.read(&slots, 2, &mut bytes).unwrap() && bytes == *b"whole");
         assert!(!file.read(&slots, 3, &mut bytes).unwrap());

@@ -58,11 +58,8 @@ impl File {
         options.read(true).write(true);
         let file = match options.open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let file = options
-                    .create(true)
-                    .truncate(false)
-                    .open(path)
-                    .map_err(failed)?;
+                let created = options.create(true).truncate(false).open(path);
+                let file = created.map_err(failed)?;
                 #[cfg(feature = "record")]
                 record::push(path, || Operation::Create(path.to_owned()));
                 path.parent().map_or(Ok(()), sync_folder)?;
@@ -109,15 +106,11 @@ impl File {
         &self.path
     }
 
-    /// Returns another handle of the same file.
     pub fn try_clone(&self) -> Result<Self, StorageError> {
-        let file = self
-            .file
-            .try_clone()
-            .map_err(StorageError::at("read", &self.path))?;
+        let file = self.file.try_clone();
         Ok(Self {
             path: self.path.clone(),
-            file,
+            file: file.map_err(StorageError::at("read", &self.path))?,
         })
     }
 
@@ -154,12 +147,9 @@ impl File {
         }
     }
 
-    /// Returns the length, bytes.
     pub fn length(&self) -> Result<u64, StorageError> {
-        let metadata = self
-            .file
-            .metadata()
-            .map_err(StorageError::at("read", &self.path))?;
+        let metadata = self.file.metadata();
+        let metadata = metadata.map_err(StorageError::at("read", &self.path))?;
         Ok(metadata.len())
     }
 
@@ -190,23 +180,21 @@ impl File {
             return Ok(());
         }
         self.unless_full(self.file.write_all_at(bytes, offset), "write")?;
-        if was_full() {
-            return Ok(());
-        }
         #[cfg(feature = "record")]
-        record::push(&self.path, || Operation::Write {
-            path: self.path.clone(),
-            offset,
-            bytes: bytes.to_vec(),
-        });
+        if !was_full() {
+            record::push(&self.path, || Operation::Write {
+                path: self.path.clone(),
+                offset,
+                bytes: bytes.to_vec(),
+            });
+        }
         Ok(())
     }
 
     /// Cuts the file, or extends it by zeros.
     pub fn set_length(&self, length: u64) -> Result<(), StorageError> {
-        self.file
-            .set_len(length)
-            .map_err(StorageError::at("write", &self.path))?;
+        let set = self.file.set_len(length);
+        set.map_err(StorageError::at("write", &self.path))?;
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::SetLength {
             path: self.path.clone(),
@@ -235,46 +223,5 @@ impl File {
             id,
         });
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_file_that_has_lost_its_name_is_noticed() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let file = File::open_or_create(&path).unwrap();
-        file.require_name().unwrap();
-        let lost = || {
-            let sentence = file.require_name().unwrap_err().to_string();
-            let begin = format!("cannot keep {}: another program", path.display());
-            assert!(sentence.starts_with(&begin), "{sentence}");
-        };
-        fs::rename(&path, folder.path().join("away")).unwrap();
-        lost();
-        fs::write(&path, "another").unwrap();
-        lost();
-        fs::rename(folder.path().join("away"), &path).unwrap();
-        file.require_name().unwrap();
-    }
-
-    #[test]
-    fn a_lock_is_waited_for_while_its_owner_goes_and_refused_while_it_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let owner = File::open_or_create(&path).unwrap();
-        assert!(owner.lock().unwrap());
-        let other = File::open_or_create(&path).unwrap();
-        assert!(!other.lock().unwrap());
-        let going = thread::spawn(move || {
-            thread::sleep(Duration::from_millis(50));
-            drop(owner);
-        });
-        assert!(other.lock().unwrap());
-        going.join().unwrap();
     }
 }

@@ -30,14 +30,11 @@ pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
     if !above.as_os_str().is_empty() {
         create_folder(above)?;
     }
-    match fs::create_dir(folder) {
+    match fs::create_dir(folder).and_then(|()| open_to_owner(folder)) {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
             Err(StorageError::at("write", folder)(error))
         }
-        created => {
-            if created.is_ok() {
-                open_to_owner(folder).map_err(StorageError::at("write", folder))?;
-            }
+        _ => {
             #[cfg(feature = "record")]
             record::push(folder, || Operation::CreateFolder(folder.to_owned()));
             sync_folder(above)
@@ -48,13 +45,8 @@ pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
 /// Gives the owner all rights in a new folder. The umask may have taken one: another thread of this
 /// process can have changed it for a moment.
 fn open_to_owner(folder: &Path) -> io::Result<()> {
-    const OWNER: u32 = 0o700;
-    let handle = fs::File::open(folder)?;
-    let mode = handle.metadata()?.permissions().mode();
-    match mode & OWNER == OWNER {
-        true => Ok(()),
-        false => handle.set_permissions(fs::Permissions::from_mode(mode | OWNER)),
-    }
+    let mode = fs::metadata(folder)?.permissions().mode();
+    fs::set_permissions(folder, fs::Permissions::from_mode(mode | 0o700))
 }
 
 /// Removes a file, if there is one. [`sync_folder`] makes that survive a power failure.

@@ -1,7 +1,7 @@
 //! Synchronisation of a file in the background.
 
 use std::{
-    fmt, io,
+    io,
     path::PathBuf,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     thread::{self, JoinHandle},
@@ -15,19 +15,20 @@ use crate::{File, StorageError};
 ///
 /// At most [`GroupSync::LIMIT`] changes are in danger of a power failure, and none for much longer
 /// than [`GroupSync::INTERVAL`].
+#[derive(Debug)]
 pub struct GroupSync {
     path: PathBuf,
     shared: Arc<Shared>,
     worker: Option<JoinHandle<()>>,
 }
 
+#[derive(Debug)]
 struct Shared {
     progress: Mutex<Progress>,
     changed: Condvar,
 }
 
-/// Counts of changes, and how the thread stands.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Progress {
     made: u64,
     safe: u64,
@@ -36,12 +37,6 @@ struct Progress {
     ending: bool,
     /// Why a synchronisation has failed. No synchronisation follows it.
     failure: Option<(io::ErrorKind, String)>,
-}
-
-impl fmt::Debug for GroupSync {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("GroupSync").finish_non_exhaustive()
-    }
 }
 
 impl Shared {

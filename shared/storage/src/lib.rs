@@ -36,7 +36,7 @@ use std::{
 use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
-pub use durable::{Busy, Checksum, DurableFile, Slots};
+pub use durable::{Busy, Checksum, DurableFile, Slots, may_begin};
 pub use file::{File, continue_when_full, was_full};
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;

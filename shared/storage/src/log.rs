@@ -12,7 +12,6 @@
 //! zeros up to a multiple of four. So the same records are the same file.
 
 mod reader;
-mod records;
 #[cfg(test)]
 mod tests;
 
@@ -25,7 +24,7 @@ use thiserror::Error;
 
 use crate::{Busy, DurableFile, StorageError};
 pub use reader::LogReader;
-use records::{Records, encode};
+use reader::encode;
 
 /// The start of a log: the kind of its records, and their version.
 pub type LogMagic = [u8; 16];
@@ -41,29 +40,20 @@ pub enum LogError {
     Storage(#[from] StorageError),
     #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
     Foreign { path: PathBuf },
+    /// The record of this number, from 0.
     #[error("{path} is damaged at record {record}, although it had been written whole")]
-    Damaged {
-        path: PathBuf,
-        /// The number of the record, from 0.
-        record: usize,
-    },
+    Damaged { path: PathBuf, record: usize },
     /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
-    Malformed {
-        path: PathBuf,
-        /// The number of the record, from 0.
-        record: usize,
-    },
+    Malformed { path: PathBuf, record: usize },
     #[error(transparent)]
     Busy(#[from] Busy),
 }
 
-/// A log open for appending.
 #[derive(Debug)]
 pub struct Log {
     file: DurableFile,
-    records: Records,
-    /// Number of changes that were counted.
+    records: LogReader,
     changes: u64,
     /// Their number when the last record was appended.
     appended: u64,
@@ -75,10 +65,10 @@ impl Log {
     /// failure. Of the others only the headers are read. The contents of the log then survive a
     /// power failure.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
-        let mut records = Records::new(path, magic);
+        let mut records = LogReader::new(path, magic);
         let file = DurableFile::open(path, |file| {
             records.refresh()?;
-            if !records.has_magic() {
+            if !records.has_magic {
                 file.set_length(0)?;
                 file.write_at(&magic, 0)?;
                 records.refresh()?;
@@ -95,20 +85,18 @@ impl Log {
         })
     }
 
-    /// Returns the number of records.
     pub fn len(&self) -> usize {
         self.records.len()
     }
 
-    /// Returns whether there are no records.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.records.is_empty()
     }
 
     /// Allocates the memory for appending records of up to `bytes` bytes: later appends allocate
     /// nothing.
     pub fn reserve(&mut self, bytes: usize) {
-        self.buffer.reserve(bytes + records::MARGIN);
+        self.buffer.reserve(bytes + reader::MARGIN);
         self.records.reserve(MANY);
     }
 
@@ -116,13 +104,11 @@ impl Log {
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
-            return Err(StorageError::at("write", self.file.file().path())(too_long).into());
+            return Err(StorageError::at("write", self.file.file.path())(too_long).into());
         }
         let header = encode(self.len(), record, &mut self.buffer);
-        self.file
-            .file()
-            .write_at(&self.buffer, self.records.end())?;
-        self.file.file().require_name()?;
+        self.file.file.write_at(&self.buffer, self.records.end())?;
+        self.file.file.require_name()?;
         self.records.push(header);
         self.appended = self.changes + 1;
         self.count()
@@ -132,7 +118,7 @@ impl Log {
     /// most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of them are made before the records
     /// survive a power failure.
     pub fn rely(&mut self) -> Result<(), LogError> {
-        match self.file.safe() >= Some(self.appended) {
+        match self.file.sync.safe() >= Some(self.appended) {
             true => Ok(()),
             false => self.count(),
         }
@@ -140,19 +126,16 @@ impl Log {
 
     fn count(&mut self) -> Result<(), LogError> {
         self.changes += 1;
-        Ok(self.file.changed()?)
+        Ok(self.file.sync.changed()?)
     }
 
     /// Makes all records survive a power failure.
     pub fn sync(&self) -> Result<(), LogError> {
-        self.file.file().require_name()?;
-        Ok(self.file.finish()?)
+        self.file.file.require_name()?;
+        Ok(self.file.sync.finish()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.
-    ///
-    /// # Panics
-    /// There are no more than `index` records.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
     }
@@ -167,8 +150,8 @@ impl Log {
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         if records < self.len() {
             self.records.truncate(records);
-            self.file.file().set_length(self.records.end())?;
-            self.file.file().sync()?;
+            self.file.file.set_length(self.records.end())?;
+            self.file.file.sync()?;
         }
         Ok(())
     }

@@ -8,7 +8,6 @@ use std::{
     },
 };
 
-/// A change of a file or folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Operation {
     CreateFolder(PathBuf),
@@ -16,25 +15,21 @@ pub enum Operation {
     /// Bytes written at an offset.
     Write {
         path: PathBuf,
-        /// The place of the first byte.
         offset: u64,
         bytes: Vec<u8>,
     },
     /// A file cut or extended.
     SetLength {
         path: PathBuf,
-        /// The new length, bytes.
         length: u64,
     },
     SyncBegins {
         path: PathBuf,
-        /// The number of the synchronisation.
         id: u64,
     },
     /// It has ended: writes before its begin survive.
     SyncEnds {
         path: PathBuf,
-        /// The number of the synchronisation.
         id: u64,
     },
     /// A file renamed, in place of an existing one.
@@ -51,45 +46,37 @@ pub enum Operation {
 #[derive(Debug)]
 pub struct Recorder(PathBuf);
 
-struct Recording {
-    root: PathBuf,
-    operations: Vec<Operation>,
-}
+/// The roots of recorders, and the changes below each.
+static RECORDINGS: Mutex<Vec<(PathBuf, Vec<Operation>)>> = Mutex::new(Vec::new());
 
-static RECORDINGS: Mutex<Vec<Recording>> = Mutex::new(Vec::new());
-
-fn recordings() -> MutexGuard<'static, Vec<Recording>> {
+fn recordings() -> MutexGuard<'static, Vec<(PathBuf, Vec<Operation>)>> {
     RECORDINGS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Recorder {
     /// Starts to record the changes below `root`.
     pub fn start(root: &Path) -> Self {
-        recordings().push(Recording {
-            root: root.to_owned(),
-            operations: Vec::new(),
-        });
+        recordings().push((root.to_owned(), Vec::new()));
         Self(root.to_owned())
     }
 
-    /// Returns the changes so far.
     pub fn operations(&self) -> Vec<Operation> {
         let all = recordings();
-        let ours = all.iter().find(|recording| recording.root == self.0);
-        ours.map_or(Vec::new(), |recording| recording.operations.clone())
+        let ours = all.iter().find(|(root, _)| *root == self.0);
+        ours.map_or(Vec::new(), |(_, operations)| operations.clone())
     }
 }
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        recordings().retain(|recording| recording.root != self.0);
+        recordings().retain(|(root, _)| *root != self.0);
     }
 }
 
 pub(crate) fn push(path: &Path, operation: impl Fn() -> Operation) {
-    for recording in recordings().iter_mut() {
-        if path.starts_with(&recording.root) {
-            recording.operations.push(operation());
+    for (root, operations) in recordings().iter_mut() {
+        if path.starts_with(root) {
+            operations.push(operation());
         }
     }
 }

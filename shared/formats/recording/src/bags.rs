@@ -2,10 +2,6 @@
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
-//! Reading order: `files` (the files of a bag), `spans` (the places of messages), `topics` (the
-//! topics of a radar), `azimuths` (messages as azimuths), `bag` (all files as one), `scans`
-//! (azimuths as scans), `sensors` (other sensors), `samples` (of gyro and wheels), [`fixes()`] (of
-//! GNSS), [`BagWriter`].
 
 mod azimuths;
 mod bag;

@@ -10,15 +10,14 @@ use std::{
 /// The longest time for which a chunk is not synchronised. A power failure loses at most this much.
 const SYNC_PERIOD: Duration = Duration::from_secs(1);
 
-/// The call that synchronises a file.
 pub(crate) type Synchronise = Arc<dyn Fn(&File) -> io::Result<()> + Send + Sync>;
 
 /// The file of a writer, beside the one that the library writes to.
 pub(crate) struct Disk {
     file: File,
-    synchronise: Synchronise,
+    pub synchronise: Synchronise,
     /// Length of the file up to the last complete table.
-    complete_bytes: u64,
+    pub complete_bytes: u64,
     /// When the oldest chunk that is not synchronised was written.
     unsynchronised: Option<Instant>,
 }
@@ -33,22 +32,6 @@ impl Disk {
         }
     }
 
-    /// Returns the call of an ordinary writer.
-    pub fn synchronises() -> Synchronise {
-        Arc::new(File::sync_data)
-    }
-
-    /// Returns the call for the next part.
-    pub fn synchronise_of_next(&self) -> Synchronise {
-        self.synchronise.clone()
-    }
-
-    /// Returns the length up to the last complete table.
-    pub fn complete_bytes(&self) -> u64 {
-        self.complete_bytes
-    }
-
-    /// Notes that a table is complete.
     pub fn complete(&mut self) -> io::Result<()> {
         // The file of the library and this one have one position.
         self.complete_bytes = self.file.stream_position()?;

@@ -7,7 +7,6 @@ use crate::LogLine;
 /// The most that is kept, bytes: a radar may be switched on days after the recorder.
 const MAX_BYTES: usize = 1 << 20;
 
-/// The newest log lines.
 #[derive(Debug, Default)]
 pub(crate) struct EarlyLines {
     lines: VecDeque<LogLine>,
@@ -42,7 +41,6 @@ impl EarlyLines {
     }
 }
 
-/// Returns the memory of a line, about.
 fn bytes(line: &LogLine) -> usize {
     size_of::<LogLine>() + line.level.len() + line.stage.len() + line.message.len()
 }

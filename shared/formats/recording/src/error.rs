@@ -1,74 +1,64 @@
 //! The errors of recordings and bags.
 
 use std::{
+    fmt::Display,
     io,
     path::{Path, PathBuf},
 };
 
-use gyre_datasets::OpenError;
-use gyre_ros2_messages::BadMessage;
+use gyre_datasets::{OpenError, ReadError};
 use mcap::McapError;
 use thiserror::Error;
 
 /// A recording or a bag that cannot be written or read. Its `Display` is one sentence.
 #[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum RecordingError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: io::Error },
-    /// An error of the library.
-    #[error("{path}: {source}")]
-    Mcap { path: PathBuf, source: McapError },
-    #[error(
-        "{0} does not begin with the signature of MCAP: it is another file, or was not copied whole"
-    )]
-    NoMcap(PathBuf),
-    #[error("{path} is not a recording of Gyre: {reason}")]
-    Foreign { path: PathBuf, reason: String },
-    /// A bag that cannot be read as it is.
-    #[error("the bag {path} {reason}")]
-    Unreadable { path: PathBuf, reason: String },
-    #[error("{path} is damaged at byte {offset}: {reason}")]
-    Damaged {
-        path: PathBuf,
-        offset: u64,
-        reason: String,
-    },
-    #[error(
-        "{path} has no message {seq} of topic `{topic}`: the recorder missed it, or the topic was not among its --topics"
-    )]
-    Absent {
-        path: PathBuf,
-        topic: String,
-        seq: u64,
-    },
-    #[error("cannot write a message: {0}")]
-    Message(#[from] BadMessage),
-    #[error("cannot write {path}: {reason}")]
-    Unwritable { path: PathBuf, reason: String },
+    /// A place of a file is damaged: a sentence.
+    #[error("{0}")]
+    Damaged(String),
+    /// Any other reason: a sentence.
+    #[error("{0}")]
+    Other(String),
 }
 
 impl RecordingError {
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
-        Self::Io {
-            path: path.to_owned(),
-            source,
-        }
+        let path = path.to_owned();
+        Self::Io { path, source }
     }
 
-    pub(crate) fn unreadable(path: &Path, reason: impl Into<String>) -> Self {
-        Self::Unreadable {
-            path: path.to_owned(),
-            reason: reason.into(),
-        }
+    pub(crate) fn damaged(path: &Path, offset: u64, reason: impl Display) -> Self {
+        let path = path.display();
+        Self::Damaged(format!("{path} is damaged at byte {offset}: {reason}"))
+    }
+
+    pub(crate) fn foreign(path: &Path, reason: impl Display) -> Self {
+        let path = path.display();
+        Self::Other(format!("{path} is not a recording of Gyre: {reason}"))
+    }
+
+    pub(crate) fn unreadable(path: &Path, reason: impl Display) -> Self {
+        Self::Other(format!("the bag {} {reason}", path.display()))
     }
 
     /// An error of the library, which wraps the error of the system.
     pub(crate) fn of(path: &Path, error: McapError) -> Self {
-        let path = path.to_owned();
         match error {
-            McapError::Io(source) => Self::Io { path, source },
-            source => Self::Mcap { path, source },
+            McapError::Io(source) => Self::io(path, source),
+            error => Self::Other(format!("{}: {error}", path.display())),
+        }
+    }
+
+    /// The error of a scan in a file that is damaged, unless the disk does not give it.
+    pub(crate) fn of_scan(self, path: &Path) -> ReadError {
+        match self {
+            Self::Io { path, source } => ReadError::Io { path, source },
+            error => ReadError::Damaged {
+                path: path.to_owned(),
+                reason: error.to_string(),
+            },
         }
     }
 }

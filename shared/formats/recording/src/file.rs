@@ -23,8 +23,8 @@ use mcap::{
 };
 
 use crate::RecordingError;
-pub(crate) use parse::parse;
 use parse::{Field, fields};
+pub(crate) use parse::{next, parse};
 
 /// Bytes of opcode and length before each record.
 const PREFIX: u64 = 9;
@@ -51,14 +51,12 @@ const MESSAGE_TIME: Range<usize> = 15..23;
 /// The place of records in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
-    /// Position of the first opcode.
     pub offset: u64,
     /// Bytes of the records with their opcodes and lengths.
     pub bytes: u64,
 }
 
 impl Span {
-    /// Returns the position behind the records.
     pub fn end(self) -> u64 {
         self.offset + self.bytes
     }
@@ -67,7 +65,6 @@ impl Span {
 /// A first and last time, ns since 1970; `None` without messages.
 pub(crate) type Times = Option<(u64, u64)>;
 
-/// Returns the times of both.
 pub(crate) fn joined(times: Times, others: Times) -> Times {
     match (times, others) {
         (Some((first, last)), Some(other)) => Some((first.min(other.0), last.max(other.1))),
@@ -75,14 +72,12 @@ pub(crate) fn joined(times: Times, others: Times) -> Times {
     }
 }
 
-/// A channel of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Channel {
     pub topic: String,
     /// The type, such as `nav_msgs/msg/Odometry`.
     pub type_name: String,
     pub schema: String,
-    /// The encoding of its messages.
     pub encoding: String,
 }
 
@@ -110,7 +105,6 @@ pub struct McapFile {
     /// The positions of the damaged places so far, at most [`MAX_PLACES`].
     pub(crate) damage: BTreeSet<u64>,
     schemas: BTreeMap<u16, (String, String)>,
-    /// The channels so far.
     pub(crate) channels: BTreeMap<u16, Channel>,
 }
 
@@ -121,7 +115,9 @@ impl McapFile {
         let file = gyre_storage::open(path).map_err(failed)?;
         let bytes = file.metadata().map_err(failed)?.len();
         if number(&file, 0).map_err(failed)?.to_le_bytes() != MAGIC {
-            return Err(RecordingError::NoMcap(path.to_owned()));
+            let reason = "does not begin with the signature of MCAP: it is another file, or was not copied whole";
+            let path = path.display();
+            return Err(RecordingError::Other(format!("{path} {reason}")));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -174,8 +170,7 @@ impl McapFile {
         if opcode != op::METADATA {
             return Ok(None);
         }
-        let bytes = self.content(span);
-        let bytes = bytes.map_err(|error| RecordingError::io(&self.path, error))?;
+        let bytes = self.content(span)?;
         match parse(opcode, bytes.get(PREFIX as usize..).unwrap_or_default()) {
             Ok(Record::Metadata(record)) => Ok(Some(record)),
             _ => {
@@ -185,7 +180,6 @@ impl McapFile {
         }
     }
 
-    /// Returns the times that are in a record.
     pub(crate) fn times_ns(&self, opcode: u8, span: Span) -> Result<Times, RecordingError> {
         let place = match opcode {
             op::CHUNK => CHUNK_TIMES,
@@ -193,8 +187,7 @@ impl McapFile {
             _ => return Ok(None),
         };
         let bytes = span.bytes.min(place.end as u64);
-        let head = self.content(Span { bytes, ..span });
-        let head = head.map_err(|error| RecordingError::io(&self.path, error))?;
+        let head = self.content(Span { bytes, ..span })?;
         let (numbers, _) = head.get(place).unwrap_or_default().as_chunks::<8>();
         let times = numbers.iter().map(|bytes| u64::from_le_bytes(*bytes));
         // A chunk without messages has zeros.
@@ -212,8 +205,7 @@ impl McapFile {
         let read = match span.bytes > MAX_SPAN_BYTES {
             true => Err(McapError::ChunkTooLarge(span.bytes)),
             false => {
-                let bytes = self.content(span);
-                let bytes = bytes.map_err(|error| RecordingError::io(&self.path, error))?;
+                let bytes = self.content(span)?;
                 records::records(&bytes, |record| {
                     self.learn(record, &wanted).map_or(0, |message| {
                         let kept = size_of::<Message>() + message.data.len();
@@ -227,16 +219,11 @@ impl McapFile {
             Ok(()) => Ok(messages),
             Err(error) => {
                 self.damage.insert(span.offset);
-                Err(RecordingError::Damaged {
-                    path: self.path.clone(),
-                    offset: span.offset,
-                    reason: error.to_string(),
-                })
+                Err(RecordingError::damaged(&self.path, span.offset, error))
             }
         }
     }
 
-    /// Learns channels, and returns a message that is wanted.
     fn learn(&mut self, record: Record<'_>, wanted: &impl Fn(&Channel) -> bool) -> Option<Message> {
         match record {
             Record::Schema { header, data }
@@ -251,8 +238,8 @@ impl McapFile {
                     && channel.topic.len() <= MAX_NAME_BYTES
                     && !channel.topic.contains(char::is_control) =>
             {
-                let schema = self.schemas.get(&channel.schema_id);
-                let (type_name, schema) = schema.cloned().unwrap_or_default();
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                let (type_name, schema) = schema.unwrap_or_default();
                 let learned = Channel {
                     topic: channel.topic,
                     type_name,
@@ -261,9 +248,8 @@ impl McapFile {
                 };
                 self.channels.insert(channel.id, learned);
             }
-            Record::Message { header, data } => {
-                let channel = self.channels.get(&header.channel_id)?;
-                return wanted(channel).then(|| Message {
+            Record::Message { header, data } if wanted(self.channels.get(&header.channel_id)?) => {
+                return Some(Message {
                     channel: header.channel_id,
                     sequence: header.sequence,
                     log_ns: i64::try_from(header.log_time).unwrap_or(i64::MAX),
@@ -294,10 +280,13 @@ impl McapFile {
     }
 
     /// Reads the bytes of a place, up to the end of the file.
-    fn content(&self, span: Span) -> io::Result<Vec<u8>> {
-        let left = self.file.metadata()?.len().saturating_sub(span.offset);
+    fn content(&self, span: Span) -> Result<Vec<u8>, RecordingError> {
+        let failed = |error| RecordingError::io(&self.path, error);
+        let length = self.file.metadata().map_err(failed)?.len();
+        let left = length.saturating_sub(span.offset);
         let mut bytes = vec![0; left.min(span.bytes) as usize];
-        self.file.read_exact_at(&mut bytes, span.offset)?;
+        let read = self.file.read_exact_at(&mut bytes, span.offset);
+        read.map_err(failed)?;
         Ok(bytes)
     }
 
@@ -452,13 +441,5 @@ mod tests {
         let (_, span) = file.next_record().unwrap().unwrap();
         let refused = file.read(span, |_| true).unwrap_err().to_string();
         assert!(refused.contains("is damaged at byte 8"), "{refused}");
-    }
-
-    #[test]
-    fn other_files_are_refused() {
-        for content in [&b"\x89PNG\r\n"[..], b""] {
-            let refused = opened(content, content.len() as u64).unwrap_err();
-            assert!(matches!(refused, RecordingError::NoMcap(_)));
-        }
     }
 }

@@ -11,7 +11,6 @@ use mcap::records::Metadata;
 
 use crate::Entry;
 
-/// The name of the records of generations without a recorded message.
 const NAME: &str = "gyre.generation";
 
 /// The first numbers of the generations that one process gives. A generation is left out if a later
@@ -40,7 +39,6 @@ impl Generations {
         self.starts_later_by(entry.generation, entry.seq)
     }
 
-    /// Returns whether a later generation begins with this number, or an earlier one.
     fn starts_later_by(&self, generation: u32, number: u64) -> bool {
         let mut later = self.0.range((Excluded(generation), Unbounded));
         later.next().is_some_and(|(_, first)| *first <= number)
@@ -56,13 +54,9 @@ pub(crate) fn to_metadata(topic: &str, skipped: GivenAnew) -> Metadata {
     }
 }
 
-/// Reads such a record; `None` for a different record.
 pub(crate) fn of_metadata(record: &Metadata) -> Option<(String, GivenAnew)> {
-    let of = record.metadata.first_key_value()?;
-    let ((topic, value), true) = (of, record.name == NAME) else {
-        return None;
-    };
-    let (generation, first) = value.split_once(':')?;
+    let (topic, value) = record.metadata.first_key_value()?;
+    let (generation, first) = value.split_once(':').filter(|_| record.name == NAME)?;
     let skipped = GivenAnew {
         generation: generation.parse().ok()?,
         first: first.parse().ok()?,

@@ -113,11 +113,8 @@ mod tests {
         fs::write(&recording, "").unwrap();
         let own = GnssLog::of_recording(&recording);
         fs::write(&own, "stamp_ns,latitude_deg,longitude_deg,sigma_m\n7,,,0\n").unwrap();
-        fs::write(
-            folder.path().join("gnss.csv"),
-            "stamp_s,east_m,north_m\n7,1,2\n",
-        )
-        .unwrap();
+        let beside = folder.path().join("gnss.csv");
+        fs::write(beside, "stamp_s,east_m,north_m\n7,1,2\n").unwrap();
         let of = |data: &Path| of_scans(None, data).unwrap();
         for data in [recording.as_path(), folder.path()] {
             let log = of(data);

@@ -6,8 +6,9 @@ use gyre_messages::topic;
 use gyre_storage::quoted;
 use mcap::records::Metadata;
 
-/// The name of the record.
 const NAME: &str = "gyre.recording";
+/// The reason against a file without it.
+pub(crate) const NO_HEAD: &str = "it has no metadata `gyre.recording`";
 /// The version of everything that this crate writes beside the wire messages, which carry versions
 /// of their own.
 const FORMAT: &str = "1";
@@ -17,11 +18,9 @@ const FORMAT: &str = "1";
 pub struct Head {
     /// Identifies the recording: all its parts have the same identifier.
     pub id: String,
-    /// The number of the part, from 1.
     pub part: usize,
     /// The resolved configuration of the run, TOML.
     pub configuration: String,
-    /// The topics that are recorded.
     pub topics: Vec<String>,
     /// Bytes of the run's largest scan.
     pub scan_bytes: usize,
@@ -58,31 +57,25 @@ impl Head {
         };
         let number = |key: &str| {
             let value = entry(key)?;
-            let invalid = |_| {
-                format!(
-                    "`{key}` of its metadata `{NAME}` is {}, not a number",
-                    quoted(&value)
-                )
-            };
-            value.parse().map_err(invalid)
+            value.parse().map_err(|_| {
+                let value = quoted(&value);
+                format!("`{key}` of its metadata `{NAME}` is {value}, not a number")
+            })
         };
         let format = entry("format")?;
         if format != FORMAT {
+            let format = quoted(&format);
             return Err(format!(
-                "it has format {}, and this version of Gyre reads {FORMAT}",
-                quoted(&format)
+                "it has format {format}, and this version of Gyre reads {FORMAT}"
             ));
         }
         let topics = entry("topics")?;
-        let topics = topics
-            .split(',')
-            .filter(|topic| !topic.is_empty())
-            .map(of_type);
+        let topics = topics.split(',').filter(|topic| !topic.is_empty());
         Ok(Self {
             id: entry("id")?,
             part: number("part")?,
             configuration: entry("configuration")?,
-            topics: topics.collect::<Result<_, _>>()?,
+            topics: topics.map(of_type).collect::<Result<_, _>>()?,
             scan_bytes: number("scan_bytes")?,
             mode: entry("mode")?,
         })
@@ -92,10 +85,8 @@ impl Head {
 /// Returns the topics with the types of their headers.
 fn types(topics: &[String]) -> String {
     let topics = topics.iter().filter_map(|name| topic(name));
-    let types: Vec<String> = topics
-        .map(|topic| format!("{}={}", topic.name, topic.header.name))
-        .collect();
-    types.join(",")
+    let types = topics.map(|topic| format!("{}={}", topic.name, topic.header.name));
+    types.collect::<Vec<String>>().join(",")
 }
 
 /// Returns the topic of this type, which must be the type that this program has.

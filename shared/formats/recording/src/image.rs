@@ -6,14 +6,11 @@ use gyre_messages::{Masked, MaskedHeader, Message, Scan, ScanHeader};
 /// The rows of an image in a payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
-    /// Position of the first row.
     pub first: usize,
     /// Bytes from one row to the next.
     pub stride: usize,
-    /// Bytes of a row.
     pub width: usize,
     pub count: usize,
-    /// Bytes of a cell.
     pub cell: usize,
     /// The encoding of the cells, as viewers name it.
     pub encoding: &'static str,
@@ -23,37 +20,35 @@ impl Rows {
     /// Returns the image of a message; `None` for a topic without one, or a header without rows.
     pub fn of(topic: &str, header: &[u8]) -> Option<Self> {
         let rows = match topic {
-            Scan::TOPIC => Self::of_scan(&read(header)?),
-            Masked::TOPIC => Self::of_raster(&read(header)?),
+            // The powers, azimuth x range bin.
+            Scan::TOPIC => {
+                let header: ScanHeader = read(header)?;
+                Self {
+                    first: header.first_byte as usize,
+                    // Of a single row it has no meaning.
+                    stride: header.stride.max(header.bins) as usize,
+                    width: header.bins as usize,
+                    count: header.azimuths as usize,
+                    cell: 1,
+                    encoding: "mono8",
+                }
+            }
+            // The first raster, n x n.
+            Masked::TOPIC => {
+                let count = read::<MaskedHeader>(header)?.n as usize;
+                let width = count * size_of::<f32>();
+                Self {
+                    first: 0,
+                    stride: width,
+                    width,
+                    count,
+                    cell: size_of::<f32>(),
+                    encoding: "32FC1",
+                }
+            }
             _ => return None,
         };
         (rows.count > 0 && rows.width > 0 && rows.width <= rows.stride).then_some(rows)
-    }
-
-    /// The powers, azimuth x range bin.
-    fn of_scan(header: &ScanHeader) -> Self {
-        Self {
-            first: header.first_byte as usize,
-            // Of a single row it has no meaning.
-            stride: header.stride.max(header.bins) as usize,
-            width: header.bins as usize,
-            count: header.azimuths as usize,
-            cell: 1,
-            encoding: "mono8",
-        }
-    }
-
-    /// The first raster, n x n.
-    fn of_raster(header: &MaskedHeader) -> Self {
-        let width = header.n as usize * size_of::<f32>();
-        Self {
-            first: 0,
-            stride: width,
-            width,
-            count: header.n as usize,
-            cell: size_of::<f32>(),
-            encoding: "32FC1",
-        }
     }
 
     /// Returns the image and the rest of a payload, in order; `None` if the payload is shorter than
@@ -104,23 +99,29 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    fn rows(first: usize, stride: usize, width: usize, count: usize) -> Rows {
+        Rows {
+            first,
+            stride,
+            width,
+            count,
+            cell: 1,
+            encoding: "mono8",
+        }
+    }
+
     #[test]
     fn a_payload_is_put_together_as_it_was_taken_apart() {
         let payload: Vec<u8> = (0..=255).collect();
-        for (first, stride, width, count) in
-            [(0, 8, 8, 4), (11, 20, 9, 3), (3, 64, 64, 1), (5, 7, 1, 30)]
-        {
-            let rows = Rows {
-                first,
-                stride,
-                width,
-                count,
-                cell: 1,
-                encoding: "mono8",
-            };
+        for rows in [
+            rows(0, 8, 8, 4),
+            rows(11, 20, 9, 3),
+            rows(3, 64, 64, 1),
+            rows(5, 7, 1, 30),
+        ] {
             let (image, rest) = rows.split(&payload).unwrap();
-            assert_eq!(image.len(), width * count);
-            assert_eq!(image[0], first as u8);
+            assert_eq!(image.len(), rows.width * rows.count);
+            assert_eq!(image[0], rows.first as u8);
             assert_eq!(image.len() + rest.len(), payload.len());
             assert_eq!(rows.join(&image, &rest).unwrap(), payload, "{rows:?}");
             assert_eq!(rows.join(&image[1..], &rest), None);
@@ -129,20 +130,8 @@ mod tests {
 
     #[test]
     fn an_image_beyond_its_payload_is_none() {
-        let rows = Rows {
-            first: 0,
-            stride: 10,
-            width: 10,
-            count: 3,
-            cell: 1,
-            encoding: "mono8",
-        };
-        assert_eq!(rows.split(&[0; 29]), None);
-        let absurd = Rows {
-            first: usize::MAX,
-            stride: usize::MAX,
-            ..rows
-        };
+        assert_eq!(rows(0, 10, 10, 3).split(&[0; 29]), None);
+        let absurd = rows(usize::MAX, usize::MAX, 10, 3);
         assert_eq!(absurd.split(&[0; 29]), None);
         assert_eq!(absurd.join(&[0; 30], &[]), None);
     }

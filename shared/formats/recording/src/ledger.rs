@@ -7,30 +7,26 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_storage::{SETTINGS, StorageError};
+use gyre_storage::SETTINGS;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Head, RecordingError,
     newest::{head, newest},
     parts::{part, parts},
-    position::{Position, Positions},
+    position::Positions,
 };
 
 /// The newest part of a recording, and what all parts before it hold.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Begun {
-    /// The first file.
     to: PathBuf,
-    /// See [`Head::id`].
     pub id: String,
-    /// The number of the newest part.
     pub part: usize,
     /// The positions behind the parts before it.
     pub positions: Positions,
 }
 
-/// The ledger of a run.
 #[derive(Clone, Debug)]
 pub struct Ledger(PathBuf);
 
@@ -61,7 +57,12 @@ impl Ledger {
         if let Ok((head, passed)) = newest(&part(to, begun.part))
             && head.id == begun.id
         {
-            begun.positions = passed.into_iter().fold(begun.positions, later);
+            for (topic, position) in passed {
+                let known = begun.positions.entry(topic).or_default();
+                if (position.generation, position.next) > (known.generation, known.next) {
+                    *known = position;
+                }
+            }
         }
         Ok(Some(begun))
     }
@@ -81,9 +82,8 @@ impl Ledger {
         };
         let text = toml::to_string(&begun).map_err(|error| self.failed(io::Error::other(error)))?;
         let folder = self.0.parent().map_or(Ok(()), gyre_storage::create_folder);
-        folder
-            .and_then(|()| gyre_storage::write(&self.0, text))
-            .map_err(|StorageError { source, .. }| self.failed(source))
+        let written = folder.and_then(|()| gyre_storage::write(&self.0, text));
+        written.map_err(|error| self.failed(error.source))
     }
 
     /// Returns the absolute path, so that the run may restart in any folder.
@@ -92,18 +92,6 @@ impl Ledger {
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        RecordingError::Io {
-            path: self.0.clone(),
-            source,
-        }
+        RecordingError::io(&self.0, source)
     }
-}
-
-/// Takes the later one of two positions of a topic.
-fn later(mut positions: Positions, (topic, position): (String, Position)) -> Positions {
-    let known = positions.entry(topic).or_default();
-    if (position.generation, position.next) > (known.generation, known.next) {
-        *known = position;
-    }
-    positions
 }

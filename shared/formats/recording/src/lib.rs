@@ -19,11 +19,6 @@
 //! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far.
 //! So a reader finds a message without decompressing earlier chunks, even in a file without a
 //! summary because its writer was killed.
-//!
-//! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
-//! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`,
-//! `generations`, `scans` (a [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (the
-//! opening of sources in any form).
 
 pub mod bags;
 mod disk;
@@ -62,7 +57,6 @@ pub use table::Entry;
 pub use view::LogLine;
 pub use writer::{Incoming, RecordingWriter};
 
-/// The channel of a topic's wire messages.
 fn exact_channel(topic: &str) -> String {
     format!("gyre/{topic}")
 }

@@ -13,7 +13,6 @@ use crate::LogLine;
 /// The most that is read at once, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A position in the log.
 pub struct LogTail {
     path: PathBuf,
     offset: u64,
@@ -47,10 +46,8 @@ impl LogTail {
         };
         let rest = self.begun.split_off(end + 1);
         let lines = std::mem::replace(&mut self.begun, rest);
-        lines
-            .split(|byte| *byte == b'\n')
-            .filter_map(|line| parse(line, now_ns))
-            .collect()
+        let lines = lines.split(|byte| *byte == b'\n');
+        lines.filter_map(|line| parse(line, now_ns)).collect()
     }
 
     fn appended(&mut self) -> Option<Vec<u8>> {

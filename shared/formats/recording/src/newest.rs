@@ -4,7 +4,9 @@ use std::path::Path;
 
 use mcap::records::op;
 
-use crate::{Head, RecordingError, file::McapFile, position::Positions, table::Table};
+use crate::{
+    Head, RecordingError, file::McapFile, head::NO_HEAD, position::Positions, table::Table,
+};
 
 /// Reads the head of a file, and the positions behind its newest messages.
 pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
@@ -26,10 +28,7 @@ pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
             }
         }
     }
-    let head = head.ok_or_else(|| RecordingError::Foreign {
-        path: path.to_owned(),
-        reason: "it has no metadata `gyre.recording`".to_owned(),
-    })?;
+    let head = head.ok_or_else(|| RecordingError::foreign(path, NO_HEAD))?;
     Ok((head, positions))
 }
 

@@ -17,9 +17,7 @@ pub fn is_recording(path: &Path) -> bool {
     if is_bag(path) {
         return false;
     }
-    let is_named = path
-        .extension()
-        .is_some_and(|extension| extension == "mcap");
+    let is_named = path.extension().is_some_and(|it| it == "mcap");
     is_named || first_part_in(path).is_some()
 }
 
@@ -54,10 +52,8 @@ pub fn reopen(
         Format::Ros2Bag => return bags::reopen(root, options, &files),
         _ => return gyre_datasets::reopen(root, options, format, files),
     }
-    let paths: Vec<PathBuf> = (0..files.len())
-        .filter_map(|index| files.get(index))
-        .map(Path::to_owned)
-        .collect();
+    let paths = (0..files.len()).filter_map(|index| files.get(index));
+    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
     open_parts(&paths, root, options)
 }
 
@@ -82,10 +78,8 @@ pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
 
 fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> {
     if paths.is_empty() {
-        return Err(OpenError::Recording(format!(
-            "there is no recording {}",
-            root.display()
-        )));
+        let reason = format!("there is no recording {}", root.display());
+        return Err(OpenError::Recording(reason));
     }
     Recording::open(paths).map_err(|error| match error {
         RecordingError::Io { path, source } => OpenError::Io { path, source },
@@ -112,18 +106,16 @@ fn open_parts(
 
 /// Returns the options of the recorded run: the section `[dataset]` of its configuration.
 fn recorded_options(recording: &Recording) -> Result<DatasetOptions, OpenError> {
-    let invalid = |reason: String| {
+    let invalid = |error: toml::de::Error| {
+        let reason = error.message();
         OpenError::Recording(format!(
             "the configuration in the recording is not one of Gyre: {reason}"
         ))
     };
-    let table: Result<toml::Table, _> = recording.head().configuration.parse();
-    let mut table = table.map_err(|error| invalid(error.message().to_owned()))?;
-    let section = table
-        .remove("dataset")
-        .unwrap_or_else(|| toml::Table::new().into());
-    let options: Result<DatasetOptions, _> = section.try_into();
-    let options = options.map_err(|error: toml::de::Error| invalid(error.message().to_owned()))?;
+    let mut table: toml::Table = recording.head().configuration.parse().map_err(invalid)?;
+    let section = table.remove("dataset");
+    let section = section.unwrap_or_else(|| toml::Table::new().into());
+    let options: DatasetOptions = section.try_into().map_err(invalid)?;
     Ok(DatasetOptions {
         format: Some(Format::Mcap),
         ..options

@@ -3,6 +3,7 @@
 //! are complete may be moved away: no number is given twice.
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
 };
@@ -23,11 +24,11 @@ pub fn parts(path: &Path) -> Vec<PathBuf> {
     if path.is_dir() {
         return first_part_in(path).map_or_else(Vec::new, |first| parts(&first));
     }
-    let parts = numbers(path)
-        .into_iter()
-        .map(|number| (part(path, number), number));
-    let parts = parts.filter(|(path, number)| *number == 1 || is_part(path, *number));
-    parts.map(|(path, _)| path).collect()
+    let parts = numbers(path).into_iter().filter_map(|number| {
+        let path = part(path, number);
+        (number == 1 || is_part(&path, number)).then_some(path)
+    });
+    parts.collect()
 }
 
 /// Returns whether a file is this part of a recording, not a different file with a number in its
@@ -58,26 +59,18 @@ fn numbers(path: &Path) -> Vec<usize> {
 /// Returns the first file of the only recording in a folder.
 pub(crate) fn first_part_in(folder: &Path) -> Option<PathBuf> {
     let files = fs::read_dir(folder).ok()?.flatten();
-    let files = files.map(|file| file.path());
-    let files = files.filter(|path| {
-        let is_recording = path.extension().is_some_and(|it| it == "mcap");
-        is_recording && !is_hidden(path)
+    let files = files.map(|file| file.path()).filter(|path| {
+        let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+        // macOS stores `._NAME.mcap` beside NAME.mcap on file systems of others.
+        path.extension().is_some_and(|it| it == "mcap") && !name.starts_with(b".")
     });
     let first = files.map(|path| match later_part(&path) {
         Some((first, number)) if is_part(&path, number) => first,
         _ => path,
     });
-    let mut first: Vec<PathBuf> = first.collect();
-    first.sort_unstable();
-    first.dedup();
-    let only = first.pop();
+    let mut first: BTreeSet<PathBuf> = first.collect();
+    let only = first.pop_first();
     only.filter(|_| first.is_empty())
-}
-
-/// macOS stores `._NAME.mcap` beside NAME.mcap on file systems of others.
-fn is_hidden(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default();
-    name.as_encoded_bytes().starts_with(b".")
 }
 
 /// Returns the first file and the number of NAME.N.mcap.
@@ -106,10 +99,7 @@ mod tests {
         let head = Head {
             id: "a".to_owned(),
             part: number,
-            configuration: String::new(),
-            topics: Vec::new(),
-            scan_bytes: 0,
-            mode: String::new(),
+            ..Head::default()
         };
         let writer = RecordingWriter::create(path, &head).unwrap();
         writer.finish().unwrap();

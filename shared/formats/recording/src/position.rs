@@ -9,13 +9,11 @@ use crate::Entry;
 /// The place behind the newest message of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
-    /// The number of the next message.
     pub next: u64,
     /// The generation of the newest one.
     pub generation: u32,
 }
 
-/// The positions of the topics of a recording.
 pub type Positions = BTreeMap<String, Position>;
 
 impl Position {
@@ -24,24 +22,6 @@ impl Position {
         let next = entry.seq.saturating_add(1);
         if (entry.generation, next) > (self.generation, self.next) {
             (self.generation, self.next) = (entry.generation, next);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_position_is_behind_the_newest_message_of_the_newest_generation() {
-        let mut position = Position::default();
-        for (generation, seq, next) in [(0, 4, 5), (0, 2, 5), (3, 2, 3), (2, 9, 3), (3, 3, 4)] {
-            position.pass(&Entry {
-                seq,
-                generation,
-                ..Entry::default()
-            });
-            assert_eq!(position.next, next, "after {seq} of {generation}");
         }
     }
 }

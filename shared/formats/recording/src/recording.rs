@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    mem,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -14,6 +14,7 @@ use crate::{
     Entry, Head, RecordingError, exact_channel,
     file::{Channel, McapFile, Message, Span},
     generations::{self, Generations},
+    head::NO_HEAD,
     image::{Rows, read},
     table::Table,
     view::image_channel,
@@ -24,38 +25,34 @@ const MAX_ABSENT: usize = 8;
 /// Chunks that are kept in memory: messages of one scan can be in two.
 const KEPT: usize = 2;
 
-/// A wire message as it was recorded.
+/// The bytes of a wire message: of its header, and of its payload that the header describes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stored {
-    /// The bytes of its header.
     pub header: Vec<u8>,
-    /// The bytes of its payload that the header describes.
     pub payload: Vec<u8>,
 }
 
-/// An open recording with all its parts.
+/// An open recording: at least one part.
+#[derive(Default)]
 pub struct Recording {
-    head: Head,
     parts: Vec<Part>,
     /// The messages of each topic by their sequence number.
     places: BTreeMap<String, BTreeMap<u64, Place>>,
     generations: BTreeMap<NumberedBy, Generations>,
     /// Files of other recordings.
     left_out: Vec<PathBuf>,
-    kept: Vec<Kept>,
+    /// The messages of some chunks, and the parts that they are in.
+    kept: Vec<(usize, Span, Vec<Message>)>,
 }
 
-/// A file of a recording.
 struct Part {
-    /// See [`Head::part`].
-    number: usize,
+    head: Head,
     file: McapFile,
     missed: BTreeMap<String, u64>,
     /// The generations of a topic without a recorded message.
     skipped: Vec<(String, GivenAnew)>,
 }
 
-/// The place of a message.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     entry: Entry,
@@ -66,47 +63,36 @@ struct Place {
 /// The messages of a part by topic, and the chunk that they are in.
 type Places = Vec<(String, Vec<Entry>, Span)>;
 
-/// The messages of a chunk in memory.
-struct Kept {
-    part: usize,
-    chunk: Span,
-    messages: Vec<Message>,
-}
-
 impl Recording {
     /// Opens the files of a recording, in order. Files of a different recording than the first are
     /// left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
-        let mut recording: Option<Self> = None;
+        let mut recording = Self::default();
         for path in paths {
-            let (head, part, places) = Part::open(path)?;
-            let recording = recording.get_or_insert_with(|| Self {
-                head: head.clone(),
-                parts: Vec::new(),
-                places: BTreeMap::new(),
-                generations: BTreeMap::new(),
-                left_out: Vec::new(),
-                kept: Vec::new(),
-            });
-            match head.id == recording.head.id {
+            let (part, places) = Part::open(path)?;
+            let mut parts = recording.parts.iter();
+            match parts.all(|other| other.head.id == part.head.id) {
                 true => recording.add(part, places),
                 false => recording.left_out.push(path.clone()),
             }
         }
-        recording.ok_or_else(|| RecordingError::Io {
-            path: PathBuf::new(),
-            source: std::io::ErrorKind::NotFound.into(),
-        })
+        match recording.parts.is_empty() {
+            true => Err(RecordingError::io(
+                Path::new(""),
+                io::ErrorKind::NotFound.into(),
+            )),
+            false => Ok(recording),
+        }
     }
 
     /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:
     /// the first message of a generation makes earlier ones void.
-    fn add(&mut self, part: Part, places: Places) {
-        let number = self.parts.len();
-        for (topic, skipped) in &part.skipped {
+    fn add(&mut self, added: Part, places: Places) {
+        let part = self.parts.len();
+        for (topic, skipped) in &added.skipped {
             self.note(NumberedBy::of(topic), *skipped);
         }
-        self.parts.push(part);
+        self.parts.push(added);
         for (topic, entries, chunk) in places {
             let by = NumberedBy::of(&topic);
             for entry in &entries {
@@ -114,14 +100,9 @@ impl Recording {
             }
             let generations = self.generations.entry(by).or_default();
             let places = self.places.entry(topic).or_default();
-            for entry in entries {
-                if !generations.makes_void(&entry) {
-                    places.entry(entry.seq).or_insert(Place {
-                        entry,
-                        part: number,
-                        chunk,
-                    });
-                }
+            for entry in entries.into_iter().filter(|it| !generations.makes_void(it)) {
+                let place = Place { entry, part, chunk };
+                places.entry(entry.seq).or_insert(place);
             }
         }
     }
@@ -140,9 +121,8 @@ impl Recording {
         }
     }
 
-    /// Returns the run that it is of.
     pub fn head(&self) -> &Head {
-        &self.head
+        &self.parts[0].head
     }
 
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
@@ -157,8 +137,8 @@ impl Recording {
 
     /// Returns the file that holds a message; the first one if none does.
     pub fn path_of(&self, topic: &str, seq: u64) -> &Path {
-        let place = self.places.get(topic).and_then(|places| places.get(&seq));
-        &self.parts[place.map_or(0, |place| place.part)].file.path
+        let part = self.place(topic, seq).map_or(0, |place| place.part);
+        &self.parts[part].file.path
     }
 
     /// Returns the numbers of messages that the recorders have counted as missed, by topic. One
@@ -178,7 +158,7 @@ impl Recording {
 
     /// Returns the numbers of the parts that are not there, as far as later ones are.
     pub fn absent_parts(&self) -> Vec<usize> {
-        let there: BTreeSet<usize> = self.parts.iter().map(|part| part.number).collect();
+        let there: BTreeSet<usize> = self.parts.iter().map(|part| part.head.part).collect();
         let last = there.last().copied().unwrap_or_default();
         // A damaged head may have any number.
         let absent = (1..last).filter(|number| !there.contains(number));
@@ -198,45 +178,45 @@ impl Recording {
         parts.find_map(|(number, part)| part.file.damage(number == last))
     }
 
-    pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
-        let place = self.places.get(topic).and_then(|places| places.get(&seq));
-        let Some(place) = place.copied() else {
-            return Err(RecordingError::Absent {
-                path: self.parts[0].file.path.clone(),
-                topic: topic.to_owned(),
-                seq,
-            });
-        };
-        let damaged = |path: &Path| RecordingError::Damaged {
-            path: path.to_owned(),
-            offset: place.chunk.offset,
-            reason: format!(
-                "it has no complete message {seq} of topic `{topic}`, which its table lists"
-            ),
-        };
-        let kept = self.keep(place)?;
-        let (messages, file) = (&self.kept[kept].messages, &self.parts[place.part].file);
-        stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| damaged(&file.path))
+    fn place(&self, topic: &str, seq: u64) -> Option<Place> {
+        self.places.get(topic)?.get(&seq).copied()
     }
 
-    /// Reads the header of a message.
+    pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
+        let Some(place) = self.place(topic, seq) else {
+            let path = self.parts[0].file.path.display();
+            return Err(RecordingError::Other(format!(
+                "{path} has no message {seq} of topic `{topic}`: the recorder missed it, or the topic was not among its --topics"
+            )));
+        };
+        let kept = self.keep(place)?;
+        let ((_, _, messages), file) = (&self.kept[kept], &self.parts[place.part].file);
+        stored(messages, &file.channels, topic, &place.entry).ok_or_else(|| {
+            let reason = format!(
+                "it has no complete message {seq} of topic `{topic}`, which its table lists"
+            );
+            RecordingError::damaged(&file.path, place.chunk.offset, reason)
+        })
+    }
+
     pub fn read_header<H: bytemuck::AnyBitPattern>(
         &mut self,
         topic: &str,
         seq: u64,
     ) -> Result<H, RecordingError> {
         let stored = self.read(topic, seq)?;
-        read(&stored.header).ok_or_else(|| RecordingError::Foreign {
-            path: self.path_of(topic, seq).to_owned(),
-            reason: format!("its messages of topic `{topic}` are of another version"),
+        read(&stored.header).ok_or_else(|| {
+            let reason = format!("its messages of topic `{topic}` are of another version");
+            RecordingError::foreign(self.path_of(topic, seq), reason)
         })
     }
 
     /// Returns the position of a chunk among those in memory, and reads it first if it is not
     /// there.
     fn keep(&mut self, place: Place) -> Result<usize, RecordingError> {
-        let is_it = |kept: &Kept| (kept.part, kept.chunk) == (place.part, place.chunk);
-        if let Some(index) = self.kept.iter().position(is_it) {
+        let mut kept = self.kept.iter();
+        let wanted = (place.part, place.chunk);
+        if let Some(index) = kept.position(|(part, chunk, _)| (*part, *chunk) == wanted) {
             return Ok(index);
         }
         if self.kept.len() == KEPT {
@@ -244,20 +224,16 @@ impl Recording {
         }
         let file = &mut self.parts[place.part].file;
         let messages = file.read(place.chunk, |_| true)?;
-        self.kept.push(Kept {
-            part: place.part,
-            chunk: place.chunk,
-            messages,
-        });
+        self.kept.push((place.part, place.chunk, messages));
         Ok(self.kept.len() - 1)
     }
 }
 
 impl Part {
     /// Opens a file: its head, and where its messages are.
-    fn open(path: &Path) -> Result<(Head, Self, Places), RecordingError> {
+    fn open(path: &Path) -> Result<(Self, Places), RecordingError> {
         let mut part = Self {
-            number: 0,
+            head: Head::default(),
             file: McapFile::open(path)?,
             missed: BTreeMap::new(),
             skipped: Vec::new(),
@@ -265,23 +241,20 @@ impl Part {
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
         let mut is_first = true;
         while let Some((opcode, span)) = part.file.next_record()? {
-            match opcode {
-                // Behind the end are the channels again, for a file whose first chunk is damaged.
-                op::SCHEMA | op::CHANNEL => part.learn_channels(span)?,
-                op::CHUNK => {
-                    // The first one has the channels.
-                    if mem::take(&mut is_first) {
-                        part.learn_channels(span)?;
-                    }
-                    chunk = Some(span);
-                }
-                _ => {}
+            let is_chunk = opcode == op::CHUNK;
+            // The first chunk has the channels, and behind the end they are again, for a file whose
+            // first chunk is damaged.
+            if matches!(opcode, op::SCHEMA | op::CHANNEL) || (is_chunk && is_first) {
+                part.learn_channels(span)?;
+            }
+            if is_chunk {
+                (is_first, chunk) = (false, Some(span));
             }
             let Some(record) = part.file.metadata(opcode, span)? else {
                 continue;
             };
             if let Some(read) = Head::of_metadata(&record) {
-                head = Some(read.map_err(|reason| part.foreign(reason))?);
+                head = Some(read.map_err(|reason| RecordingError::foreign(path, reason))?);
             } else if let Some(skipped) = generations::of_metadata(&record) {
                 part.skipped.push(skipped);
             } else if let Some(table) = Table::of_metadata(&record) {
@@ -294,36 +267,22 @@ impl Part {
                 part.file.damage.insert(span.offset);
             }
         }
-        let reason = "it has no metadata `gyre.recording`".to_owned();
-        let head: Head = head.ok_or_else(|| match part.file.damage.first() {
-            None => part.foreign(reason),
-            Some(offset) => RecordingError::Damaged {
-                path: part.file.path.clone(),
-                offset: *offset,
-                reason,
-            },
+        part.head = head.ok_or_else(|| match part.file.damage.first() {
+            None => RecordingError::foreign(path, NO_HEAD),
+            Some(offset) => RecordingError::damaged(path, *offset, NO_HEAD),
         })?;
-        part.number = head.part;
-        Ok((head, part, places))
+        Ok((part, places))
     }
 
     /// Learns the channels in a place, unless it is damaged.
     fn learn_channels(&mut self, span: Span) -> Result<(), RecordingError> {
         match self.file.read(span, |_| false) {
-            Err(RecordingError::Damaged { .. }) => Ok(()),
+            Err(RecordingError::Damaged(_)) => Ok(()),
             read => read.map(drop),
-        }
-    }
-
-    fn foreign(&self, reason: String) -> RecordingError {
-        RecordingError::Foreign {
-            path: self.file.path.clone(),
-            reason,
         }
     }
 }
 
-/// Puts a message together.
 fn stored(
     messages: &[Message],
     channels: &BTreeMap<u16, Channel>,
@@ -331,10 +290,8 @@ fn stored(
     entry: &Entry,
 ) -> Option<Stored> {
     let on = |message: &Message, channel: &str| {
-        let is_named = channels
-            .get(&message.channel)
-            .is_some_and(|it| it.topic == channel);
-        is_named && message.sequence == entry.seq as u32
+        let of = channels.get(&message.channel);
+        of.is_some_and(|it| it.topic == channel) && message.sequence == entry.seq as u32
     };
     let (exact, bytes) = (exact_channel(name), topic(name)?.header.bytes);
     // A reassigned number may occur twice in a chunk.

@@ -5,13 +5,13 @@ use std::{collections::BTreeMap, path::Path};
 
 use gyre_datasets::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, ReadError,
-    turn_ns,
+    check_capacity, turn_ns,
 };
 use gyre_messages::{Message, Scan, ScanHeader};
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
-use crate::{Entry, Recording, RecordingError, Stored, image::read};
+use crate::{Entry, Recording, Stored, image::read};
 
 /// Scans of a drive of months; a larger number in a table is damaged.
 const MAX_SCANS: u64 = 50_000_000;
@@ -20,7 +20,6 @@ const MAX_SCANS: u64 = 50_000_000;
 pub(crate) struct Scans {
     recording: Recording,
     files: FileList,
-    /// The scans by their number.
     entries: BTreeMap<usize, Entry>,
     first: SweepGeometry,
     period_ns: i64,
@@ -31,19 +30,14 @@ pub(crate) struct Scans {
 }
 
 impl Scans {
-    /// Opens the scans of a recording.
     pub fn open(mut recording: Recording) -> Result<Self, OpenError> {
         let entries: BTreeMap<usize, Entry> = recording
             .entries(Scan::TOPIC)
             .filter(|entry| entry.scan < MAX_SCANS)
             .map(|entry| (entry.scan as usize, entry))
             .collect();
-        let path = recording
-            .paths()
-            .next()
-            .unwrap_or(Path::new(""))
-            .display()
-            .to_string();
+        let path = recording.paths().next().unwrap_or(Path::new(""));
+        let path = path.display().to_string();
         let Some(first) = entries.values().next() else {
             let reason = format!("{path} holds no scans: the topic `scan` was not recorded");
             return Err(OpenError::Recording(reason));
@@ -73,52 +67,47 @@ impl Scans {
         options: &DatasetOptions,
         recorded: &DatasetOptions,
     ) -> Result<(), OpenError> {
-        let refuse = |key, value: String| {
-            Err(OpenError::BadOption {
-                key,
-                value,
-                format: Some(Format::Mcap),
-                reason: "its scans have the constants that they were recorded with; leave the key out",
-            })
+        let other = |wished: Option<f32>, is: f32| {
+            let wished = wished.filter(|wished| *wished != is);
+            wished.map(|wished| wished.to_string())
         };
         let scan = &self.first;
-        for (key, wished, is) in [
+        let eccentricity_rad = recorded.azimuth_eccentricity_rad.unwrap_or_default();
+        let topic = options.topic.map(|topic| topic.to_string());
+        let source = options.azimuth_source;
+        let is_other = source.is_some() && source != recorded.azimuth_source;
+        let source = is_other.then(|| format!("{source:?}").to_lowercase());
+        let counts = options.encoder_counts;
+        let counts = counts.filter(|counts| Some(*counts) != recorded.encoder_counts);
+        let refused = [
             (
                 "range_resolution_m",
-                options.range_resolution_m,
-                scan.range_resolution_m,
+                other(options.range_resolution_m, scan.range_resolution_m),
             ),
             (
                 "range_offset_m",
-                options.range_offset_m,
-                scan.range_offset_m,
+                other(options.range_offset_m, scan.range_offset_m),
             ),
-            ("doppler_s", options.doppler_s, scan.doppler_s),
+            ("doppler_s", other(options.doppler_s, scan.doppler_s)),
             (
                 "azimuth_eccentricity_rad",
-                options.azimuth_eccentricity_rad,
-                recorded.azimuth_eccentricity_rad.unwrap_or_default(),
+                other(options.azimuth_eccentricity_rad, eccentricity_rad),
             ),
-        ] {
-            if let Some(wished) = wished.filter(|wished| *wished != is) {
-                return refuse(key, wished.to_string());
+            ("topic", topic),
+            ("azimuth_source", source),
+            ("encoder_counts", counts.map(|counts| counts.to_string())),
+        ];
+        for (key, value) in refused {
+            if let Some(value) = value {
+                return Err(OpenError::BadOption {
+                    key,
+                    value,
+                    format: Some(Format::Mcap),
+                    reason: "its scans have the constants that they were recorded with; leave the key out",
+                });
             }
         }
-        if let Some(topic) = options.topic {
-            return refuse("topic", topic.to_string());
-        }
-        if options.azimuth_source.is_some() && options.azimuth_source != recorded.azimuth_source {
-            return refuse(
-                "azimuth_source",
-                format!("{:?}", options.azimuth_source).to_lowercase(),
-            );
-        }
-        match options.encoder_counts {
-            Some(counts) if options.encoder_counts != recorded.encoder_counts => {
-                refuse("encoder_counts", counts.to_string())
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }
 
@@ -130,10 +119,8 @@ fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String>
         format!("Part {number} of the recording is not there: what only it holds is missing.")
     }));
     notes.extend(recording.left_out().iter().map(|path| {
-        format!(
-            "{} is of another recording, and is left out.",
-            path.display()
-        )
+        let path = path.display();
+        format!("{path} is of another recording, and is left out.")
     }));
     let (first, last) = (entries.keys().next(), entries.keys().next_back());
     if let (Some(first), Some(last)) = (first, last) {
@@ -233,7 +220,7 @@ impl Dataset for Scans {
         let stored = self
             .recording
             .read(Scan::TOPIC, entry.seq)
-            .map_err(|error| failed(&path, error))?;
+            .map_err(|error| error.of_scan(&path))?;
         let damaged = || ReadError::Damaged {
             path: path.clone(),
             reason: format!("scan {index} does not fit its header and its table"),
@@ -248,46 +235,17 @@ impl Dataset for Scans {
         let powers = header
             .power_bytes()
             .and_then(|end| stored.payload.get(..end));
-        copy(powers.ok_or_else(damaged)?, slot.bytes, "bytes")?;
-        let azimuths = geometry.azimuths;
-        copy(
-            &header.azimuth_rad[..azimuths],
-            slot.azimuth_rad,
-            "azimuths",
-        )?;
-        copy(
-            &header.azimuth_stamp_ns[..azimuths],
-            slot.stamp_ns,
-            "stamps",
-        )?;
-        copy(&header.azimuth_flags[..azimuths], slot.flags, "flags")?;
+        let (powers, azimuths) = (powers.ok_or_else(damaged)?, geometry.azimuths);
+        let bytes = powers.len();
+        check_capacity(ScanLimits { bytes, azimuths }, &slot)?;
+        slot.bytes[..bytes].copy_from_slice(powers);
+        slot.azimuth_rad[..azimuths].copy_from_slice(&header.azimuth_rad[..azimuths]);
+        slot.stamp_ns[..azimuths].copy_from_slice(&header.azimuth_stamp_ns[..azimuths]);
+        slot.flags[..azimuths].copy_from_slice(&header.azimuth_flags[..azimuths]);
         Ok(geometry)
     }
 
     fn samples(&self) -> &[Sample] {
         &self.samples
-    }
-}
-
-fn copy<T: Copy>(from: &[T], to: &mut [T], what: &'static str) -> Result<(), ReadError> {
-    let (needed, actual) = (from.len(), to.len());
-    let to = to.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
-        what,
-        needed,
-        actual,
-    })?;
-    to.copy_from_slice(from);
-    Ok(())
-}
-
-/// A file that the disk does not give may be read later; a damaged one may not.
-fn failed(path: &Path, error: RecordingError) -> ReadError {
-    let path = path.to_owned();
-    match error {
-        RecordingError::Io { source, .. } => ReadError::Io { path, source },
-        other => ReadError::Damaged {
-            path,
-            reason: other.to_string(),
-        },
     }
 }

@@ -23,7 +23,6 @@ pub struct Split {
     pub span_ns: Option<i64>,
 }
 
-/// Writes the files of a recording.
 pub struct SplitWriter {
     /// The first part.
     to: PathBuf,
@@ -47,7 +46,9 @@ impl SplitWriter {
         ledger: Option<Ledger>,
         positions: Positions,
     ) -> Result<Self, RecordingError> {
-        note(ledger.as_ref(), &to, &head, &positions)?;
+        if let Some(ledger) = &ledger {
+            ledger.note(&to, &head, &positions)?;
+        }
         Ok(Self {
             writer: RecordingWriter::create(&part(&to, head.part), &head)?,
             to,
@@ -59,9 +60,8 @@ impl SplitWriter {
         })
     }
 
-    /// Returns the file that is being written.
     pub fn path(&self) -> &Path {
-        self.writer.path()
+        &self.writer.path
     }
 
     /// Adds a message, to the next part if this one is full.
@@ -85,10 +85,11 @@ impl SplitWriter {
     fn go_on(&mut self) -> Result<(), RecordingError> {
         self.writer.end()?;
         self.head.part = next_part(&self.to, self.head.part);
-        note(self.ledger.as_ref(), &self.to, &self.head, &self.positions)?;
-        let missed = self
-            .writer
-            .go_on(&part(&self.to, self.head.part), &self.head)?;
+        if let Some(ledger) = &self.ledger {
+            ledger.note(&self.to, &self.head, &self.positions)?;
+        }
+        let next = part(&self.to, self.head.part);
+        let missed = self.writer.go_on(&next, &self.head)?;
         add(&mut self.missed, missed);
         Ok(())
     }
@@ -98,37 +99,24 @@ impl SplitWriter {
         self.writer.missed(topic, missed);
     }
 
-    /// Adds a line of the log.
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         self.writer.add_log(line)
     }
 
-    /// Adds the health of the run.
     pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
         self.writer.add_health(json, now_ns)
     }
 
-    /// Writes a chunk if one is due.
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         self.writer.flush_if_due()
     }
 
     /// Ends the recording, and returns the number of messages missed, by topic.
-    pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
-        let missed = self.writer.finish()?;
-        add(&mut self.missed, missed);
-        Ok(self.missed)
+    pub fn finish(self) -> Result<BTreeMap<String, u64>, RecordingError> {
+        let mut sum = self.missed;
+        add(&mut sum, self.writer.finish()?);
+        Ok(sum)
     }
-}
-
-/// Notes in the ledger, if there is one, that a part is begun.
-fn note(
-    ledger: Option<&Ledger>,
-    to: &Path,
-    head: &Head,
-    positions: &Positions,
-) -> Result<(), RecordingError> {
-    ledger.map_or(Ok(()), |ledger| ledger.note(to, head, positions))
 }
 
 fn add(sum: &mut BTreeMap<String, u64>, missed: BTreeMap<String, u64>) {

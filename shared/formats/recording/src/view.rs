@@ -45,13 +45,9 @@ const RADAR: &str = "radar";
 const PREVIOUS: &str = "previous_scan";
 /// Display height of objects, m: a radar in the plane does not measure it.
 const OBJECT_HEIGHT_M: f64 = 1.6;
-/// Length of the head of an arrow, m.
 const ARROW_HEAD_M: f64 = 1.0;
-/// The channel of log lines.
 pub const LOG: &str = "/log";
-/// The channel of the trajectory.
 pub const TRAJECTORY: &str = "/trajectory";
-/// The channel of points.
 pub const POINTS: &str = "/points";
 
 /// A line of the log of a run.
@@ -61,9 +57,7 @@ pub struct LogLine {
     pub written_ns: i64,
     /// `ERROR`, `WARN`, `INFO` or `DEBUG`.
     pub level: String,
-    /// The process.
     pub stage: String,
-    /// The message with its fields.
     pub message: String,
 }
 
@@ -71,7 +65,6 @@ pub struct LogLine {
 #[derive(Clone, Debug)]
 pub struct View {
     pub channel: &'static str,
-    /// Returns the schema of the message.
     pub schema: fn() -> Option<Schema>,
     /// The message in protobuf.
     pub data: Vec<u8>,
@@ -82,7 +75,6 @@ pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
     pub name: &'static str,
-    /// Returns the schema of its messages.
     pub schema: fn() -> Option<Schema>,
 }
 
@@ -132,7 +124,6 @@ impl View {
         Some(Self::image(image_channel(topic)?, &rows, image, stamp_ns))
     }
 
-    /// Returns the image of a message.
     pub(crate) fn image(channel: &'static str, rows: &Rows, image: Vec<u8>, stamp_ns: i64) -> Self {
         let message = RawImage {
             timestamp: Some(timestamp(stamp_ns)),
@@ -180,7 +171,6 @@ impl View {
         Self::of(TRAJECTORY, &message)
     }
 
-    /// Returns a line of the log.
     pub fn log(line: &LogLine) -> Self {
         let level = match line.level.as_str() {
             "ERROR" => Level::Error,
@@ -202,21 +192,47 @@ impl View {
 
 /// Returns what viewers draw of a message beside its image, its points and the trajectory.
 pub fn views(topic: &str, header: &[u8]) -> Vec<View> {
-    let views = match topic {
-        Rotation::TOPIC => read(header).map(rotation),
-        Motion::TOPIC => read(header).map(|header| motion("/motion", &header)),
-        Refined::TOPIC => read(header).map(|header| motion("/refined", &header)),
-        gyre_messages::Pose::TOPIC => read(header).map(integrated),
-        Loop::TOPIC => read(header).map(closed),
-        Correction::TOPIC => read(header).map(correction),
-        Fix::TOPIC => read(header).map(fix),
-        Objects::TOPIC => read(header).map(objects),
-        _ => None,
-    };
-    views.unwrap_or_default()
+    views_of(topic, header).unwrap_or_default()
 }
 
-/// The last poses.
+fn views_of(topic: &str, header: &[u8]) -> Option<Vec<View>> {
+    Some(match topic {
+        Rotation::TOPIC => {
+            let it: RotationHeader = read(header)?;
+            let place = [0.0, 0.0, it.rotation.angle_rad];
+            vec![in_frame("/rotation", PREVIOUS, &it.item, place)]
+        }
+        Motion::TOPIC => vec![motion("/motion", &read(header)?)],
+        Refined::TOPIC => vec![motion("/refined", &read(header)?)],
+        gyre_messages::Pose::TOPIC => {
+            let it: PoseHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![
+                in_frame("/pose", ODOMETRY, &it.item, place),
+                transform("/tf", [ODOMETRY, RADAR], &it.item, place),
+            ]
+        }
+        Loop::TOPIC => {
+            let it: LoopHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![in_frame("/loop", "earlier_keyframe", &it.item, place)]
+        }
+        Correction::TOPIC => {
+            let it: CorrectionHeader = read(header)?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![transform("/correction", ["map", ODOMETRY], &it.item, place)]
+        }
+        Fix::TOPIC => {
+            let it: FixHeader = read(header)?;
+            it.pose()?;
+            let place = [it.x_m, it.y_m, it.yaw_rad];
+            vec![in_frame("/fix", "earlier_map", &it.item, place)]
+        }
+        Objects::TOPIC => vec![objects(&read(header)?)],
+        _ => return None,
+    })
+}
+
 #[derive(Default)]
 pub(crate) struct Recent {
     places: VecDeque<[f64; 3]>,
@@ -242,62 +258,22 @@ impl Recent {
     }
 }
 
-fn integrated(header: PoseHeader) -> Vec<View> {
-    let (item, place) = (&header.item, [header.x_m, header.y_m, header.yaw_rad]);
-    vec![
-        in_frame("/pose", ODOMETRY, item, place),
-        transform("/tf", ODOMETRY, RADAR, item, place),
-    ]
-}
-
-fn rotation(header: RotationHeader) -> Vec<View> {
-    let place = [0.0, 0.0, header.rotation.angle_rad];
-    vec![in_frame("/rotation", PREVIOUS, &header.item, place)]
-}
-
-fn motion(channel: &'static str, header: &MotionHeader) -> Vec<View> {
+fn motion(channel: &'static str, header: &MotionHeader) -> View {
     let motion = &header.motion;
     let place = [motion.x_m, motion.y_m, motion.yaw_rad];
-    vec![in_frame(channel, PREVIOUS, &header.item, place)]
-}
-
-fn closed(header: LoopHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    vec![in_frame("/loop", "earlier_keyframe", &header.item, place)]
-}
-
-fn correction(header: CorrectionHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    vec![transform(
-        "/correction",
-        "map",
-        ODOMETRY,
-        &header.item,
-        place,
-    )]
-}
-
-fn fix(header: FixHeader) -> Vec<View> {
-    let place = [header.x_m, header.y_m, header.yaw_rad];
-    let found = header
-        .pose()
-        .map(|_| in_frame("/fix", "earlier_map", &header.item, place));
-    found.into_iter().collect()
+    in_frame(channel, PREVIOUS, &header.item, place)
 }
 
 /// Returns the objects as one entity, which replaces the entity of the scan before.
-fn objects(header: ObjectsHeader) -> Vec<View> {
+fn objects(header: &ObjectsHeader) -> View {
     let listed = header.list();
+    let moving = listed.iter().filter(|it| it.is_moving());
     let entity = SceneEntity {
         timestamp: Some(timestamp(header.item.stamp_ns)),
         frame_id: ODOMETRY.to_owned(),
         id: Objects::TOPIC.to_owned(),
         cubes: listed.iter().map(cube).collect(),
-        arrows: listed
-            .iter()
-            .filter(|it| it.is_moving())
-            .map(arrow)
-            .collect(),
+        arrows: moving.map(arrow).collect(),
         texts: listed.iter().map(name).collect(),
         ..SceneEntity::default()
     };
@@ -305,15 +281,12 @@ fn objects(header: ObjectsHeader) -> Vec<View> {
         deletions: Vec::new(),
         entities: vec![entity],
     };
-    vec![View::of("/objects", &message)]
+    View::of("/objects", &message)
 }
 
 fn cube(object: &ListedObject) -> CubePrimitive {
     CubePrimitive {
-        pose: Some(lifted(
-            [object.x_m, object.y_m, object.yaw_rad],
-            0.5 * OBJECT_HEIGHT_M,
-        )),
+        pose: lifted(object, object.yaw_rad, 0.5 * OBJECT_HEIGHT_M),
         size: Some(Vector3 {
             x: object.length_m,
             y: object.width_m,
@@ -323,14 +296,10 @@ fn cube(object: &ListedObject) -> CubePrimitive {
     }
 }
 
-/// The way of an object in a second.
 fn arrow(object: &ListedObject) -> ArrowPrimitive {
     let (way_m, heading_rad) = (object.speed_mps(), object.vy_mps.atan2(object.vx_mps));
     ArrowPrimitive {
-        pose: Some(lifted(
-            [object.x_m, object.y_m, heading_rad],
-            OBJECT_HEIGHT_M,
-        )),
+        pose: lifted(object, heading_rad, OBJECT_HEIGHT_M),
         shaft_length: (way_m - ARROW_HEAD_M).max(0.0),
         shaft_diameter: 0.3,
         head_length: ARROW_HEAD_M.min(way_m),
@@ -341,7 +310,7 @@ fn arrow(object: &ListedObject) -> ArrowPrimitive {
 
 fn name(object: &ListedObject) -> TextPrimitive {
     TextPrimitive {
-        pose: Some(lifted([object.x_m, object.y_m, 0.0], OBJECT_HEIGHT_M + 1.0)),
+        pose: lifted(object, 0.0, OBJECT_HEIGHT_M + 1.0),
         billboard: true,
         font_size: 1.2,
         scale_invariant: false,
@@ -359,13 +328,11 @@ fn object_colour(object: &ListedObject, a: f64) -> Color {
     Color { r, g, b, a }
 }
 
-/// A place at a height, m.
-fn lifted(place: [f64; 3], height_m: f64) -> Pose {
-    let pose = pose(place);
-    Pose {
-        position: pose.position.map(|at| Vector3 { z: height_m, ..at }),
-        ..pose
-    }
+/// The place of an object at a height, m.
+fn lifted(object: &ListedObject, yaw_rad: f64, height_m: f64) -> Option<Pose> {
+    let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
+    pose.position.as_mut()?.z = height_m;
+    Some(pose)
 }
 
 fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) -> View {
@@ -377,23 +344,16 @@ fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) ->
     View::of(channel, &message)
 }
 
-fn transform(
-    channel: &'static str,
-    parent: &str,
-    child: &str,
-    item: &Item,
-    place: [f64; 3],
-) -> View {
-    let Pose {
-        position,
-        orientation,
-    } = pose(place);
+/// The pose of the second frame in the first.
+fn transform(channel: &'static str, frames: [&str; 2], item: &Item, place: [f64; 3]) -> View {
+    let [parent_frame_id, child_frame_id] = frames.map(str::to_owned);
+    let pose = pose(place);
     let message = FrameTransform {
         timestamp: Some(timestamp(item.stamp_ns)),
-        parent_frame_id: parent.to_owned(),
-        child_frame_id: child.to_owned(),
-        translation: position,
-        rotation: orientation,
+        parent_frame_id,
+        child_frame_id,
+        translation: pose.position,
+        rotation: pose.orientation,
     };
     View::of(channel, &message)
 }
@@ -418,7 +378,6 @@ fn timestamp(ns: i64) -> Timestamp {
     Timestamp::new(seconds, (ns % 1_000_000_000) as u32)
 }
 
-/// The channel of a topic's image.
 pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
     match topic {
         Scan::TOPIC => Some("/scan"),

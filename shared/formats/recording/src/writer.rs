@@ -6,11 +6,12 @@ use std::{
     mem,
     os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use bytemuck::pod_read_unaligned;
-use foxglove::Schema;
+use foxglove::{Encode, Schema, messages::RawImage};
 use gyre_messages::{GivenAnew, Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
@@ -32,6 +33,7 @@ const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
 
+const PROTOBUF: &str = "protobuf";
 /// The channel of the run's health, and its schema: any JSON object.
 const HEALTH: &str = "/health";
 const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
@@ -40,7 +42,6 @@ const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 #[derive(Clone, Debug)]
 pub struct Incoming {
     pub topic: &'static str,
-    /// The bytes of the header.
     pub header: Vec<u8>,
     /// The bytes of the payload that the header describes.
     pub payload: Vec<u8>,
@@ -52,16 +53,14 @@ pub struct Incoming {
     pub skipped: Option<GivenAnew>,
 }
 
-/// Writes one file of a recording.
 pub struct RecordingWriter {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     /// `None` after a failure.
     mcap: Option<Writer<File>>,
     disk: Disk,
     channels: BTreeMap<String, u16>,
     recent: Recent,
     table: Table,
-    /// The skipped generations since the last table.
     skipped: Vec<(&'static str, GivenAnew)>,
     /// Bytes of the messages since the last table, and when the first of them came.
     pending: (usize, Option<Instant>),
@@ -74,29 +73,21 @@ pub struct RecordingWriter {
     early: EarlyLines,
 }
 
-/// The times of a message: the sensor's, and when it was received.
-#[derive(Clone, Copy)]
-struct Times {
-    log_ns: u64,
-    publish_ns: u64,
-    sequence: u32,
-}
-
-impl Times {
-    fn new(stamp_ns: i64, received_ns: i64, sequence: u32) -> Self {
-        let positive = |ns: i64| u64::try_from(ns).unwrap_or_default();
-        Self {
-            log_ns: positive(stamp_ns),
-            publish_ns: positive(received_ns),
-            sequence,
-        }
+/// Returns the header of a message: the sensor's time, and when it was received.
+fn header(stamp_ns: i64, received_ns: i64, sequence: u32) -> MessageHeader {
+    let positive = |ns: i64| u64::try_from(ns).unwrap_or_default();
+    MessageHeader {
+        channel_id: 0,
+        sequence,
+        log_time: positive(stamp_ns),
+        publish_time: positive(received_ns),
     }
 }
 
 impl RecordingWriter {
     /// Begins a file, which must not exist.
     pub fn create(path: &Path, head: &Head) -> Result<Self, RecordingError> {
-        Self::create_with(path, head, Disk::synchronises())
+        Self::create_with(path, head, Arc::new(File::sync_data))
     }
 
     pub(crate) fn create_with(
@@ -104,17 +95,11 @@ impl RecordingWriter {
         head: &Head,
         synchronise: Synchronise,
     ) -> Result<Self, RecordingError> {
-        let failed = |source| RecordingError::Io {
-            path: path.to_owned(),
-            source,
-        };
-        let new = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(path);
-        let file = new.map_err(failed)?;
-        let own = file.try_clone().map_err(failed)?;
+        let failed = |error| RecordingError::io(path, error);
+        let mut new = OpenOptions::new();
+        new.write(true).create_new(true).mode(0o600);
+        let file = new.open(path).map_err(failed)?;
+        let disk = Disk::of(file.try_clone().map_err(failed)?, synchronise);
         let options = WriteOptions::new()
             .compression(Some(Compression::Zstd))
             .compression_level(LEVEL)
@@ -125,11 +110,10 @@ impl RecordingWriter {
             .chunk_size(None)
             .disable_seeking(true);
         let unwritable = |source| RecordingError::of(path, source);
-        let mcap = options.create(file).map_err(unwritable)?;
         let mut writer = Self {
             path: path.to_owned(),
-            mcap: Some(mcap),
-            disk: Disk::of(own, synchronise),
+            mcap: Some(options.create(file).map_err(unwritable)?),
+            disk,
             channels: BTreeMap::new(),
             recent: Recent::default(),
             table: Table::default(),
@@ -151,70 +135,60 @@ impl RecordingWriter {
     fn begin(&mut self, head: &Head) -> Result<(), McapError> {
         self.mcap()?.write_metadata(&head.to_metadata())?;
         for topic in head.topics.iter().filter_map(|name| topic(name)) {
-            let schema =
-                self.mcap()?
-                    .add_schema(topic.header.name, ENCODING, topic.name.as_bytes())?;
-            let name = exact_channel(topic.name);
-            let channel = self
-                .mcap()?
-                .add_channel(schema, &name, ENCODING, &BTreeMap::new())?;
-            self.channels.insert(name, channel);
+            let schema = || {
+                Some(Schema::new(
+                    topic.header.name,
+                    ENCODING,
+                    topic.name.as_bytes(),
+                ))
+            };
+            self.channel(&exact_channel(topic.name), ENCODING, schema)?;
             if let Some(name) = image_channel(topic.name) {
-                self.channel(
-                    name,
-                    <foxglove::messages::RawImage as foxglove::Encode>::get_schema,
-                )?;
+                self.channel(name, PROTOBUF, RawImage::get_schema)?;
             }
         }
-        self.flush_all()
+        self.write_chunk()
     }
 
     /// Adds a message, and writes a chunk if one is due.
     ///
     /// After an error the file is cut back to its last complete chunk.
     pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
-        let added = self.try_add(message);
-        self.checked(added)?;
+        self.checked(|writer| writer.write_message(message))?;
         self.flush_if_due()
     }
 
-    fn try_add(&mut self, message: &Incoming) -> Result<(), McapError> {
+    fn write_message(&mut self, message: &Incoming) -> Result<(), McapError> {
         let topic = message.topic;
         let Some(item) = message.header.get(..size_of::<Item>()) else {
             return Ok(());
         };
         let item: Item = pod_read_unaligned(item);
-        let times = Times::new(item.stamp_ns, message.received_ns, item.seq as u32);
+        let header = header(item.stamp_ns, message.received_ns, item.seq as u32);
         let rows = Rows::of(topic, &message.header);
         let parts = rows.and_then(|rows| Some((rows, rows.split(&message.payload)?)));
         let mut exact = message.header.clone();
         match (parts, image_channel(topic)) {
             (Some((rows, (image, rest))), Some(channel)) => {
-                self.view(&View::image(channel, &rows, image, item.stamp_ns), times)?;
+                self.view(&View::image(channel, &rows, image, item.stamp_ns), header)?;
                 exact.extend_from_slice(&rest);
             }
             _ => exact.extend_from_slice(&message.payload),
         }
         if let Some(channel) = self.channels.get(&exact_channel(topic)).copied() {
-            self.write(channel, &exact, times)?;
+            self.write(channel, &exact, header)?;
         }
         let trajectory = self.recent.add(topic, &message.header);
         for view in views(topic, &message.header).iter().chain(&trajectory) {
-            self.view(view, times)?;
+            self.view(view, header)?;
         }
-        self.table
-            .entries
-            .entry(topic.to_owned())
-            .or_default()
-            .push(Entry::of(&item));
+        let entries = self.table.entries.entry(topic.to_owned()).or_default();
+        entries.push(Entry::of(&item));
         self.missed(topic, message.missed);
         self.skipped.extend(message.skipped.map(|it| (topic, it)));
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
         self.first_ns = self.first_ns.or(self.newest_ns);
-        for line in mem::take(&mut self.early).into_lines() {
-            self.try_add_log(&line)?;
-        }
-        Ok(())
+        self.write_early()
     }
 
     /// Counts messages that were missed, without one after them.
@@ -230,13 +204,17 @@ impl RecordingWriter {
             self.early.push(line);
             return Ok(());
         }
-        let added = self.try_add_log(&line);
-        self.checked(added)
+        self.checked(|writer| writer.write_log(&line))
     }
 
-    fn try_add_log(&mut self, line: &LogLine) -> Result<(), McapError> {
+    fn write_log(&mut self, line: &LogLine) -> Result<(), McapError> {
         let stamp_ns = self.newest_ns.unwrap_or(line.written_ns);
-        self.view(&View::log(line), Times::new(stamp_ns, line.written_ns, 0))
+        self.view(&View::log(line), header(stamp_ns, line.written_ns, 0))
+    }
+
+    fn write_early(&mut self) -> Result<(), McapError> {
+        let mut lines = mem::take(&mut self.early).into_lines();
+        lines.try_for_each(|line| self.write_log(&line))
     }
 
     /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is
@@ -245,34 +223,15 @@ impl RecordingWriter {
         let Some(stamp_ns) = self.newest_ns else {
             return Ok(());
         };
-        let added = self.try_add_health(json, Times::new(stamp_ns, now_ns, 0));
-        self.checked(added)
+        let schema = || Some(Schema::new("gyre.Health", "jsonschema", HEALTH_SCHEMA));
+        self.checked(|writer| {
+            let channel = writer.channel(HEALTH, "json", schema)?;
+            writer.write(channel, json.as_bytes(), header(stamp_ns, now_ns, 0))
+        })
     }
 
-    fn try_add_health(&mut self, json: &str, times: Times) -> Result<(), McapError> {
-        let channel = match self.channels.get(HEALTH) {
-            Some(channel) => *channel,
-            None => {
-                let schema = self
-                    .mcap()?
-                    .add_schema("gyre.Health", "jsonschema", HEALTH_SCHEMA)?;
-                let channel = self
-                    .mcap()?
-                    .add_channel(schema, HEALTH, "json", &BTreeMap::new())?;
-                self.channels.insert(HEALTH.to_owned(), channel);
-                channel
-            }
-        };
-        self.write(channel, json.as_bytes(), times)
-    }
-
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Returns the bytes in the file.
     pub(crate) fn bytes(&self) -> u64 {
-        self.disk.complete_bytes()
+        self.disk.complete_bytes
     }
 
     /// Returns the time from the newest scan when the file was begun to the newest one now, on the
@@ -282,37 +241,33 @@ impl RecordingWriter {
         newest_ns.map_or(0, |(newest, first)| newest.saturating_sub(first))
     }
 
-    fn view(&mut self, view: &View, times: Times) -> Result<(), McapError> {
-        let channel = self.channel(view.channel, view.schema)?;
-        self.write(channel, &view.data, times)
+    fn view(&mut self, view: &View, header: MessageHeader) -> Result<(), McapError> {
+        let channel = self.channel(view.channel, PROTOBUF, view.schema)?;
+        self.write(channel, &view.data, header)
     }
 
-    /// Returns the channel of this name for viewers.
-    fn channel(&mut self, name: &str, schema: fn() -> Option<Schema>) -> Result<u16, McapError> {
+    /// Returns the channel of this name, which is added if it is not there.
+    fn channel(
+        &mut self,
+        name: &str,
+        encoding: &str,
+        schema: impl FnOnce() -> Option<Schema>,
+    ) -> Result<u16, McapError> {
         if let Some(channel) = self.channels.get(name) {
             return Ok(*channel);
         }
+        let mcap = self.mcap()?;
         let schema = match schema() {
-            Some(schema) => {
-                self.mcap()?
-                    .add_schema(&schema.name, &schema.encoding, &schema.data)?
-            }
+            Some(schema) => mcap.add_schema(&schema.name, &schema.encoding, &schema.data)?,
             None => 0,
         };
-        let channel = self
-            .mcap()?
-            .add_channel(schema, name, "protobuf", &BTreeMap::new())?;
+        let channel = mcap.add_channel(schema, name, encoding, &BTreeMap::new())?;
         self.channels.insert(name.to_owned(), channel);
         Ok(channel)
     }
 
-    fn write(&mut self, channel_id: u16, data: &[u8], times: Times) -> Result<(), McapError> {
-        let header = MessageHeader {
-            channel_id,
-            sequence: times.sequence,
-            log_time: times.log_ns,
-            publish_time: times.publish_ns,
-        };
+    fn write(&mut self, channel_id: u16, data: &[u8], of: MessageHeader) -> Result<(), McapError> {
+        let header = MessageHeader { channel_id, ..of };
         self.mcap()?.write_to_known_channel(&header, data)?;
         let (bytes, since) = self.pending;
         self.pending = (bytes + data.len(), since.or_else(|| Some(Instant::now())));
@@ -328,17 +283,15 @@ impl RecordingWriter {
         if is_due {
             self.flush()?;
         }
-        let synchronised = self.disk.synchronise_if_due();
-        self.checked(synchronised.map_err(McapError::Io))
+        self.checked(|writer| Ok(writer.disk.synchronise_if_due()?))
     }
 
     /// Writes the messages so far as a chunk, and its table.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        let flushed = self.flush_all();
-        self.checked(flushed)
+        self.checked(Self::write_chunk)
     }
 
-    fn flush_all(&mut self) -> Result<(), McapError> {
+    fn write_chunk(&mut self) -> Result<(), McapError> {
         self.mcap()?.flush()?;
         for (topic, skipped) in mem::take(&mut self.skipped) {
             let record = generations::to_metadata(topic, skipped);
@@ -355,10 +308,7 @@ impl RecordingWriter {
     /// Writes the remaining messages and the summary, and returns the number of messages missed, by
     /// topic.
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
-        for line in mem::take(&mut self.early).into_lines() {
-            let added = self.try_add_log(&line);
-            self.checked(added)?;
-        }
+        self.checked(Self::write_early)?;
         self.end()?;
         Ok(self.table.missed)
     }
@@ -370,19 +320,19 @@ impl RecordingWriter {
         path: &Path,
         head: &Head,
     ) -> Result<BTreeMap<String, u64>, RecordingError> {
-        let next = Self::create_with(path, head, self.disk.synchronise_of_next())?;
+        let next = Self::create_with(path, head, self.disk.synchronise.clone())?;
         let before = mem::replace(self, next);
         // The state of viewers continues.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
         Ok(before.table.missed)
     }
 
-    /// Writes the remaining messages and the summary.
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
-        let finished = self.mcap().and_then(Writer::finish).map(drop);
-        let synchronised = finished.and_then(|()| Ok(self.disk.synchronise()?));
-        self.checked(synchronised)
+        self.checked(|writer| {
+            writer.mcap()?.finish()?;
+            Ok(writer.disk.synchronise()?)
+        })
     }
 
     fn mcap(&mut self) -> Result<&mut Writer<File>, McapError> {
@@ -391,9 +341,12 @@ impl RecordingWriter {
             .ok_or(McapError::AttemptedWriteAfterFailure)
     }
 
-    /// Cuts the file back to its last complete chunk after a failure.
-    fn checked(&mut self, result: Result<(), McapError>) -> Result<(), RecordingError> {
-        result.map_err(|source| {
+    /// Writes, and after a failure cuts the file back to its last complete chunk.
+    fn checked(
+        &mut self,
+        write: impl FnOnce(&mut Self) -> Result<(), McapError>,
+    ) -> Result<(), RecordingError> {
+        write(self).map_err(|source| {
             // Dropped as it is, it would write a summary.
             drop(self.mcap.take().map(Writer::into_inner));
             let _ = self.disk.cut_back();

@@ -1,6 +1,5 @@
 //! Definitions of messages: names and fields, as ROS 2 writes them.
 
-/// The definition of a message type.
 #[derive(Debug)]
 pub struct Definition {
     /// The package, such as `nav_msgs`.
@@ -9,8 +8,8 @@ pub struct Definition {
     pub name: &'static str,
     /// The fields, one a line, as in its `.msg` file.
     pub fields: &'static str,
-    /// The types of its fields that are messages themselves.
-    pub parts: &'static [&'static Definition],
+    /// The message that each field consists of; `None` for a number or a text.
+    pub parts: &'static [Option<&'static Definition>],
 }
 
 /// Separates the definitions of a schema of the encoding `ros2msg`.
@@ -41,10 +40,9 @@ impl Definition {
         text
     }
 
-    /// Adds all types in this one, each once.
     fn collect(&self, parts: &mut Vec<&'static Definition>) {
-        for part in self.parts {
-            if !parts.iter().any(|known| std::ptr::eq(*known, *part)) {
+        for part in self.parts.iter().copied().flatten() {
+            if !parts.iter().any(|known| std::ptr::eq(*known, part)) {
                 parts.push(part);
                 part.collect(parts);
             }
@@ -52,22 +50,54 @@ impl Definition {
     }
 }
 
-/// A message of ROS 2.
 pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
     const DEFINITION: &'static Definition;
 }
 
-/// Defines the [`Definition`] of a message type.
-macro_rules! message {
-    ($type:ident, $package:literal, $fields:literal, [$($part:path),*]) => {
-        impl crate::Ros2Message for $type {
-            const DEFINITION: &'static crate::Definition = &crate::Definition {
-                package: $package,
-                name: stringify!($type),
-                fields: $fields,
-                parts: &[$(<$part as crate::Ros2Message>::DEFINITION),*],
-            };
-        }
+/// The type of a field.
+pub(crate) trait Field {
+    /// The message that it consists of.
+    const PART: Option<&'static Definition> = None;
+}
+
+macro_rules! plain {
+    ($($type:ty),*) => {
+        $(impl Field for $type {})*
     };
 }
-pub(crate) use message;
+plain!(bool, u8, i8, u16, i32, u32, u64, f32, f64, [f64; 9], String);
+
+impl<T: Field> Field for Vec<T> {
+    const PART: Option<&'static Definition> = T::PART;
+}
+
+/// Defines the messages of a package: their fields, each with its line in the `.msg` file.
+macro_rules! package {
+    ($package:ident: $(
+        $(#[$of_type:meta])*
+        struct $type:ident {
+            $($(#[$of_field:meta])* $field:ident: $kind:ty = $line:literal,)*
+        }
+    )*) => {$(
+        $(#[$of_type])*
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        pub struct $type {
+            $($(#[$of_field])* pub $field: $kind,)*
+        }
+
+        impl $crate::Ros2Message for $type {
+            const DEFINITION: &'static $crate::Definition = &$crate::Definition {
+                package: stringify!($package),
+                name: stringify!($type),
+                fields: concat!($($line, "\n"),*),
+                parts: &[$(<$kind as $crate::definition::Field>::PART),*],
+            };
+        }
+
+        impl $crate::definition::Field for $type {
+            const PART: Option<&'static $crate::Definition> =
+                Some(<$type as $crate::Ros2Message>::DEFINITION);
+        }
+    )*};
+}
+pub(crate) use package;

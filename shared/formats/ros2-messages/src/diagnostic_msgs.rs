@@ -1,21 +1,6 @@
 //! `diagnostic_msgs`: the health of parts.
 
-use serde::{Deserialize, Serialize};
-
-use crate::{definition::message, std_msgs::Header};
-
-/// A value of a status.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct KeyValue {
-    pub key: String,
-    pub value: String,
-}
-message!(
-    KeyValue,
-    "diagnostic_msgs",
-    "string key\nstring value\n",
-    []
-);
+use crate::{definition::package, std_msgs::Header};
 
 pub const OK: u8 = 0;
 pub const WARN: u8 = 1;
@@ -23,34 +8,25 @@ pub const ERROR: u8 = 2;
 /// Nothing has been heard for some time.
 pub const STALE: u8 = 3;
 
-/// The status of a part.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DiagnosticStatus {
-    /// [`OK`], [`WARN`], [`ERROR`] or [`STALE`].
-    pub level: u8,
-    pub name: String,
-    pub message: String,
-    /// The hardware of the part.
-    pub hardware_id: String,
-    pub values: Vec<KeyValue>,
-}
-message!(
-    DiagnosticStatus,
-    "diagnostic_msgs",
-    "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\nstring message\n\
-     string hardware_id\nKeyValue[] values\n",
-    [KeyValue]
-);
+package! { diagnostic_msgs:
+    struct KeyValue {
+        key: String = "string key",
+        value: String = "string value",
+    }
 
-/// The status of several parts: the topic `/diagnostics`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DiagnosticArray {
-    pub header: Header,
-    pub status: Vec<DiagnosticStatus>,
+    /// The status of a part.
+    struct DiagnosticStatus {
+        /// [`OK`], [`WARN`], [`ERROR`] or [`STALE`].
+        level: u8 = "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level",
+        name: String = "string name",
+        message: String = "string message",
+        hardware_id: String = "string hardware_id",
+        values: Vec<KeyValue> = "KeyValue[] values",
+    }
+
+    /// The topic `/diagnostics`.
+    struct DiagnosticArray {
+        header: Header = "std_msgs/Header header",
+        status: Vec<DiagnosticStatus> = "DiagnosticStatus[] status",
+    }
 }
-message!(
-    DiagnosticArray,
-    "diagnostic_msgs",
-    "std_msgs/Header header\nDiagnosticStatus[] status\n",
-    [Header, DiagnosticStatus]
-);

@@ -22,18 +22,10 @@ pub struct Domain {
     interface: Option<Ipv4Addr>,
 }
 
-/// A domain that cannot be joined.
+/// A domain that cannot be joined: a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum DomainError {
-    #[error("ROS_DOMAIN_ID is `{0}`, but must be a number from 0 to {MAX_DOMAIN}")]
-    Variable(String),
-    #[error("domain {0} does not exist: domains of ROS 2 are numbers from 0 to {MAX_DOMAIN}")]
-    TooHigh(u16),
-    #[error(
-        "interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
-    )]
-    Interface(String),
-}
+#[error("{0}")]
+pub struct DomainError(String);
 
 impl Domain {
     /// Returns the domain of this number, or of the variable `ROS_DOMAIN_ID`, or 0; on the network
@@ -50,24 +42,31 @@ impl Domain {
         interface: Option<&str>,
         variable: &dyn Fn(&str) -> Option<String>,
     ) -> Result<Self, DomainError> {
+        let range = format!("from 0 to {MAX_DOMAIN}");
         let id = match (id, variable(DOMAIN)) {
             (Some(id), _) => id,
             (None, None) => 0,
-            (None, Some(text)) => text.parse().map_err(|_| DomainError::Variable(text))?,
+            (None, Some(text)) => text.parse().map_err(|_| {
+                DomainError(format!(
+                    "{DOMAIN} is `{text}`, but must be a number {range}"
+                ))
+            })?,
         };
         if id > MAX_DOMAIN {
-            return Err(DomainError::TooHigh(id));
+            let reason = format!("domains of ROS 2 are numbers {range}");
+            return Err(DomainError(format!("domain {id} does not exist: {reason}")));
         }
         let stays = |(name, value): &(&str, &str)| variable(name).as_deref() == Some(*value);
         let interface = match interface {
-            Some(text) => Some(
-                text.parse()
-                    .map_err(|_| DomainError::Interface(text.to_owned()))?,
-            ),
-            None => ON_THIS_COMPUTER
-                .iter()
-                .any(stays)
-                .then_some(Ipv4Addr::LOCALHOST),
+            Some(text) => Some(text.parse().map_err(|_| {
+                DomainError(format!(
+                    "interface `{text}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
+                ))
+            })?),
+            None => {
+                let is_restricted = ON_THIS_COMPUTER.iter().any(stays);
+                is_restricted.then_some(Ipv4Addr::LOCALHOST)
+            }
         };
         Ok(Self { id, interface })
     }
@@ -81,7 +80,6 @@ impl Domain {
         self.interface.is_none_or(|address| !address.is_loopback())
     }
 
-    /// Returns the address of this machine on the only network that is used; `None`: all networks.
     pub fn interface(&self) -> Option<Ipv4Addr> {
         self.interface
     }
@@ -89,18 +87,19 @@ impl Domain {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn domain(
         id: Option<u16>,
         interface: Option<&str>,
         set: &[(&str, &str)],
-    ) -> Result<Domain, DomainError> {
+    ) -> Result<Domain, String> {
         let variable = |name: &str| {
             let found = set.iter().find(|(variable, _)| *variable == name);
             found.map(|(_, value)| (*value).to_owned())
         };
-        Domain::of(id, interface, &variable)
+        Domain::of(id, interface, &variable).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -109,9 +108,12 @@ mod tests {
         assert_eq!(of(None, &[]), Ok(0));
         assert_eq!(of(None, &[(DOMAIN, "42")]), Ok(42));
         assert_eq!(of(Some(7), &[(DOMAIN, "42")]), Ok(7));
-        assert_eq!(of(Some(233), &[]), Err(DomainError::TooHigh(233)));
-        let bad = Err(DomainError::Variable("robots".to_owned()));
-        assert_eq!(of(None, &[(DOMAIN, "robots")]), bad);
+        for (refused, expected) in [
+            (of(Some(233), &[]), "domain 233 does not exist"),
+            (of(None, &[(DOMAIN, "robots")]), "ROS_DOMAIN_ID is `robots`"),
+        ] {
+            assert!(refused.unwrap_err().starts_with(expected));
+        }
     }
 
     #[test]
@@ -122,12 +124,9 @@ mod tests {
         for (name, value) in ON_THIS_COMPUTER {
             assert_eq!(is_open(None, &[(name, value)]), Ok(false));
         }
-        assert_eq!(
-            is_open(Some("192.168.0.2"), &[("ROS_LOCALHOST_ONLY", "1")]),
-            Ok(true)
-        );
+        let restricted = [("ROS_LOCALHOST_ONLY", "1")];
+        assert_eq!(is_open(Some("192.168.0.2"), &restricted), Ok(true));
         assert_eq!(is_open(Some("127.0.0.1"), &[]), Ok(false));
-        let bad = Err(DomainError::Interface("lo".to_owned()));
-        assert_eq!(is_open(Some("lo"), &[]), bad);
+        assert!(is_open(Some("lo"), &[]).unwrap_err().contains("`lo`"));
     }
 }

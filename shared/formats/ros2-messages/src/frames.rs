@@ -30,9 +30,7 @@ pub struct Frames {
     pub map: String,
     /// The frame of continuous odometry.
     pub odom: String,
-    /// The vehicle's frame.
     pub base: String,
-    /// The radar's frame.
     pub radar: String,
 }
 
@@ -44,15 +42,7 @@ impl FromStr for Frames {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         let is_name = |name: &String| !name.is_empty() && !name.starts_with('/');
         match <[String; 4]>::try_from(names) {
-            Ok(names) if names.iter().all(is_name) => {
-                let [map, odom, base, radar] = names;
-                Ok(Self {
-                    map,
-                    odom,
-                    base,
-                    radar,
-                })
-            }
+            Ok(names) if names.iter().all(is_name) => Ok(Self::of(names)),
             _ => Err(
                 "four names without `/` before them are needed, as in map,odom,base_link,radar"
                     .to_owned(),
@@ -61,15 +51,20 @@ impl FromStr for Frames {
     }
 }
 
-impl Default for Frames {
-    /// Returns the names of REP-105.
-    fn default() -> Self {
+impl Frames {
+    fn of([map, odom, base, radar]: [String; 4]) -> Self {
         Self {
-            map: "map".to_owned(),
-            odom: "odom".to_owned(),
-            base: "base_link".to_owned(),
-            radar: "radar".to_owned(),
+            map,
+            odom,
+            base,
+            radar,
         }
+    }
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self::of(["map", "odom", "base_link", "radar"].map(str::to_owned))
     }
 }
 
@@ -79,7 +74,6 @@ pub struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
     pub motion: UncertainMotion,
-    /// The duration, ns.
     pub duration_ns: i64,
     /// True if it was measured, not predicted from earlier motions.
     pub is_measured: bool,
@@ -236,9 +230,9 @@ mod tests {
         assert_eq!("map, odom,car/base,radar_top".parse(), Ok(frames));
         for text in [
             "",
-            "map,odom,base_link",
+            "map,odom,base",
             "map,odom,,radar",
-            "/map,odom,base_link,radar",
+            "/map,odom,base,radar",
         ] {
             assert!(text.parse::<Frames>().is_err(), "{text}");
         }
@@ -289,6 +283,9 @@ mod tests {
         assert_eq!(predicted.twist.twist, odometry.twist.twist);
         assert_eq!(predicted.twist.covariance, covariance(None));
         assert_ne!(odometry.twist.covariance, covariance(None));
+        let first = self::odometry(0, &Frames::default(), &UncertainMotion::identity(), None);
+        assert_eq!(first.twist.twist, geometry_msgs::Twist::default());
+        assert_eq!(first.twist.covariance, covariance(None));
     }
 
     #[test]
@@ -321,25 +318,5 @@ mod tests {
                 "{yaw_rad}: {found} {expected}"
             );
         }
-    }
-
-    #[test]
-    fn the_first_pose_has_no_velocity() {
-        let odometry = odometry(0, &Frames::default(), &UncertainMotion::identity(), None);
-        assert_eq!(odometry.twist.twist, geometry_msgs::Twist::default());
-        assert_eq!(odometry.twist.covariance, covariance(None));
-        assert_eq!(odometry.pose.covariance.at(0, 0), 0.0);
-    }
-
-    #[test]
-    fn a_grid_lies_along_the_axes_of_its_frame() {
-        let corner_m = Vector2::new(-128.0, 0.0);
-        let grid = occupancy_grid(5_000_000_000, "map", 0.5, [2, 1], corner_m, vec![100, 255]);
-        assert_eq!((grid.info.width, grid.info.height), (2, 1));
-        assert_eq!(grid.info.resolution, 0.5);
-        let origin = grid.info.origin;
-        assert_eq!((origin.position.x, origin.position.y), (-128.0, 0.0));
-        assert_eq!((origin.orientation.z, origin.orientation.w), (0.0, 1.0));
-        assert_eq!((grid.header.stamp.sec, &*grid.header.frame_id), (5, "map"));
     }
 }

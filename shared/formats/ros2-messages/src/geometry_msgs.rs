@@ -4,7 +4,11 @@
 use gyre_samples::Sample;
 use serde::{Deserialize, Serialize};
 
-use crate::{definition::message, std_msgs::Header};
+use crate::{
+    Definition, Ros2Message,
+    definition::{Field, package},
+    std_msgs::Header,
+};
 
 /// A covariance of six values in the order of ROS, x, y, z, roll, pitch, yaw, by rows.
 ///
@@ -15,20 +19,10 @@ pub struct Covariance([[f64; 18]; 2]);
 /// Number of values of a pose or a twist.
 pub const VALUES: usize = 6;
 
-impl Covariance {
-    /// Returns the element of a row and a column, both below [`VALUES`].
-    ///
-    /// # Panics
-    /// For a row or a column past the end.
-    pub fn at(&self, row: usize, column: usize) -> f64 {
-        assert!(row < VALUES && column < VALUES, "{row}, {column}");
-        self.0.as_flattened()[row * VALUES + column]
-    }
+impl Field for Covariance {}
 
+impl Covariance {
     /// Sets the element of a row and a column, both below [`VALUES`].
-    ///
-    /// # Panics
-    /// For a row or a column past the end.
     pub fn set(&mut self, row: usize, column: usize, value: f64) {
         assert!(row < VALUES && column < VALUES, "{row}, {column}");
         self.0.as_flattened_mut()[row * VALUES + column] = value;
@@ -40,56 +34,14 @@ impl Covariance {
     }
 }
 
-/// A position, m.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Point {
-    /// Forward, m.
-    pub x: f64,
-    /// To the left, m.
-    pub y: f64,
-    /// Up, m.
-    pub z: f64,
-}
-message!(
-    Point,
-    "geometry_msgs",
-    "float64 x\nfloat64 y\nfloat64 z\n",
-    []
-);
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Vector3 {
-    /// Forward.
-    pub x: f64,
-    /// To the left.
-    pub y: f64,
-    /// Up.
-    pub z: f64,
-}
-message!(
-    Vector3,
-    "geometry_msgs",
-    "float64 x\nfloat64 y\nfloat64 z\n",
-    []
-);
-
+/// A rotation: the vector and the scalar.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quaternion {
-    /// The vector's x.
     pub x: f64,
-    /// The vector's y.
     pub y: f64,
-    /// The vector's z.
     pub z: f64,
-    /// The scalar.
     pub w: f64,
 }
-message!(
-    Quaternion,
-    "geometry_msgs",
-    "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
-    []
-);
 
 impl Default for Quaternion {
     fn default() -> Self {
@@ -102,59 +54,88 @@ impl Default for Quaternion {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// The position, m.
-    pub position: Point,
-    pub orientation: Quaternion,
+impl Ros2Message for Quaternion {
+    const DEFINITION: &'static Definition = &Definition {
+        package: "geometry_msgs",
+        name: "Quaternion",
+        fields: "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+        parts: &[],
+    };
 }
-message!(
-    Pose,
-    "geometry_msgs",
-    "Point position\nQuaternion orientation\n",
-    [Point, Quaternion]
-);
 
-/// A pose with covariance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PoseWithCovariance {
-    pub pose: Pose,
-    /// The covariance, along the axes of the frame of the pose.
-    pub covariance: Covariance,
+impl Field for Quaternion {
+    const PART: Option<&'static Definition> = Some(Self::DEFINITION);
 }
-message!(
-    PoseWithCovariance,
-    "geometry_msgs",
-    "Pose pose\nfloat64[36] covariance\n",
-    [Pose]
-);
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Twist {
-    /// Linear, m/s.
-    pub linear: Vector3,
-    /// Angular, rad/s.
-    pub angular: Vector3,
-}
-message!(
-    Twist,
-    "geometry_msgs",
-    "Vector3 linear\nVector3 angular\n",
-    [Vector3]
-);
+package! { geometry_msgs:
+    /// A position: forward, to the left and up, m.
+    #[derive(Copy)]
+    struct Point {
+        x: f64 = "float64 x",
+        y: f64 = "float64 y",
+        z: f64 = "float64 z",
+    }
 
-/// A velocity at a time.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TwistStamped {
-    pub header: Header,
-    pub twist: Twist,
+    /// Forward, to the left and up.
+    #[derive(Copy)]
+    struct Vector3 {
+        x: f64 = "float64 x",
+        y: f64 = "float64 y",
+        z: f64 = "float64 z",
+    }
+
+    #[derive(Copy)]
+    struct Pose {
+        position: Point = "Point position",
+        orientation: Quaternion = "Quaternion orientation",
+    }
+
+    /// A pose with its covariance along the axes of its frame.
+    #[derive(Copy)]
+    struct PoseWithCovariance {
+        pose: Pose = "Pose pose",
+        covariance: Covariance = "float64[36] covariance",
+    }
+
+    /// Linear, m/s, and angular, rad/s.
+    #[derive(Copy)]
+    struct Twist {
+        linear: Vector3 = "Vector3 linear",
+        angular: Vector3 = "Vector3 angular",
+    }
+
+    struct TwistStamped {
+        header: Header = "std_msgs/Header header",
+        twist: Twist = "Twist twist",
+    }
+
+    /// A velocity with its covariance, in (m/s)^2, (rad/s)^2 and their products.
+    #[derive(Copy)]
+    struct TwistWithCovariance {
+        twist: Twist = "Twist twist",
+        covariance: Covariance = "float64[36] covariance",
+    }
+
+    /// The pose of a frame in another frame.
+    #[derive(Copy)]
+    struct Transform {
+        translation: Vector3 = "Vector3 translation",
+        rotation: Quaternion = "Quaternion rotation",
+    }
+
+    /// The pose of the frame `child_frame_id` in the frame of the header, at its time.
+    struct TransformStamped {
+        header: Header = "std_msgs/Header header",
+        child_frame_id: String = "string child_frame_id",
+        transform: Transform = "Transform transform",
+    }
 }
-message!(
-    TwistStamped,
-    "geometry_msgs",
-    "std_msgs/Header header\nTwist twist\n",
-    [Header, Twist]
-);
+
+impl Vector3 {
+    pub(crate) fn new(x: f64, y: f64, z: f64) -> Self {
+        Self { x, y, z }
+    }
+}
 
 impl TwistStamped {
     /// Returns the speed ahead as a sample of the wheels, on the driver's clock: see
@@ -163,45 +144,3 @@ impl TwistStamped {
         Sample::speed(self.header.stamp_or(received_ns), self.twist.linear.x)
     }
 }
-
-/// A velocity with covariance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TwistWithCovariance {
-    pub twist: Twist,
-    /// The covariance, in (m/s)^2, (rad/s)^2 and their products.
-    pub covariance: Covariance,
-}
-message!(
-    TwistWithCovariance,
-    "geometry_msgs",
-    "Twist twist\nfloat64[36] covariance\n",
-    [Twist]
-);
-
-/// The pose of a frame in another frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Transform {
-    /// The position, m.
-    pub translation: Vector3,
-    pub rotation: Quaternion,
-}
-message!(
-    Transform,
-    "geometry_msgs",
-    "Vector3 translation\nQuaternion rotation\n",
-    [Vector3, Quaternion]
-);
-
-/// The pose of the frame `child_frame_id` in the frame of the header, at its time.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TransformStamped {
-    pub header: Header,
-    pub child_frame_id: String,
-    pub transform: Transform,
-}
-message!(
-    TransformStamped,
-    "geometry_msgs",
-    "std_msgs/Header header\nstring child_frame_id\nTransform transform\n",
-    [Header, Transform]
-);

@@ -1,15 +1,4 @@
 //! The ROS 2 messages that Gyre speaks, without I/O.
-//!
-//! Reading order:
-//! - [`Definition`]: names and fields of a type, and the text of its schema;
-//! - a module for each ROS package: [`nav_msgs`], [`tf2_msgs`], [`navtech_msgs`] and those that
-//!   they consist of;
-//! - [`Domain`]: where on the network;
-//! - [`encode`], [`decode`]: messages as CDR;
-//! - [`frames`]: poses and motions of Gyre as odometry and transforms;
-//! - [`objects`]: tracked objects of Gyre as detections and markers;
-//! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's
-//!   messages.
 
 pub mod builtin_interfaces;
 mod cdr;

@@ -39,7 +39,6 @@ impl FromStr for Mounting {
 }
 
 impl Mounting {
-    /// Returns the pose of the radar in the frame of the vehicle.
     pub fn radar(&self) -> &Pose {
         &self.0
     }

@@ -1,32 +1,47 @@
 //! `nav_msgs`: odometry and grids.
 
 use gyre_samples::Sample;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     builtin_interfaces::Time,
-    definition::message,
+    definition::package,
     geometry_msgs::{Pose, PoseWithCovariance, TwistWithCovariance},
     std_msgs::Header,
 };
 
-/// The pose of a vehicle in the frame of the header, and its velocity in its own frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Odometry {
-    /// Time and frame of the pose.
-    pub header: Header,
-    /// The vehicle's frame, which is the frame of the velocity.
-    pub child_frame_id: String,
-    pub pose: PoseWithCovariance,
-    pub twist: TwistWithCovariance,
+package! { nav_msgs:
+    /// The pose of the vehicle's frame `child_frame_id` in the frame of the header, and its velocity
+    /// in its own frame.
+    struct Odometry {
+        header: Header = "std_msgs/Header header",
+        child_frame_id: String = "string child_frame_id",
+        pose: PoseWithCovariance = "geometry_msgs/PoseWithCovariance pose",
+        twist: TwistWithCovariance = "geometry_msgs/TwistWithCovariance twist",
+    }
+
+    /// Size and place of a grid.
+    #[derive(Copy)]
+    struct MapMetaData {
+        map_load_time: Time = "builtin_interfaces/Time map_load_time",
+        /// Side of a cell, m.
+        resolution: f32 = "float32 resolution",
+        /// Columns, along x.
+        width: u32 = "uint32 width",
+        /// Rows, along y.
+        height: u32 = "uint32 height",
+        /// The corner of the first cell, in the frame of the map.
+        origin: Pose = "geometry_msgs/Pose origin",
+    }
+
+    /// A map of cells: 0 to 100 % occupied, or -1 for unknown.
+    struct OccupancyGrid {
+        header: Header = "std_msgs/Header header",
+        info: MapMetaData = "MapMetaData info",
+        /// The cells by rows, from the origin on, as the bytes of an `int8`: 255 is -1.
+        #[serde(with = "serde_bytes")]
+        data: Vec<u8> = "int8[] data",
+    }
 }
-message!(
-    Odometry,
-    "nav_msgs",
-    "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n\
-     geometry_msgs/TwistWithCovariance twist\n",
-    [Header, PoseWithCovariance, TwistWithCovariance]
-);
 
 impl Odometry {
     /// Returns the speed ahead as a sample of the wheels, on the driver's clock: see
@@ -36,42 +51,3 @@ impl Odometry {
         Sample::speed(self.header.stamp_or(received_ns), speed_mps)
     }
 }
-
-/// Size and place of a grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MapMetaData {
-    /// When the map was loaded.
-    pub map_load_time: Time,
-    /// Side of a cell, m.
-    pub resolution: f32,
-    /// Columns, along x.
-    pub width: u32,
-    /// Rows, along y.
-    pub height: u32,
-    /// The corner of the first cell, in the frame of the map.
-    pub origin: Pose,
-}
-message!(
-    MapMetaData,
-    "nav_msgs",
-    "builtin_interfaces/Time map_load_time\nfloat32 resolution\nuint32 width\nuint32 height\n\
-     geometry_msgs/Pose origin\n",
-    [Time, Pose]
-);
-
-/// A map of cells: 0 to 100 % occupied, or -1 for unknown.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct OccupancyGrid {
-    /// Time and frame of the map.
-    pub header: Header,
-    pub info: MapMetaData,
-    /// The cells by rows, from the origin on, as the bytes of an `int8`: 255 is -1.
-    #[serde(with = "serde_bytes")]
-    pub data: Vec<u8>,
-}
-message!(
-    OccupancyGrid,
-    "nav_msgs",
-    "std_msgs/Header header\nMapMetaData info\nint8[] data\n",
-    [Header, MapMetaData]
-);

@@ -15,13 +15,12 @@ use crate::{
     vision_msgs::{
         BoundingBox3D, Detection3D, Detection3DArray, ObjectHypothesis, ObjectHypothesisWithPose,
     },
-    visualization_msgs::{ADD, ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
+    visualization_msgs::{ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
 };
 
-/// The class of an object that moves.
-pub const MOVING: &str = "moving";
+const MOVING: &str = "moving";
 /// The class of an object that moved, and stands now.
-pub const STANDING: &str = "standing";
+const STANDING: &str = "standing";
 
 /// Height for drawing objects, m: a radar in the plane does not measure it.
 const DRAWN_HEIGHT_M: f64 = 1.6;
@@ -30,7 +29,7 @@ const ARROW_M: f64 = 0.9;
 /// Height of a letter, m.
 const LETTER_M: f64 = 1.2;
 
-/// Returns the objects of a scan as detections of the class [`MOVING`] or [`STANDING`].
+/// Returns the objects of a scan as detections of the class `moving` or `standing`.
 ///
 /// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
 /// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
@@ -45,22 +44,19 @@ pub fn detections(
     let detection = |object: &ListedObject| {
         let pose = frames::pose(&place(mounting, object));
         let class_id = if object.is_moving() { MOVING } else { STANDING };
+        let covariance = covariance(mounting, object);
+        let result = ObjectHypothesisWithPose {
+            hypothesis: ObjectHypothesis {
+                class_id: class_id.to_owned(),
+                score: 1.0,
+            },
+            pose: PoseWithCovariance { pose, covariance },
+        };
+        let (center, size) = (pose, size(object, 0.0));
         Detection3D {
             header: header.clone(),
-            results: vec![ObjectHypothesisWithPose {
-                hypothesis: ObjectHypothesis {
-                    class_id: class_id.to_owned(),
-                    score: 1.0,
-                },
-                pose: PoseWithCovariance {
-                    pose,
-                    covariance: covariance(mounting, object),
-                },
-            }],
-            bbox: BoundingBox3D {
-                center: pose,
-                size: size(object, 0.0),
-            },
+            results: vec![result],
+            bbox: BoundingBox3D { center, size },
             id: object.id.to_string(),
         }
     };
@@ -80,28 +76,21 @@ pub fn markers(
     objects: &[ListedObject],
 ) -> MarkerArray {
     let header = Header::new(stamp_ns, &frames.odom);
-    let drawn = objects.iter().zip(0..).flat_map(|(object, id)| {
-        let moving = object.is_moving().then(|| arrow(mounting, object));
-        let shapes = [cube(mounting, object), name(mounting, object)];
-        shapes.into_iter().chain(moving).map(move |shape| Marker {
-            id,
-            action: ADD,
-            ..shape
-        })
-    });
-    let remove_all = Marker {
+    let mut markers = vec![Marker {
         action: DELETEALL,
         ..Marker::default()
-    };
-    let all = [remove_all].into_iter().chain(drawn);
-    MarkerArray {
-        markers: all
-            .map(|shape| Marker {
-                header: header.clone(),
-                ..shape
-            })
-            .collect(),
+    }];
+    for (object, id) in objects.iter().zip(0..) {
+        let moving = object.is_moving().then(|| arrow(mounting, object));
+        let shapes = [cube(mounting, object), name(mounting, object)];
+        let shapes = shapes.into_iter().chain(moving);
+        // Their action is `ADD`, the default.
+        markers.extend(shapes.map(|shape| Marker { id, ..shape }));
     }
+    for marker in &mut markers {
+        marker.header = header.clone();
+    }
+    MarkerArray { markers }
 }
 
 fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {
@@ -115,7 +104,6 @@ fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {
     }
 }
 
-/// The way of an object in a second.
 fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
     let at = place(mounting, object).translation.vector;
     let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);
@@ -124,11 +112,7 @@ fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
         ns: "velocities".to_owned(),
         r#type: ARROW,
         pose: lifted(&ahead, DRAWN_HEIGHT_M),
-        scale: Vector3 {
-            x: object.speed_mps(),
-            y: ARROW_M,
-            z: ARROW_M,
-        },
+        scale: Vector3::new(object.speed_mps(), ARROW_M, ARROW_M),
         color: colour(object, 1.0),
         ..Marker::default()
     }
@@ -139,10 +123,7 @@ fn name(mounting: &Mounting, object: &ListedObject) -> Marker {
         ns: "identities".to_owned(),
         r#type: TEXT_VIEW_FACING,
         pose: lifted(&place(mounting, object), DRAWN_HEIGHT_M + LETTER_M),
-        scale: Vector3 {
-            z: LETTER_M,
-            ..Vector3::default()
-        },
+        scale: Vector3::new(0.0, 0.0, LETTER_M),
         color: colour(object, 1.0),
         text: object.id.to_string(),
         ..Marker::default()
@@ -170,11 +151,7 @@ fn lifted(place: &Pose, height_m: f64) -> geometry_msgs::Pose {
 }
 
 fn size(object: &ListedObject, height_m: f64) -> Vector3 {
-    Vector3 {
-        x: object.length_m,
-        y: object.width_m,
-        z: height_m,
-    }
+    Vector3::new(object.length_m, object.width_m, height_m)
 }
 
 /// Returns the covariance of the centre, turned by the mounting.

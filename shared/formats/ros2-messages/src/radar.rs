@@ -9,5 +9,5 @@ mod b_scan;
 mod configuration;
 mod scan;
 
-pub use b_scan::{BadScan, TimedAzimuth};
+pub use b_scan::TimedAzimuth;
 pub use scan::{Encoder, ScanMessages};

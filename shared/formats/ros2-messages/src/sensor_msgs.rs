@@ -1,81 +1,76 @@
 //! `sensor_msgs`: images, and the measurements of inertial sensors and GNSS receivers.
 
 use gyre_samples::{RawFix, Sample, SampleKind};
-use serde::{Deserialize, Serialize};
 
 use crate::{
-    definition::message,
+    definition::package,
     geometry_msgs::{Quaternion, Vector3},
     std_msgs::Header,
 };
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Image {
-    pub header: Header,
-    /// Rows.
-    pub height: u32,
-    /// Columns.
-    pub width: u32,
-    /// The encoding of a pixel, such as `mono8` or `8UC1`.
-    pub encoding: String,
-    /// 1 if pixels of several bytes are big-endian.
-    pub is_bigendian: u8,
-    /// Bytes of a row.
-    pub step: u32,
-    /// The pixels by rows.
-    #[serde(with = "serde_bytes")]
-    pub data: Vec<u8>,
-}
-message!(
-    Image,
-    "sensor_msgs",
-    "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\n\
-     uint32 step\nuint8[] data\n",
-    [Header]
-);
+package! { sensor_msgs:
+    struct Image {
+        header: Header = "std_msgs/Header header",
+        height: u32 = "uint32 height",
+        width: u32 = "uint32 width",
+        /// The encoding of a pixel, such as `mono8` or `8UC1`.
+        encoding: String = "string encoding",
+        is_bigendian: u8 = "uint8 is_bigendian",
+        /// Bytes of a row.
+        step: u32 = "uint32 step",
+        #[serde(with = "serde_bytes")]
+        data: Vec<u8> = "uint8[] data",
+    }
 
-/// An image as a file.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CompressedImage {
-    pub header: Header,
-    /// The format of the file, such as `png`.
-    pub format: String,
-    /// The bytes of the file.
-    #[serde(with = "serde_bytes")]
-    pub data: Vec<u8>,
-}
-message!(
-    CompressedImage,
-    "sensor_msgs",
-    "std_msgs/Header header\nstring format\nuint8[] data\n",
-    [Header]
-);
+    /// An image as a file, such as `png`.
+    struct CompressedImage {
+        header: Header = "std_msgs/Header header",
+        format: String = "string format",
+        #[serde(with = "serde_bytes")]
+        data: Vec<u8> = "uint8[] data",
+    }
 
-/// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is negative
-/// (-1) where there is no such measurement.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Imu {
-    pub header: Header,
-    pub orientation: Quaternion,
-    /// Covariance of the orientation.
-    pub orientation_covariance: [f64; 9],
-    /// Rates about the axes, rad/s.
-    pub angular_velocity: Vector3,
-    /// Covariance of the rates.
-    pub angular_velocity_covariance: [f64; 9],
-    /// Acceleration along the axes, m/s².
-    pub linear_acceleration: Vector3,
-    /// Covariance of the acceleration.
-    pub linear_acceleration_covariance: [f64; 9],
+    /// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is
+    /// negative (-1) where there is no such measurement.
+    struct Imu {
+        header: Header = "std_msgs/Header header",
+        orientation: Quaternion = "geometry_msgs/Quaternion orientation",
+        orientation_covariance: [f64; 9] = "float64[9] orientation_covariance",
+        /// Rates about the axes, rad/s.
+        angular_velocity: Vector3 = "geometry_msgs/Vector3 angular_velocity",
+        angular_velocity_covariance: [f64; 9] = "float64[9] angular_velocity_covariance",
+        /// Acceleration along the axes, m/s².
+        linear_acceleration: Vector3 = "geometry_msgs/Vector3 linear_acceleration",
+        linear_acceleration_covariance: [f64; 9] = "float64[9] linear_acceleration_covariance",
+    }
+
+    /// The kind of a fix of a GNSS receiver, and the systems that it is of.
+    #[derive(Copy)]
+    struct NavSatStatus {
+        /// 0 for a fix, 1 and 2 for one that is augmented by satellites or on the ground; -1
+        /// without a fix; -2 where the driver does not state it, as by default from ROS 2 Jazzy on.
+        status: i8 = "int8 status",
+        /// The systems, a bit each: GPS, GLONASS, BeiDou, Galileo.
+        service: u16 = "uint16 service",
+    }
+
+    /// A fix of a GNSS receiver on the ellipsoid of WGS 84.
+    struct NavSatFix {
+        /// Time, and the frame of the antenna.
+        header: Header = "std_msgs/Header header",
+        status: NavSatStatus = "sensor_msgs/NavSatStatus status",
+        /// Degrees.
+        latitude: f64 = "float64 latitude",
+        /// Degrees.
+        longitude: f64 = "float64 longitude",
+        /// Altitude above the ellipsoid, m; NaN where it is not known.
+        altitude: f64 = "float64 altitude",
+        /// Covariance along east, north and up, by rows, m².
+        position_covariance: [f64; 9] = "float64[9] position_covariance",
+        /// 0 if the covariance is not known; 1 to 3 for an approximation, its diagonal, all of it.
+        position_covariance_type: u8 = "uint8 position_covariance_type",
+    }
 }
-message!(
-    Imu,
-    "sensor_msgs",
-    "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
-     geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
-     geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
-    [Header, Quaternion, Vector3]
-);
 
 impl Imu {
     /// Returns the rates and accelerations as a sample, in the sensor's own axes and on its own
@@ -99,48 +94,6 @@ impl Imu {
         }
     }
 }
-
-/// The kind of a fix of a GNSS receiver, and the systems that it is of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct NavSatStatus {
-    /// 0 for a fix, 1 and 2 for one that is augmented by satellites or on the ground; -1 without a
-    /// fix; -2 where the driver does not state it, as by default from ROS 2 Jazzy on.
-    pub status: i8,
-    /// The systems, a bit each: GPS, GLONASS, BeiDou, Galileo.
-    pub service: u16,
-}
-message!(
-    NavSatStatus,
-    "sensor_msgs",
-    "int8 status\nuint16 service\n",
-    []
-);
-
-/// A fix of a GNSS receiver on the ellipsoid of WGS 84.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct NavSatFix {
-    /// Time, and the frame of the antenna.
-    pub header: Header,
-    /// The kind of the fix.
-    pub status: NavSatStatus,
-    /// Latitude, degrees.
-    pub latitude: f64,
-    /// Longitude, degrees.
-    pub longitude: f64,
-    /// Altitude above the ellipsoid, m; NaN where it is not known.
-    pub altitude: f64,
-    /// Covariance along east, north and up, by rows, m².
-    pub position_covariance: [f64; 9],
-    /// 0 if the covariance is not known; 1 to 3 for an approximation, its diagonal, all of it.
-    pub position_covariance_type: u8,
-}
-message!(
-    NavSatFix,
-    "sensor_msgs",
-    "std_msgs/Header header\nsensor_msgs/NavSatStatus status\nfloat64 latitude\nfloat64 longitude\n\
-     float64 altitude\nfloat64[9] position_covariance\nuint8 position_covariance_type\n",
-    [Header, NavSatStatus]
-);
 
 /// The lowest status of a fix, and the status of a driver that does not state it.
 const FIX: i8 = 0;

@@ -1,22 +1,23 @@
 //! `std_msgs`: the header of stamped messages, and colours.
 
-use serde::{Deserialize, Serialize};
+use crate::{builtin_interfaces::Time, definition::package};
 
-use crate::{builtin_interfaces::Time, definition::message};
+package! { std_msgs:
+    /// Time and frame of a message.
+    struct Header {
+        stamp: Time = "builtin_interfaces/Time stamp",
+        frame_id: String = "string frame_id",
+    }
 
-/// Time and frame of a message.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Header {
-    pub stamp: Time,
-    /// The name of the frame.
-    pub frame_id: String,
+    /// A colour, each part 0 to 1.
+    #[derive(Copy)]
+    struct ColorRGBA {
+        r: f32 = "float32 r",
+        g: f32 = "float32 g",
+        b: f32 = "float32 b",
+        a: f32 = "float32 a",
+    }
 }
-message!(
-    Header,
-    "std_msgs",
-    "builtin_interfaces/Time stamp\nstring frame_id\n",
-    [Time]
-);
 
 impl Header {
     /// Returns the header of a time in ns since 1970 and a frame.
@@ -35,19 +36,3 @@ impl Header {
         }
     }
 }
-
-/// A colour, each part 0 to 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ColorRGBA {
-    /// Red.
-    pub r: f32,
-    pub g: f32,
-    pub b: f32,
-    pub a: f32,
-}
-message!(
-    ColorRGBA,
-    "std_msgs",
-    "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
-    []
-);

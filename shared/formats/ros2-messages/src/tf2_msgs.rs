@@ -1,17 +1,10 @@
 //! `tf2_msgs`: the tree of frames.
 
-use serde::{Deserialize, Serialize};
+use crate::{definition::package, geometry_msgs::TransformStamped};
 
-use crate::{definition::message, geometry_msgs::TransformStamped};
-
-/// Poses of frames in other ones: the topics `/tf` and `/tf_static`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TFMessage {
-    pub transforms: Vec<TransformStamped>,
+package! { tf2_msgs:
+    /// Poses of frames in other ones: the topics `/tf` and `/tf_static`.
+    struct TFMessage {
+        transforms: Vec<TransformStamped> = "geometry_msgs/TransformStamped[] transforms",
+    }
 }
-message!(
-    TFMessage,
-    "tf2_msgs",
-    "geometry_msgs/TransformStamped[] transforms\n",
-    [TransformStamped]
-);

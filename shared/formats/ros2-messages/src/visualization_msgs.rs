@@ -1,10 +1,8 @@
 //! `visualization_msgs`: what viewers draw, as ROS 2 Humble and later have it.
 
-use serde::{Deserialize, Serialize};
-
 use crate::{
     builtin_interfaces::Duration,
-    definition::message,
+    definition::package,
     geometry_msgs::{Point, Pose, Vector3},
     sensor_msgs::CompressedImage,
     std_msgs::{ColorRGBA, Header},
@@ -16,106 +14,50 @@ pub const ARROW: i32 = 0;
 pub const CUBE: i32 = 1;
 /// The type of a marker that is a text, whose letters are as high as `scale.z`.
 pub const TEXT_VIEW_FACING: i32 = 9;
-/// The action of a marker that is drawn.
-pub const ADD: i32 = 0;
-/// The action that removes all markers of the topic.
+/// The action that removes all markers of the topic. Zero draws a marker.
 pub const DELETEALL: i32 = 3;
 
-/// A point of a texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct UVCoordinate {
-    /// From left to right, 0 to 1.
-    pub u: f32,
-    /// From the bottom to the top, 0 to 1.
-    pub v: f32,
-}
-message!(
-    UVCoordinate,
-    "visualization_msgs",
-    "float32 u\nfloat32 v\n",
-    []
-);
+package! { visualization_msgs:
+    #[derive(Copy)]
+    struct UVCoordinate {
+        u: f32 = "float32 u",
+        v: f32 = "float32 v",
+    }
 
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MeshFile {
-    /// The name of the file.
-    pub filename: String,
-    /// The bytes of the file.
-    #[serde(with = "serde_bytes")]
-    pub data: Vec<u8>,
-}
-message!(
-    MeshFile,
-    "visualization_msgs",
-    "string filename\nuint8[] data\n",
-    []
-);
+    struct MeshFile {
+        filename: String = "string filename",
+        #[serde(with = "serde_bytes")]
+        data: Vec<u8> = "uint8[] data",
+    }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Marker {
-    pub header: Header,
-    /// The namespace of `id`.
-    pub ns: String,
-    /// The number of the shape, which replaces an earlier one of the same number.
-    pub id: i32,
-    /// The type, such as [`CUBE`].
-    pub r#type: i32,
-    /// The action, such as [`ADD`].
-    pub action: i32,
-    /// The place and the directions of the sides.
-    pub pose: Pose,
-    /// The lengths of the sides, m.
-    pub scale: Vector3,
-    pub color: ColorRGBA,
-    /// The time for which it is drawn; zero: until it is removed.
-    pub lifetime: Duration,
-    /// True to move it with its frame.
-    pub frame_locked: bool,
-    /// The points of a line or a list.
-    pub points: Vec<Point>,
-    /// A colour for each point.
-    pub colors: Vec<ColorRGBA>,
-    /// The name of a texture.
-    pub texture_resource: String,
-    pub texture: CompressedImage,
-    /// The place of each point in the texture.
-    pub uv_coordinates: Vec<UVCoordinate>,
-    pub text: String,
-    /// The name of a mesh.
-    pub mesh_resource: String,
-    pub mesh_file: MeshFile,
-    /// True to draw the mesh with its own colours.
-    pub mesh_use_embedded_materials: bool,
-}
-message!(
-    Marker,
-    "visualization_msgs",
-    "std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\ngeometry_msgs/Pose pose\n\
-     geometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration lifetime\n\
-     bool frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\n\
-     string texture_resource\nsensor_msgs/CompressedImage texture\nUVCoordinate[] uv_coordinates\n\
-     string text\nstring mesh_resource\nMeshFile mesh_file\nbool mesh_use_embedded_materials\n",
-    [
-        Header,
-        Pose,
-        Vector3,
-        ColorRGBA,
-        Duration,
-        Point,
-        CompressedImage,
-        UVCoordinate,
-        MeshFile
-    ]
-);
+    struct Marker {
+        header: Header = "std_msgs/Header header",
+        /// The namespace of `id`.
+        ns: String = "string ns",
+        /// The number of the shape, which replaces an earlier one of the same number.
+        id: i32 = "int32 id",
+        r#type: i32 = "int32 type",
+        action: i32 = "int32 action",
+        pose: Pose = "geometry_msgs/Pose pose",
+        /// The lengths of the sides, m.
+        scale: Vector3 = "geometry_msgs/Vector3 scale",
+        color: ColorRGBA = "std_msgs/ColorRGBA color",
+        /// The time for which it is drawn; zero: until it is removed.
+        lifetime: Duration = "builtin_interfaces/Duration lifetime",
+        frame_locked: bool = "bool frame_locked",
+        points: Vec<Point> = "geometry_msgs/Point[] points",
+        colors: Vec<ColorRGBA> = "std_msgs/ColorRGBA[] colors",
+        texture_resource: String = "string texture_resource",
+        texture: CompressedImage = "sensor_msgs/CompressedImage texture",
+        uv_coordinates: Vec<UVCoordinate> = "UVCoordinate[] uv_coordinates",
+        text: String = "string text",
+        mesh_resource: String = "string mesh_resource",
+        mesh_file: MeshFile = "MeshFile mesh_file",
+        mesh_use_embedded_materials: bool = "bool mesh_use_embedded_materials",
+    }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MarkerArray {
-    /// The shapes, in the order of drawing or removal.
-    pub markers: Vec<Marker>,
+    /// Shapes, in the order of drawing or removal.
+    struct MarkerArray {
+        markers: Vec<Marker> = "Marker[] markers",
+    }
 }
-message!(
-    MarkerArray,
-    "visualization_msgs",
-    "Marker[] markers\n",
-    [Marker]
-);

@@ -1,102 +1,16 @@
 //! Messages as bytes.
 
 use gyre_ros2_messages::{
-    BadMessage, Ros2Message, decode,
-    diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue},
-    encode,
-    geometry_msgs::{Quaternion, TransformStamped},
-    nav_msgs::{OccupancyGrid, Odometry},
-    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    Ros2Message, decode, encode,
+    geometry_msgs::Quaternion,
+    nav_msgs::Odometry,
+    navtech_msgs::RadarFftDataMsg,
     sensor_msgs::{Imu, NavSatFix},
     std_msgs::Header,
-    tf2_msgs::TFMessage,
     vision_msgs::Detection3DArray,
     visualization_msgs::{CUBE, MarkerArray},
 };
 use gyre_samples::RawFix;
-
-fn comes_back<T: Ros2Message + PartialEq + std::fmt::Debug>(message: &T) {
-    let bytes = encode(message).unwrap();
-    assert_eq!(&decode::<T>(&bytes).unwrap(), message);
-    // Padding behind it, as some writers leave it.
-    assert_eq!(
-        &decode::<T>(&[&bytes[..], &[0; 3]].concat()).unwrap(),
-        message
-    );
-}
-
-#[test]
-fn messages_come_back() {
-    let header = Header::new(1_549_986_608_123_456_789, "radar");
-    assert_eq!(header.stamp.ns(), 1_549_986_608_123_456_789);
-    let mut odometry = Odometry {
-        header: header.clone(),
-        ..Odometry::default()
-    };
-    odometry.pose.covariance.set(5, 5, 0.25);
-    comes_back(&odometry);
-    comes_back(&TFMessage {
-        transforms: vec![
-            TransformStamped {
-                header: header.clone(),
-                child_frame_id: "b".to_owned(),
-                ..TransformStamped::default()
-            };
-            2
-        ],
-    });
-    comes_back(&OccupancyGrid {
-        data: vec![0, 100, 255],
-        ..OccupancyGrid::default()
-    });
-    comes_back(&DiagnosticArray {
-        header: header.clone(),
-        status: vec![DiagnosticStatus {
-            values: vec![KeyValue::default(); 3],
-            ..DiagnosticStatus::default()
-        }],
-    });
-    comes_back(&RadarConfigurationMsg {
-        bin_size: 438.1,
-        ..RadarConfigurationMsg::default()
-    });
-    comes_back(&RadarBScanMsg {
-        encoder_values: vec![13, 27, 41],
-        timestamps: vec![1, u64::MAX],
-        ..RadarBScanMsg::default()
-    });
-    comes_back(&RadarFftDataMsg {
-        header,
-        data: (0..=255).collect(),
-        ..RadarFftDataMsg::default()
-    });
-}
-
-/// The bytes of a message with an empty frame, counted by hand: CDR aligns numbers to their size,
-/// from behind the first four bytes.
-#[test]
-fn numbers_are_aligned_from_behind_the_encapsulation() {
-    let message = RadarFftDataMsg {
-        header: Header::new(2_000_000_003, "r"),
-        angle: 1.0,
-        azimuth: 0x0102,
-        sweep_counter: 3,
-        ntp_seconds: 4,
-        ntp_split_seconds: 5,
-        data: vec![6, 7, 8],
-        data_length: 3,
-    };
-    let expected = [
-        &[0, 1, 0, 0][..],
-        &[2, 0, 0, 0, 3, 0, 0, 0],
-        &[2, 0, 0, 0, b'r', 0, 0, 0],
-        &1.0_f64.to_le_bytes(),
-        &[2, 1, 3, 0, 4, 0, 0, 0, 5, 0, 0, 0],
-        &[3, 0, 0, 0, 6, 7, 8, 0],
-        &[3, 0],
-    ];
-    assert_eq!(encode(&message).unwrap(), expected.concat());
-}
 
 #[test]
 fn big_endian_messages_are_read() {
@@ -120,14 +34,11 @@ fn lengths_that_lie_are_refused_with_one_sentence() {
     let mut bytes = encode(&message).unwrap();
     let length = bytes.len() - 8 - 2 - 4;
     bytes[length..length + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-    let refused = decode::<RadarFftDataMsg>(&bytes).unwrap_err();
-    assert!(matches!(refused, BadMessage::Content { .. }));
-    assert!(refused.to_string().contains("RadarFftDataMsg"), "{refused}");
+    let refused = decode::<RadarFftDataMsg>(&bytes).unwrap_err().to_string();
+    assert!(refused.contains("RadarFftDataMsg"), "{refused}");
     for head in [&[][..], &[0, 1], &[0, 3, 0, 0, 1, 2, 3, 4]] {
-        assert!(
-            matches!(decode::<Header>(head), Err(BadMessage::Encoding { .. })),
-            "{head:?}"
-        );
+        let refused = decode::<Header>(head).unwrap_err().to_string();
+        assert!(refused.contains("does not begin a message"), "{refused}");
     }
 }
 
@@ -171,17 +82,20 @@ const IMU: &str = "\
     0000144000000000000018400000000000001c400000000000002040\
 ";
 
-fn bytes_of(hexadecimal: &str) -> Vec<u8> {
-    (0..hexadecimal.len())
-        .step_by(2)
+/// Reads the message of another writer, with padding as some leave it; Gyre writes it alike.
+fn read<T: Ros2Message>(hexadecimal: &str) -> T {
+    let places = (0..hexadecimal.len()).step_by(2);
+    let bytes: Vec<u8> = places
         .map(|at| u8::from_str_radix(&hexadecimal[at..at + 2], 16).unwrap())
-        .collect()
+        .collect();
+    let message: T = decode(&[&bytes[..], &[0; 3]].concat()).unwrap();
+    assert_eq!(encode(&message).unwrap(), bytes);
+    message
 }
 
 #[test]
 fn an_imu_of_another_writer_is_read_and_written_alike() {
-    let bytes = bytes_of(IMU);
-    let imu: Imu = decode(&bytes).unwrap();
+    let imu: Imu = read(IMU);
     assert_eq!(imu.header, Header::new(1_549_986_608_000_000_007, "imu"));
     assert_eq!(imu.orientation, Quaternion::default());
     assert_eq!(imu.orientation_covariance[0], -1.0);
@@ -190,7 +104,6 @@ fn an_imu_of_another_writer_is_read_and_written_alike() {
     assert_eq!(imu.angular_velocity_covariance[0], 0.5);
     assert_eq!([along.x, along.y, along.z], [0.5, 0.0, 9.8]);
     assert_eq!(imu.linear_acceleration_covariance[8], 8.0);
-    assert_eq!(encode(&imu).unwrap(), bytes);
 }
 
 /// A fix of a GNSS receiver, as rosbags 0.11.9 serialises it.
@@ -203,8 +116,7 @@ const FIX: &str = "\
 
 #[test]
 fn a_fix_of_another_writer_is_read_and_written_alike() {
-    let bytes = bytes_of(FIX);
-    let fix: NavSatFix = decode(&bytes).unwrap();
+    let fix: NavSatFix = read(FIX);
     assert_eq!(fix.header, Header::new(1_549_986_608_000_000_007, "gnss"));
     assert_eq!((fix.status.status, fix.status.service), (2, 9));
     let place = [fix.latitude, fix.longitude, fix.altitude];
@@ -220,12 +132,11 @@ fn a_fix_of_another_writer_is_read_and_written_alike() {
     assert_eq!(fix.fix(5), Some(expected));
     let line = format!("1549986608000000007,51.75,-1.26,{}", 6.5_f64.sqrt());
     assert_eq!(fix.line(5), line);
-    assert_eq!(encode(&fix).unwrap(), bytes);
 }
 
 #[test]
 fn a_receiver_without_a_fix_or_an_accuracy_says_so() {
-    let mut fix: NavSatFix = decode(&bytes_of(FIX)).unwrap();
+    let mut fix: NavSatFix = read(FIX);
     // Not yet set, none, and the kinds of fixes.
     for (status, has_fix) in [(-2, true), (-1, false), (0, true), (1, true), (2, true)] {
         fix.status.status = status;
@@ -259,27 +170,17 @@ const DETECTIONS: &str = "\
 
 #[test]
 fn detections_of_another_writer_are_read_and_written_alike() {
-    let bytes = bytes_of(DETECTIONS);
-    let read: Detection3DArray = decode(&bytes).unwrap();
-    let [object] = &read.detections[..] else {
-        panic!("{read:?}");
-    };
+    let found: Detection3DArray = read(DETECTIONS);
+    let object = &found.detections[0];
     let header = Header::new(1_549_986_608_000_000_007, "odom");
-    assert_eq!((&read.header, &object.header), (&header, &header));
-    let [result] = &object.results[..] else {
-        panic!("{object:?}");
-    };
+    assert_eq!((&found.header, &object.header), (&header, &header));
+    let result = &object.results[0];
     assert_eq!(result.hypothesis.class_id, "moving");
-    assert_eq!(result.hypothesis.score, 1.0);
     assert_eq!(result.pose.pose, object.bbox.center);
-    let covariance = &result.pose.covariance;
-    let found = [(0, 0), (0, 1), (1, 1), (5, 5)].map(|(row, column)| covariance.at(row, column));
+    let covariance = result.pose.covariance.elements();
+    let found = [0, 1, 7, 35].map(|element| covariance[element]);
     assert_eq!(found, [0.25, 0.5, 0.75, 1e6]);
-    let (at, size) = (object.bbox.center.position, object.bbox.size);
-    assert_eq!([at.x, at.y, at.z], [1.0, 2.0, 0.0]);
-    assert_eq!([size.x, size.y, size.z], [4.5, 1.75, 0.0]);
-    assert_eq!(object.id, "17");
-    assert_eq!(encode(&read).unwrap(), bytes);
+    assert_eq!((object.bbox.size.x, object.id.as_str()), (4.5, "17"));
 }
 
 /// A marker with all its fields, as rosbags 0.11.9 serialises it.
@@ -298,21 +199,11 @@ const MARKERS: &str = "\
 
 #[test]
 fn markers_of_another_writer_are_read_and_written_alike() {
-    let bytes = bytes_of(MARKERS);
-    let read: MarkerArray = decode(&bytes).unwrap();
-    let [marker] = &read.markers[..] else {
-        panic!("{read:?}");
-    };
-    assert_eq!((marker.ns.as_str(), marker.id), ("boxes", 3));
-    assert_eq!((marker.r#type, marker.action), (CUBE, 0));
-    assert_eq!((marker.scale.x, marker.color.a), (4.5, 0.75));
-    assert_eq!((marker.lifetime.sec, marker.lifetime.nanosec), (2, 5));
-    assert_eq!(marker.points[0].z, 3.0);
+    let found: MarkerArray = read(MARKERS);
+    let marker = &found.markers[0];
+    assert_eq!((marker.r#type, marker.scale.x), (CUBE, 4.5));
+    assert_eq!((marker.color.a, marker.lifetime.nanosec), (0.75, 5));
+    assert_eq!((marker.points[0].z, &*marker.text), (3.0, "17"));
     assert_eq!(marker.texture.data, [1, 2, 3]);
-    assert_eq!(
-        (marker.text.as_str(), &marker.mesh_file.data[..]),
-        ("17", &[9][..])
-    );
     assert!(marker.frame_locked && marker.mesh_use_embedded_materials);
-    assert_eq!(encode(&read).unwrap(), bytes);
 }

@@ -8,6 +8,7 @@ use gyre_ros2_messages::{
     frames::{Frames, UNKNOWN},
     geometry_msgs::Pose,
     objects::{detections, markers},
+    vision_msgs::Detection3D,
     visualization_msgs::{ARROW, CUBE, DELETEALL, Marker, TEXT_VIEW_FACING},
 };
 
@@ -70,15 +71,13 @@ fn objects_are_detections_with_identity_class_box_and_covariance() {
     };
     assert_eq!((car.id.as_str(), standing.id.as_str()), ("17", "4"));
     assert_eq!(car.header, array.header);
-    let class = |results: &[gyre_ros2_messages::vision_msgs::ObjectHypothesisWithPose]| {
-        let [result] = results else {
-            panic!("{results:?}");
-        };
-        assert_eq!(result.hypothesis.score, 1.0);
-        result.hypothesis.class_id.clone()
+    let class = |object: &Detection3D| {
+        let hypothesis = object.results[0].hypothesis.clone();
+        assert_eq!((object.results.len(), hypothesis.score), (1, 1.0));
+        hypothesis.class_id
     };
-    assert_eq!(class(&car.results), "moving");
-    assert_eq!(class(&standing.results), "standing");
+    assert_eq!(class(car), "moving");
+    assert_eq!(class(standing), "standing");
     let size = car.bbox.size;
     assert_eq!([size.x, size.y, size.z], [4.5, 1.75, 0.0]);
     close(&place(&car.bbox.center), &[20.0, 3.0, -FRAC_PI_2]);
@@ -102,8 +101,8 @@ fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
     assert_eq!(array.header.frame_id, "odo");
     let car = &array.detections[0];
     close(&place(&car.bbox.center), &[-2.0, 20.0, 0.0]);
-    let covariance = &car.results[0].pose.covariance;
-    let found = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(row, column)| covariance.at(row, column));
+    let covariance = car.results[0].pose.covariance.elements();
+    let found = [0, 1, 6, 7].map(|element| covariance[element]);
     close(&found, &[0.75, -0.125, -0.125, 0.25]);
     let shapes = markers(STAMP_NS, &frames, &mounting, header.list()).markers;
     let arrow = shapes.iter().find(|it| it.ns == "velocities").unwrap();
@@ -138,16 +137,4 @@ fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
     close(&place(&arrow.pose), &[20.0, 3.0, -0.75 * PI]);
     close(&[arrow.scale.x], &[9.0 / FRAC_1_SQRT_2]);
     assert_ne!(cube.color, shapes[4].color);
-}
-
-#[test]
-fn a_scan_without_objects_says_so() {
-    let header = ObjectsHeader::default();
-    let (frames, mounting) = (Frames::default(), Mounting::default());
-    let array = detections(STAMP_NS, &frames, &mounting, header.list());
-    assert_eq!(array.header.stamp.ns(), STAMP_NS);
-    assert!(array.detections.is_empty());
-    let shapes = markers(STAMP_NS, &frames, &mounting, header.list()).markers;
-    assert_eq!(shapes.len(), 1);
-    assert_eq!(shapes[0].action, DELETEALL);
 }

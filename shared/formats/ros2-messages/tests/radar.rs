@@ -2,14 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use gyre_colossus::{Configuration, Constants, RadarClock, SweepAssembler};
-use gyre_datasets::middle_ns;
-use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_colossus::Configuration;
+use gyre_radar::{OwnedScan, ScanLimits, scan::flag};
 use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},
-    radar::{BadScan, Encoder, ScanMessages},
-    sensor_msgs::Image,
+    radar::{Encoder, ScanMessages},
     std_msgs::Header,
 };
 
@@ -29,7 +27,7 @@ fn radar() -> Configuration {
 }
 
 /// The scan of a turn, as a reader of recordings gives it.
-fn scan(turn: i64) -> OwnedScan {
+fn scan() -> OwnedScan {
     let (azimuths, bins) = (40, 8);
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: azimuths * bins,
@@ -38,104 +36,28 @@ fn scan(turn: i64) -> OwnedScan {
     for row in 0..azimuths {
         let encoder = (140 * row + 13) as f64;
         scan.azimuth_rad[row] = (encoder * (TAU / 5600.0)) as f32;
-        scan.stamp_ns[row] = START_NS + 250_000_000 * turn + 6_250_000 * row as i64;
+        scan.stamp_ns[row] = START_NS + 6_250_000 * row as i64;
         scan.flags[row] = flag::MEASURED;
         for bin in 0..bins {
-            scan.bytes[row * bins + bin] = (turn as usize * 31 + row * 7 + bin) as u8;
+            scan.bytes[row * bins + bin] = (row * 7 + bin) as u8;
         }
     }
-    scan.geometry = SweepGeometry {
-        azimuths,
-        bins,
-        stride: bins,
-        first_byte: 0,
-        range_resolution_m: 0.173_611,
-        range_offset_m: 0.0,
-        doppler_s: 0.0,
-        sense: Sense::Clockwise,
-        stamp_ns: middle_ns(scan.stamp_ns[0], scan.stamp_ns[azimuths - 1]),
-    };
+    (scan.geometry.azimuths, scan.geometry.bins) = (azimuths, bins);
+    scan.geometry.stride = bins;
+    scan.geometry.stamp_ns = START_NS + 125_000_000;
     scan
 }
 
-/// Assembles the scans of messages of whole turns.
-fn assembled(
-    radar: &Configuration,
-    turns: &[RadarBScanMsg],
-    offset: u16,
-    logged_ns: i64,
-) -> Vec<OwnedScan> {
-    let mut assembler = SweepAssembler::new(radar, Constants::default()).unwrap();
-    let mut clock = RadarClock::new(radar);
-    let mut scan = OwnedScan::with_limits(assembler.limits());
-    let mut scans = Vec::new();
-    for (turn, message) in turns.iter().enumerate() {
-        let arrived_ns = logged_ns + 250_000_000 * turn as i64;
-        for row in message.rows(radar, offset, arrived_ns).unwrap() {
-            for (azimuth, stamp_ns) in clock.stamp(row.azimuth, row.arrived_ns) {
-                if let Some(sweep) = assembler.add(&azimuth, stamp_ns, scan.slot()) {
-                    scan.geometry = sweep.geometry;
-                    scans.push(scan.clone());
-                }
-            }
-        }
-    }
-    scans
-}
-
-fn assert_same(one: &OwnedScan, other: &OwnedScan) {
-    assert_eq!(one.geometry, other.geometry);
-    assert_eq!(one.bytes, other.bytes);
-    assert_eq!(one.azimuth_rad, other.azimuth_rad);
-    assert_eq!(one.stamp_ns, other.stamp_ns);
-    assert_eq!(one.flags, other.flags);
-}
-
 #[test]
-fn scans_come_back_to_the_bit() {
-    let messages = ScanMessages::new(radar(), "radar");
-    let described = messages.configuration(START_NS).configuration().unwrap();
-    assert_eq!(described.range_resolution_m(), 0.173_611);
-    let turns: Vec<_> = (0..3)
-        .map(|turn| messages.b_scan(scan(turn).view()))
-        .collect();
-    let scans = assembled(&described, &turns, 0, START_NS);
-    assert_eq!(scans.len(), 3);
-    for (turn, found) in scans.iter().enumerate() {
-        assert_same(found, &scan(turn as i64));
-    }
-}
-
-#[test]
-fn azimuths_of_both_forms_are_the_same() {
-    let mut messages = ScanMessages::new(radar(), "radar");
-    let scan = scan(0);
-    let newer = messages.azimuths(scan.view()).nth(5).unwrap();
-    let older = RadarFftDataMessage {
-        azimuth: newer.azimuth.to_be_bytes().to_vec(),
-        sweep_counter: newer.sweep_counter.to_be_bytes().to_vec(),
-        ntp_seconds: newer.ntp_seconds.to_be_bytes().to_vec(),
-        ntp_split_seconds: newer.ntp_split_seconds.to_be_bytes().to_vec(),
-        data: newer.data.clone(),
-        ..RadarFftDataMessage::default()
-    };
-    let (newer, found) = (newer.azimuth(), older.azimuth().unwrap());
-    assert_eq!((found.encoder, found.sweep_counter), (5 * 140 + 13, 6));
-    assert_eq!((found.encoder, found.powers), (newer.encoder, newer.powers));
-    let short = RadarFftDataMessage {
-        azimuth: vec![1],
-        ..older
-    };
-    let refused = short.azimuth().unwrap_err().to_string();
-    assert!(
-        refused.contains("`azimuth` has 1 bytes, expected 2"),
-        "{refused}"
-    );
+fn numbers_of_the_older_form_have_their_bytes() {
+    let refused = RadarFftDataMessage::default().azimuth().unwrap_err();
+    let refused = refused.to_string();
+    assert!(refused.contains("has 0 bytes, expected 2"), "{refused}");
 }
 
 #[test]
 fn rows_that_the_driver_has_not_written_are_missing() {
-    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
     for row in [3, 39] {
         (message.encoder_values[row], message.timestamps[row]) = (0, 0);
     }
@@ -148,29 +70,24 @@ fn rows_that_the_driver_has_not_written_are_missing() {
 #[test]
 fn a_turn_of_which_the_driver_has_written_nothing_has_no_rows() {
     let messages = ScanMessages::new(radar(), "radar");
-    let from_zero = |turn| {
-        let mut message = messages.b_scan(scan(turn).view());
+    let from_zero = || {
+        let mut message = messages.b_scan(scan().view());
         let encoders = message.encoder_values.iter_mut();
         encoders.for_each(|encoder| *encoder -= 13);
         message
     };
-    let mut empty = from_zero(0);
+    let mut empty = from_zero();
     empty.b_scan_img.data.fill(0);
     empty.encoder_values.fill(0);
     empty.timestamps.fill(0);
-    assert_eq!(empty.rows(&radar(), 0, START_NS).unwrap().count(), 0);
-    let scans = assembled(&radar(), &[empty, from_zero(0), from_zero(1)], 0, START_NS);
-    assert_eq!(scans.len(), 2);
-    for (turn, found) in scans.iter().enumerate() {
-        assert_eq!(found.geometry, scan(turn as i64).geometry);
-        assert_eq!(found.stamp_ns, scan(turn as i64).stamp_ns);
+    for (message, rows) in [(empty, 0), (from_zero(), 40)] {
+        assert_eq!(message.rows(&radar(), 0, START_NS).unwrap().count(), rows);
     }
 }
 
-/// The driver turns its images by a number of rows, and not the encoder values beside them.
 #[test]
 fn a_turned_image_is_turned_back() {
-    let plain = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let plain = ScanMessages::new(radar(), "radar").b_scan(scan().view());
     let mut turned = plain.clone();
     turned.b_scan_img.data.rotate_right(5 * 8);
     let powers = |message: &RadarBScanMsg, offset| -> Vec<Vec<u8>> {
@@ -184,26 +101,20 @@ fn a_turned_image_is_turned_back() {
 
 #[test]
 fn a_radar_without_a_clock_has_the_times_of_receipt() {
-    let messages = ScanMessages::new(radar(), "radar");
-    let turns: Vec<_> = (0..3)
-        .map(|turn| {
-            let mut message = messages.b_scan(scan(turn).view());
-            message.timestamps.fill(0);
-            message
-        })
-        .collect();
-    let scans = assembled(&radar(), &turns, 0, START_NS);
-    assert_eq!(scans.len(), 3);
-    let turn_ns = scans[1].geometry.stamp_ns - scans[0].geometry.stamp_ns;
-    assert_eq!(turn_ns, 250_000_000);
-    // The message is received when the turn has ended, half a turn after its middle.
-    assert!((START_NS - scans[0].geometry.stamp_ns - 125_000_000).abs() < 10_000_000);
+    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+    message.timestamps.fill(0);
+    let rows: Vec<_> = message.rows(&radar(), 0, START_NS).unwrap().collect();
+    // The message is received when the turn has ended.
+    let turn_ns = START_NS - rows[0].arrived_ns;
+    assert!((turn_ns - 250_000_000).abs() < 1_000_000, "{turn_ns}");
+    assert!(START_NS - rows[39].arrived_ns < 7_000_000);
+    assert_eq!((rows.len(), rows[0].azimuth.seconds), (40, [0; 4]));
 }
 
 #[test]
 fn an_image_alone_is_evenly_spaced() {
     let image = ScanMessages::new(radar(), "radar")
-        .b_scan(scan(0).view())
+        .b_scan(scan().view())
         .b_scan_img;
     let rows: Vec<_> = image.rows(&radar(), 0, START_NS).unwrap().collect();
     assert_eq!(rows.len(), 40);
@@ -213,64 +124,65 @@ fn an_image_alone_is_evenly_spaced() {
 
 #[test]
 fn images_that_are_not_of_powers_are_refused() {
-    let good = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
-    let refused = |message: RadarBScanMsg| message.rows(&radar(), 0, 0).err().unwrap();
-    let mut colours = good.clone();
-    colours.b_scan_img.encoding = "rgb8".to_owned();
-    assert!(matches!(refused(colours), BadScan::Encoding { .. }));
-    let mut short = good.clone();
-    short.b_scan_img.height = u32::MAX;
-    assert!(matches!(refused(short), BadScan::Size { .. }));
-    let empty = Image {
-        encoding: "8UC1".to_owned(),
-        ..Image::default()
-    };
-    assert!(matches!(
-        empty.rows(&radar(), 0, 0).err().unwrap(),
-        BadScan::Size { .. }
-    ));
-    let mut rows = good;
-    rows.timestamps.pop();
-    assert!(matches!(refused(rows), BadScan::Rows { .. }));
+    let edits: [(fn(&mut RadarBScanMsg), &str); 4] = [
+        (|it| it.b_scan_img.encoding = "rgb8".to_owned(), "pixels"),
+        (|it| it.b_scan_img.height = u32::MAX, "rows of 8 bytes"),
+        (|it| it.b_scan_img.width = 0, "for 0 bins"),
+        (
+            |it| it.timestamps.truncate(39),
+            "40 encoder values and 39 times",
+        ),
+    ];
+    for (edit, expected) in edits {
+        let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+        edit(&mut message);
+        let refused = message.rows(&radar(), 0, 0).err().unwrap();
+        assert!(refused.contains(expected), "{refused}");
+    }
 }
 
-#[test]
-fn configurations_of_both_forms_are_the_same() {
-    let older = RadarConfigurationMessage {
+/// The configuration of a driver before 2024, with these bytes as the depth of a bin.
+fn older(bin_size: [u8; 8]) -> Result<Configuration, String> {
+    let message = RadarConfigurationMessage {
         azimuth_samples: 400_u16.to_be_bytes().to_vec(),
         encoder_size: 5600_u16.to_be_bytes().to_vec(),
-        bin_size: 438.0_f64.to_le_bytes().to_vec(),
+        bin_size: bin_size.to_vec(),
         range_in_bins: 3768_u16.to_be_bytes().to_vec(),
         expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
         ..RadarConfigurationMessage::default()
     };
-    let older = older.configuration().unwrap();
-    let newer = RadarConfigurationMsg {
+    message.configuration().map_err(|error| error.to_string())
+}
+
+fn newer(bin_size: f32) -> Result<Configuration, String> {
+    let message = RadarConfigurationMsg {
         azimuth_samples: 400,
         encoder_size: 5600,
-        bin_size: 438.0,
+        bin_size,
         range_in_bins: 3768,
         expected_rotation_rate: 4000,
         ..RadarConfigurationMsg::default()
     };
-    let newer = newer.configuration().unwrap();
-    assert_eq!(older.range_resolution_m(), 0.0438);
-    assert_eq!(newer.range_resolution_m(), 0.0438);
-    assert_eq!((older.rotation_mhz, newer.rotation_mhz), (4000, 4000));
-    assert_eq!(older.encoder_size, newer.encoder_size);
+    message.configuration().map_err(|error| error.to_string())
+}
+
+#[test]
+fn configurations_of_both_forms_are_the_same() {
+    let (older, newer) = (
+        older(438.0_f64.to_le_bytes()).unwrap(),
+        newer(438.0).unwrap(),
+    );
+    for found in [older, newer] {
+        assert_eq!(found.range_resolution_m(), 0.0438);
+        assert_eq!((found.rotation_mhz, found.encoder_size), (4000, 5600));
+        assert_eq!((found.azimuth_samples, found.range_in_bins), (400, 3768));
+    }
 }
 
 #[test]
 fn depths_of_bins_come_back_to_the_bit() {
-    for resolution_m in [
-        0.0438,
-        0.0596,
-        0.04381,
-        100.0 / 576.0,
-        200.0 / 3360.0,
-        0.175,
-        1.0 / 3.0,
-    ] {
+    let others = [100.0 / 576.0, 200.0 / 3360.0, 1.0 / 3.0];
+    for resolution_m in [0.0438, 0.0596, 0.04381, 0.175].into_iter().chain(others) {
         let radar = Configuration {
             range_resolution_m: Some(resolution_m),
             ..radar()
@@ -283,24 +195,6 @@ fn depths_of_bins_come_back_to_the_bit() {
 
 #[test]
 fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refused() {
-    let older = |bytes: [u8; 8]| {
-        let message = RadarConfigurationMessage {
-            azimuth_samples: 400_u16.to_be_bytes().to_vec(),
-            encoder_size: 5600_u16.to_be_bytes().to_vec(),
-            bin_size: bytes.to_vec(),
-            range_in_bins: 3768_u16.to_be_bytes().to_vec(),
-            expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
-            ..RadarConfigurationMessage::default()
-        };
-        message.configuration().map_err(|error| error.to_string())
-    };
-    let newer = |bin_size: f32| {
-        let message = RadarConfigurationMsg {
-            bin_size,
-            ..RadarConfigurationMsg::default()
-        };
-        message.configuration().map_err(|error| error.to_string())
-    };
     for (size, depth_m) in [
         (438.0, 0.0438),
         (0.0438, 0.0438),
@@ -326,7 +220,7 @@ fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refus
 
 #[test]
 fn times_of_rows_are_in_the_unit_in_which_the_radar_turns() {
-    let message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
     let split = |message: &RadarBScanMsg| -> Vec<_> {
         let rows = message.rows(&radar(), 0, START_NS).unwrap();
         rows.map(|row| (row.azimuth.seconds, row.azimuth.split_seconds))

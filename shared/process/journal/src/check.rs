@@ -5,12 +5,11 @@ use std::{collections::VecDeque, path::Path};
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::{Busy, File, GroupSync};
 
-use crate::{JournalError, record::RECORDS, records::Places};
+use crate::{JournalError, Records, record::RECORDS};
 
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;
 
-/// The content of a journal.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
     pub poses: u64,
@@ -30,7 +29,7 @@ pub struct Content {
 /// power failure, and it is cut off with all that follows: those poses are computed again. Else the
 /// file was damaged after it had been written.
 pub fn check(path: &Path) -> Result<Content, JournalError> {
-    let Some(mut places) = Places::open(path)? else {
+    let Some(mut places) = Records::open(path)? else {
         return Ok(Content::default());
     };
     let (mut valid, mut ended) = (0, false);
@@ -42,7 +41,7 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
         let index = places.next - 1;
         // However long the file is, the answer is known here.
         if let Some(first) = first_invalid.filter(|first| index > first + GroupSync::LIMIT) {
-            return Err(damaged(path, first));
+            return Err(JournalError::damaged(path, first));
         }
         match (place?, first_invalid) {
             // Nothing follows the end of the stream.
@@ -63,20 +62,13 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
         }
     }
     match first_invalid {
-        Some(first) if known_safe > first => Err(damaged(path, first)),
+        Some(first) if known_safe > first => Err(JournalError::damaged(path, first)),
         _ => Ok(Content {
             poses: valid - u64::from(ended),
             ended,
             torn: places.next - valid,
             last,
         }),
-    }
-}
-
-fn damaged(path: &Path, pose: u64) -> JournalError {
-    JournalError::Damaged {
-        path: path.to_owned(),
-        pose,
     }
 }
 
@@ -88,10 +80,9 @@ pub fn cut(path: &Path, records: u64) -> Result<(), JournalError> {
         let path = path.to_owned();
         return Err(Busy { path }.into());
     }
-    file.set_length(if records == 0 {
-        0
-    } else {
-        RECORDS.offset(records)
+    file.set_length(match records {
+        0 => 0,
+        _ => RECORDS.offset(records),
     })?;
     Ok(file.sync()?)
 }

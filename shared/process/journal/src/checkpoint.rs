@@ -12,8 +12,6 @@
 //! and the run continues from there.
 
 mod codec;
-#[cfg(test)]
-mod tests;
 
 use std::{
     mem,
@@ -21,13 +19,13 @@ use std::{
 };
 
 use gyre_messages::{MotionEstimate, PoseHeader};
-use gyre_scan_matching::{Keyframe, Refiner, TrackerState};
-use gyre_storage::{Busy, DurableFile, File, GroupSync, Slots, StorageError};
+use gyre_scan_matching::{Refiner, TrackerState};
+use gyre_storage::{Busy, DurableFile, GroupSync, Slots, StorageError};
 use thiserror::Error;
 
 use codec::{
-    EMPTY, KEYFRAME_WORDS, Name, StateHeader, decode_keyframe, decode_state, encode_keyframe,
-    encode_state, keyframe_name, state_bytes,
+    EMPTY, KEYFRAME_WORDS, Name, decode_keyframe, decode_state, encode_keyframe, encode_state,
+    keyframe_name, state_bytes,
 };
 
 /// The start of the file, with the version of the slots.
@@ -35,7 +33,6 @@ const MAGIC: [u8; 16] = *b"gyre map v9     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
 /// continued with a different window.
 const MAX_WINDOW: usize = 66;
-/// Number of states in the ring.
 const STATES: usize = look_back(MAX_WINDOW);
 /// Bytes of the file's header: the start, the numbers of slots of both rings, the sizes of a
 /// state's and a keyframe's slot.
@@ -56,11 +53,7 @@ pub enum CheckpointError {
     #[error(
         "{path} does not have the state of the refinement before item {item}: start again with --fresh"
     )]
-    Missing {
-        path: PathBuf,
-        /// The item whose state is missing.
-        item: u64,
-    },
+    Missing { path: PathBuf, item: u64 },
     #[error(transparent)]
     Busy(#[from] Busy),
 }
@@ -77,26 +70,17 @@ pub struct Checkpoint {
     /// keyframes of the state before it.
     map: Vec<Name>,
     earlier_map: Vec<Name>,
-    buffers: Buffers,
+    /// Memory for the slot of a state, for the one that is in the file, and for a keyframe's.
+    state: Vec<u8>,
+    found: Vec<u8>,
+    keyframe: Vec<u8>,
 }
 
-/// The places of the two rings of a file.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     states: Slots,
     keyframes: Slots,
-    /// Number of slots for keyframes.
     count: usize,
-}
-
-/// Buffers for one slot each.
-#[derive(Debug)]
-struct Buffers {
-    state: Vec<u8>,
-    found: Vec<u8>,
-    keyframe: Vec<u8>,
-    /// The name of the keyframe in its buffer.
-    encoded: Option<Name>,
 }
 
 /// Returns the path of the checkpoint of the run that writes to `out`.
@@ -109,7 +93,6 @@ pub fn checksum(motion: &MotionEstimate) -> u64 {
     crc32fast::hash(bytemuck::bytes_of(motion)).into()
 }
 
-/// Returns the slot of the state after an item.
 fn slot_of(item: u64) -> u64 {
     item % STATES as u64
 }
@@ -140,17 +123,6 @@ impl Layout {
         }
         header
     }
-
-    /// Replaces a file of another layout by an empty one.
-    fn require(&self, file: &File) -> Result<(), StorageError> {
-        let mut header = [0; HEADER_BYTES];
-        let matches = file.read_at(&mut header, 0)? && header == self.header();
-        if !matches {
-            file.set_length(0)?;
-            file.write_at(&self.header(), 0)?;
-        }
-        Ok(())
-    }
 }
 
 impl Checkpoint {
@@ -164,7 +136,13 @@ impl Checkpoint {
     ) -> Result<Self, CheckpointError> {
         let layout = Layout::of(max_keyframes, cells);
         let file = DurableFile::open(path, |file| {
-            Ok::<(), CheckpointError>(layout.require(file)?)
+            let (header, mut found) = (layout.header(), [0; HEADER_BYTES]);
+            // A file of another layout becomes an empty one.
+            if !file.read_at(&mut found, 0)? || found != header {
+                file.set_length(0)?;
+                file.write_at(&header, 0)?;
+            }
+            Ok::<(), CheckpointError>(())
         })?;
         let mut checkpoint = Self {
             file,
@@ -173,27 +151,19 @@ impl Checkpoint {
             keyframes: Vec::with_capacity(layout.count),
             map: Vec::with_capacity(max_keyframes),
             earlier_map: Vec::with_capacity(max_keyframes),
-            buffers: Buffers {
-                state: vec![0; layout.states.bytes],
-                found: vec![0; layout.states.bytes],
-                keyframe: vec![0; layout.keyframes.bytes],
-                encoded: None,
-            },
+            state: vec![0; layout.states.bytes],
+            found: vec![0; layout.states.bytes],
+            keyframe: vec![0; layout.keyframes.bytes],
         };
-        checkpoint.read_names()?;
-        Ok(checkpoint)
-    }
-
-    /// Reads the names of all keyframes.
-    fn read_names(&mut self) -> Result<(), StorageError> {
-        let Self { file, layout, .. } = self;
-        let bytes = &mut self.buffers.keyframe;
-        for slot in 0..layout.count {
-            let is_there = file.read(&layout.keyframes, slot as u64, bytes)?;
-            self.keyframes
-                .push(keyframe_name(bytes).filter(|_| is_there));
+        for slot in 0..layout.count as u64 {
+            let slots = &layout.keyframes;
+            let is_there = checkpoint
+                .file
+                .read(slots, slot, &mut checkpoint.keyframe)?;
+            let name = keyframe_name(&checkpoint.keyframe).filter(|_| is_there);
+            checkpoint.keyframes.push(name);
         }
-        Ok(())
+        Ok(checkpoint)
     }
 
     /// Writes the state after `item`, which led to a motion with this checksum: first the new
@@ -207,18 +177,17 @@ impl Checkpoint {
         refiner: &Refiner,
     ) -> Result<(), CheckpointError> {
         self.name_keyframes(item, refiner);
-        let header = StateHeader { item, motion };
-        let (file, states, slot) = (&self.file, self.layout.states, slot_of(item));
-        let Buffers { state, found, .. } = &mut self.buffers;
-        encode_state(header, &self.map, refiner.state(), state);
-        let known = file.read(&states, slot, found)? && found == state;
+        let (states, slot) = (self.layout.states, slot_of(item));
+        encode_state((item, motion), &self.map, refiner.state(), &mut self.state);
+        let is_there = self.file.read(&states, slot, &mut self.found)?;
+        let known = is_there && self.found == self.state;
         if !known {
             self.erase_keyframes_from(item)?;
         }
         self.write_keyframes(refiner)?;
         if !known {
-            self.file.write(&states, slot, &self.buffers.state)?;
-            self.file.changed()?;
+            self.file.write(&states, slot, &self.state)?;
+            self.file.sync.changed()?;
         }
         Ok(())
     }
@@ -232,9 +201,8 @@ impl Checkpoint {
             let starts_map = k == 0 && keyframe.id.checked_add(1) == Some(item);
             let mut earlier = self.earlier_map.iter();
             let named = earlier.find(|name| name.id == keyframe.id && !starts_map);
-            let name = named
-                .copied()
-                .unwrap_or_else(|| self.buffers.encode(keyframe));
+            let name = named.copied();
+            let name = name.unwrap_or_else(|| encode_keyframe(keyframe, &mut self.keyframe));
             self.map.push(name);
         }
     }
@@ -246,14 +214,10 @@ impl Checkpoint {
             if self.keyframes.contains(&Some(name)) {
                 continue;
             }
-            if self.buffers.encoded != Some(name) {
-                self.buffers.encode(keyframe);
-            }
-            let slot = self.free_slot();
+            encode_keyframe(keyframe, &mut self.keyframe);
+            let (slots, slot) = (self.layout.keyframes, self.free_slot());
             self.keyframes[slot] = Some(name);
-            let keyframes = &self.layout.keyframes;
-            self.file
-                .write(keyframes, slot as u64, &self.buffers.keyframe)?;
+            self.file.write(&slots, slot as u64, &self.keyframe)?;
         }
         Ok(())
     }
@@ -263,8 +227,8 @@ impl Checkpoint {
         for slot in 0..self.keyframes.len() {
             let obsolete = |name: &Name| name.id >= item && !self.map.contains(name);
             if self.keyframes[slot].as_ref().is_some_and(obsolete) {
-                self.file
-                    .write(&self.layout.keyframes, slot as u64, &EMPTY)?;
+                let slots = &self.layout.keyframes;
+                self.file.write(slots, slot as u64, &EMPTY)?;
                 self.keyframes[slot] = None;
             }
         }
@@ -275,35 +239,28 @@ impl Checkpoint {
     /// restart.
     fn free_slot(&self) -> usize {
         let used = self.keyframes.iter().flatten().count();
-        let empty = self
-            .keyframes
-            .iter()
-            .position(Option::is_none)
-            .filter(|_| used < self.kept);
-        let oldest = || {
-            (0..self.keyframes.len())
-                .filter(|slot| self.keyframes[*slot].is_some())
-                .min_by_key(|slot| self.keyframes[*slot])
-        };
-        empty.or_else(oldest).unwrap_or(0)
+        let mut slots = self.keyframes.iter();
+        let empty = slots.position(Option::is_none);
+        let named = self.keyframes.iter().enumerate();
+        let oldest = named.filter(|(_, name)| name.is_some());
+        let oldest = oldest.min_by_key(|(_, name)| **name).map(|(slot, _)| slot);
+        let empty = empty.filter(|_| used < self.kept);
+        empty.or(oldest).unwrap_or(0)
     }
 
-    /// Reads the state after `item` and the names of its keyframes; `None` if the file does not
-    /// have it whole.
-    fn read_state(
-        &mut self,
-        item: u64,
-    ) -> Result<Option<(StateHeader, TrackerState)>, StorageError> {
-        let (states, found) = (&self.layout.states, &mut self.buffers.found);
-        let whole = self.file.read(states, slot_of(item), found)?;
-        let state = decode_state(found, &mut self.map);
-        Ok(state.filter(|(header, _)| whole && header.item == item))
+    /// Reads the state after `item` with the checksum of its motion, and the names of its keyframes;
+    /// `None` if the file does not have it whole.
+    fn read_state(&mut self, item: u64) -> Result<Option<(u64, TrackerState)>, StorageError> {
+        let states = &self.layout.states;
+        let whole = self.file.read(states, slot_of(item), &mut self.found)?;
+        let state = decode_state(&self.found, &mut self.map);
+        let state = state.filter(|((of, _), _)| whole && *of == item);
+        Ok(state.map(|((_, motion), tracker)| (motion, tracker)))
     }
 
-    /// Restores the state after `item`.
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
-            path: self.file.file().path().to_owned(),
+            path: self.file.file.path().to_owned(),
             item: item.saturating_add(1),
         };
         let Some((_, tracker)) = self.read_state(item)? else {
@@ -312,8 +269,7 @@ impl Checkpoint {
         let places: Vec<Option<u64>> = self.map.iter().map(|name| self.place_of(*name)).collect();
         let mut keyframes = self.map.iter().zip(places);
         let (file, slots) = (&self.file, &self.layout.keyframes);
-        let bytes = &mut self.buffers.keyframe;
-        self.buffers.encoded = None;
+        let bytes = &mut self.keyframe;
         refiner.restore(tracker, |keyframe| {
             let Some((name, Some(slot))) = keyframes.next() else {
                 return false;
@@ -327,17 +283,9 @@ impl Checkpoint {
         }
     }
 
-    /// Returns the slot of a keyframe, if it is in the file.
     fn place_of(&self, name: Name) -> Option<u64> {
         let slot = self.keyframes.iter().position(|slot| *slot == Some(name));
         slot.map(|slot| slot as u64)
-    }
-
-    /// Returns whether the whole state after a pose is in the file.
-    fn knows(&mut self, pose: &PoseHeader) -> Result<bool, StorageError> {
-        let state = self.read_state(pose.item.seq)?;
-        let led_to_it = state.is_some_and(|(header, _)| header.motion == checksum(&pose.motion));
-        Ok(led_to_it && self.map.iter().all(|name| self.place_of(*name).is_some()))
     }
 
     /// Returns the newest of these poses, given newest first, that a run can continue from: the one
@@ -347,18 +295,14 @@ impl Checkpoint {
         poses: impl IntoIterator<Item = &'a PoseHeader>,
     ) -> Result<Option<&'a PoseHeader>, CheckpointError> {
         for pose in poses {
-            if self.knows(pose)? {
+            let motion = checksum(&pose.motion);
+            let state = self.read_state(pose.item.seq)?;
+            if state.is_some_and(|(led_to, _)| led_to == motion)
+                && self.map.iter().all(|name| self.place_of(*name).is_some())
+            {
                 return Ok(Some(pose));
             }
         }
         Ok(None)
-    }
-}
-
-impl Buffers {
-    fn encode(&mut self, keyframe: &Keyframe) -> Name {
-        let name = encode_keyframe(keyframe, &mut self.keyframe);
-        self.encoded = Some(name);
-        name
     }
 }

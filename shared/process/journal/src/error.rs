@@ -1,6 +1,6 @@
 //! The error of a journal.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use gyre_storage::{Busy, StorageError};
 use thiserror::Error;
@@ -19,4 +19,11 @@ pub enum JournalError {
     Damaged { path: PathBuf, pose: u64 },
     #[error(transparent)]
     Busy(#[from] Busy),
+}
+
+impl JournalError {
+    pub(crate) fn damaged(path: &Path, pose: u64) -> Self {
+        let path = path.to_owned();
+        Self::Damaged { path, pose }
+    }
 }

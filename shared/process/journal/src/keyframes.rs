@@ -1,9 +1,6 @@
 //! The keyframes of a run: selected among its poses, and logged before those are journalled.
 
-use std::{
-    mem,
-    path::{Path, PathBuf},
-};
+use std::{mem, path::Path};
 
 use gyre_geometry::SparsePoint;
 use gyre_messages::PoseHeader;
@@ -13,15 +10,16 @@ use thiserror::Error;
 
 use crate::JournalError;
 
-/// An error of the keyframes of a run.
+/// An error of the keyframes or of the scans of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
     #[error(transparent)]
     Log(#[from] LogError),
     #[error(transparent)]
     Journal(#[from] JournalError),
-    #[error("{path} lacks the keyframe of pose {pose}: the same command computes it anew")]
-    Missing { path: PathBuf, pose: u64 },
+    /// They are fewer than the poses of the journal need.
+    #[error("{0}")]
+    Missing(String),
 }
 
 /// The keyframes of a run, open for appending.
@@ -29,7 +27,6 @@ pub enum KeyframesError {
 pub struct Keyframes {
     log: RecordLog<Keyframe>,
     builder: KeyframeBuilder,
-    /// Memory for the points of a keyframe.
     points: Vec<SparsePoint>,
 }
 
@@ -39,21 +36,24 @@ impl Keyframes {
     /// the last one is recovered from the journal.
     pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, KeyframesError> {
         let mut log = RecordLog::open(out)?;
-        let found = find(log.len(), poses, |index| log.read(index))?;
+        let (keyframes, last) = newest(log.len(), poses, |index| log.read(index))?;
         // The end of the keyframes is before the end of the journal.
         if !ended {
-            log.cut(found.keyframes)?;
+            log.cut(keyframes)?;
         }
-        match recover(out, &found, poses)? {
+        match recover(out, last.as_ref(), poses)? {
             (builder, None) => Ok(Self {
                 log,
                 builder,
                 points: Vec::new(),
             }),
-            (_, Some(pose)) => Err(KeyframesError::Missing {
-                path: records_path::<Keyframe>(out),
-                pose,
-            }),
+            (_, Some(pose)) => {
+                let path = records_path::<Keyframe>(out);
+                Err(KeyframesError::Missing(format!(
+                    "{} lacks the keyframe of pose {pose}: the same command computes it anew",
+                    path.display()
+                )))
+            }
         }
     }
 
@@ -98,56 +98,45 @@ impl Keyframes {
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
 pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
     let mut reader = RecordReader::open(out)?;
-    let found = find(reader.len(), poses, |index| reader.read(index))?;
-    let (_, missing) = recover(out, &found, poses)?;
+    let (_, last) = newest(reader.len(), poses, |index| reader.read(index))?;
+    let (_, missing) = recover(out, last.as_ref(), poses)?;
     Ok(missing.unwrap_or(poses))
 }
 
-/// The keyframes of a journal.
-struct Found {
-    keyframes: usize,
-    last: Option<Keyframe>,
-}
-
-/// Finds the last one of `keyframes` keyframes that is among the first `poses` poses.
-fn find(
+/// Returns the last one of `keyframes` keyframes that is among the first `poses` poses, and how many
+/// there are up to it.
+fn newest(
     keyframes: usize,
     poses: u64,
     mut read: impl FnMut(usize) -> Result<Keyframe, LogError>,
-) -> Result<Found, LogError> {
-    for index in (0..keyframes).rev() {
-        let keyframe = read(index)?;
+) -> Result<(usize, Option<Keyframe>), LogError> {
+    for count in (1..=keyframes).rev() {
+        let keyframe = read(count - 1)?;
         if keyframe.seq < poses {
-            return Ok(Found {
-                keyframes: index + 1,
-                last: Some(keyframe),
-            });
+            return Ok((count, Some(keyframe)));
         }
     }
-    Ok(Found {
-        keyframes: 0,
-        last: None,
-    })
+    Ok((0, None))
 }
 
 /// Takes the poses of the journal since the last keyframe again. Returns the first one that lacks
 /// its keyframe, if there is one.
 fn recover(
     out: &Path,
-    found: &Found,
+    newest: Option<&Keyframe>,
     poses: u64,
 ) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
     let mut builder = KeyframeBuilder::default();
-    let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
+    let last = newest.map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
     // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;
         let seq = pose.item.seq;
-        match &found.last {
+        match newest {
             // The pose of the journal, since the keyframe's yaw is rounded differently.
-            Some(last) if last.seq == seq => builder.resume(&pose.pose(), last.path_m),
+            Some(newest) if newest.seq == seq => builder.resume(&pose.pose(), newest.path_m),
             _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
             _ => {}
         }

@@ -31,7 +31,6 @@ pub use gyre_storage::continue_when_full;
 use record::{MAGIC, RECORD, RECORDS, Record};
 pub use records::{Records, records, records_from};
 
-/// A journal open for appending.
 #[derive(Debug)]
 pub struct Journal {
     file: DurableFile,
@@ -85,12 +84,8 @@ impl Journal {
             }
             let whole = self.file.read(&RECORDS, index, &mut bytes)?;
             let record = Record::decode(&bytes, index).filter(|_| whole);
-            let pose = record
-                .map(|record| record.pose)
-                .ok_or_else(|| JournalError::Damaged {
-                    path: self.file.file().path().to_owned(),
-                    pose: index,
-                })?;
+            let damaged = || JournalError::damaged(self.file.file.path(), index);
+            let pose = record.ok_or_else(damaged)?.pose;
             match pose.item.is(flag::END) {
                 true => ended = true,
                 false => poses.push(pose),
@@ -102,21 +97,25 @@ impl Journal {
 
     /// Appends a pose, or the end of the stream.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
-        let safe = self.file.safe().map_or(0, |appended| self.found + appended);
+        let safe = self
+            .file
+            .sync
+            .safe()
+            .map_or(0, |appended| self.found + appended);
         let record = Record {
             pose: *pose,
             in_danger: u32::try_from(self.records - safe).unwrap_or(u32::MAX),
         };
         record.encode(&mut self.buffer);
         self.file.write(&RECORDS, self.records, &self.buffer)?;
-        self.file.file().require_name()?;
+        self.file.file.require_name()?;
         self.records += 1;
-        Ok(self.file.changed()?)
+        Ok(self.file.sync.changed()?)
     }
 
     /// Waits until all that was appended survives a power failure.
     pub fn sync(&self) -> Result<(), JournalError> {
-        self.file.file().require_name()?;
-        Ok(self.file.finish()?)
+        self.file.file.require_name()?;
+        Ok(self.file.sync.finish()?)
     }
 }

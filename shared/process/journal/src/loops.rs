@@ -8,7 +8,6 @@ use gyre_messages::{Item, LoopHeader};
 use gyre_slam::{Keyframe, LoopCandidate, Query, RecordReader};
 use gyre_storage::LogError;
 
-/// The loops of a run so far.
 pub struct LoggedLoops {
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,

@@ -8,16 +8,15 @@ use gyre_slam::Record;
 use gyre_storage::LogMagic;
 use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::record::split;
+
 /// The objects at the time of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedObjects {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
-    /// The sensor's own number of the scan.
     pub scan: u64,
-    /// Time of the scan, ns.
     pub stamp_ns: i64,
-    /// The objects, in the frame of the odometry.
     pub objects: Vec<Object>,
 }
 
@@ -44,7 +43,6 @@ fn packed(matrix: &Matrix2<f64>) -> [f64; 3] {
     [matrix.m11, matrix.m12, matrix.m22]
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -53,7 +51,6 @@ struct Fixed {
     stamp_ns: i64,
 }
 
-/// An object in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct FixedObject {
@@ -87,19 +84,12 @@ impl Record for LoggedObjects {
     }
 
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (fixed, objects) = bytes.split_at_checked(size_of::<Fixed>())?;
-        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        if objects.len() % size_of::<FixedObject>() != 0 {
-            return None;
-        }
-        let objects = objects.chunks_exact(size_of::<FixedObject>());
-        let object =
-            |bytes: &[u8]| Object::from(&bytemuck::pod_read_unaligned::<FixedObject>(bytes));
+        let (fixed, objects) = split::<Fixed, FixedObject>(bytes)?;
         Some(Self {
             seq: fixed.seq,
             scan: fixed.scan,
             stamp_ns: fixed.stamp_ns,
-            objects: objects.map(object).collect(),
+            objects: objects.map(|object| Object::from(&object)).collect(),
         })
     }
 }

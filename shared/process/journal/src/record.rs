@@ -1,5 +1,6 @@
-//! The binary layout of a journal and of its records.
+//! The binary layout of a journal and of its records, and of records of other logs.
 
+use bytemuck::{AnyBitPattern, pod_read_unaligned};
 use gyre_messages::PoseHeader;
 use gyre_storage::{Checksum, Slots};
 
@@ -37,10 +38,21 @@ impl Record {
     /// wrong place is not valid.
     pub fn decode(bytes: &[u8], index: u64) -> Option<Self> {
         let record = Self {
-            pose: bytemuck::pod_read_unaligned(bytes.get(..POSE)?),
+            pose: pod_read_unaligned(bytes.get(..POSE)?),
             in_danger: u32::from_le_bytes(*bytes[POSE..].first_chunk()?),
         };
         let is_valid = Checksum::Last.is_right(bytes) && record.pose.item.seq == index;
         is_valid.then_some(record)
     }
+}
+
+/// Splits a record into its part of fixed length and the items behind it; `None` if it ends within
+/// one.
+pub(crate) fn split<F: AnyBitPattern, T: AnyBitPattern>(
+    bytes: &[u8],
+) -> Option<(F, impl Iterator<Item = T> + '_)> {
+    let (fixed, items) = bytes.split_at_checked(size_of::<F>())?;
+    let items = items.chunks_exact(size_of::<T>());
+    let is_whole = items.remainder().is_empty();
+    is_whole.then(|| (pod_read_unaligned(fixed), items.map(pod_read_unaligned)))
 }

@@ -7,37 +7,28 @@ use std::{
 };
 
 use gyre_messages::PoseHeader;
-use gyre_storage::StorageError;
+use gyre_storage::{StorageError, may_begin};
 
 use crate::{
     JournalError,
     record::{ANY_VERSION, MAGIC, RECORD, RECORDS, Record},
 };
 
-/// Bytes that are read at once.
 const BUFFER: usize = 1 << 20;
 
 /// The records of a journal, oldest first. An incomplete one at the end is left out.
 #[derive(Debug)]
 pub struct Records {
-    places: Places,
-}
-
-/// All places of a journal that can hold a record, valid or not.
-#[derive(Debug)]
-pub(crate) struct Places {
     path: PathBuf,
     reader: BufReader<File>,
     bytes: Box<[u8; RECORD]>,
-    pub next: u64,
-    /// True if the header is whole.
-    pub has_header: bool,
+    pub(crate) next: u64,
+    pub(crate) has_header: bool,
 }
 
 /// Opens a journal to read it; `None` without a journal.
 pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
-    let places = Places::open(path)?.filter(|places| places.has_header);
-    Ok(places.map(|places| Records { places }))
+    Ok(Records::open(path)?.filter(|records| records.has_header))
 }
 
 /// As [`records`], from the pose number `first` on.
@@ -45,13 +36,9 @@ pub fn records_from(path: &Path, first: u64) -> Result<Option<Records>, JournalE
     let Some(mut records) = records(path)? else {
         return Ok(None);
     };
-    let start = SeekFrom::Start(RECORDS.offset(first));
-    let places = &mut records.places;
-    places
-        .reader
-        .seek(start)
-        .map_err(StorageError::at("read", path))?;
-    places.next = first;
+    let sought = records.reader.seek(SeekFrom::Start(RECORDS.offset(first)));
+    sought.map_err(StorageError::at("read", path))?;
+    records.next = first;
     Ok(Some(records))
 }
 
@@ -59,20 +46,17 @@ impl Iterator for Records {
     type Item = Result<PoseHeader, JournalError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let at = self.places.next;
-        match self.places.read()? {
-            Ok(Some(record)) => Some(Ok(record.pose)),
-            Ok(None) => Some(Err(JournalError::Damaged {
-                path: self.places.path.clone(),
-                pose: at,
-            })),
-            Err(error) => Some(Err(error)),
-        }
+        let index = self.next;
+        Some(self.read()?.and_then(|record| {
+            let record = record.ok_or_else(|| JournalError::damaged(&self.path, index))?;
+            Ok(record.pose)
+        }))
     }
 }
 
-impl Places {
-    pub fn open(path: &Path) -> Result<Option<Self>, JournalError> {
+impl Records {
+    /// Opens a journal whose header may be torn.
+    pub(crate) fn open(path: &Path) -> Result<Option<Self>, JournalError> {
         let failed = StorageError::at("read", path);
         let file = match gyre_storage::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -80,32 +64,23 @@ impl Places {
         };
         let mut reader = BufReader::with_capacity(BUFFER, file);
         let mut header = Vec::with_capacity(MAGIC.len());
-        reader
-            .by_ref()
-            .take(MAGIC.len() as u64)
-            .read_to_end(&mut header)
-            .map_err(&failed)?;
-        // A power failure leaves a beginning of the header, and zeros behind it.
-        let torn = header
-            .iter()
-            .zip(MAGIC)
-            .skip_while(|(found, magic)| *found == magic)
-            .all(|(found, _)| *found == 0);
-        match torn {
-            true => Ok(Some(Self {
-                path: path.to_owned(),
-                reader,
-                bytes: Box::new([0; RECORD]),
-                next: 0,
-                has_header: header == MAGIC,
-            })),
-            false => Err(refused(&header, path)),
+        let mut start = reader.by_ref().take(MAGIC.len() as u64);
+        start.read_to_end(&mut header).map_err(&failed)?;
+        if !may_begin(&header, &MAGIC) {
+            return Err(refused(&header, path));
         }
+        Ok(Some(Self {
+            path: path.to_owned(),
+            reader,
+            bytes: Box::new([0; RECORD]),
+            next: 0,
+            has_header: header == MAGIC,
+        }))
     }
 
     /// Reads the next place: its record, or `None` if it is not valid. Ends at the last complete
     /// place.
-    pub fn read(&mut self) -> Option<Result<Option<Record>, JournalError>> {
+    pub(crate) fn read(&mut self) -> Option<Result<Option<Record>, JournalError>> {
         match self.reader.read_exact(&mut self.bytes[..]) {
             Ok(()) => {
                 let index = self.next;

@@ -1,21 +1,22 @@
 //! The scans of a run with their poses and points, logged before those poses are journalled: for
 //! followers that need each scan, and not only keyframes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
 use gyre_messages::PoseHeader;
 use gyre_slam::{Record, RecordLog, RecordReader, records_path};
 use gyre_storage::{LogError, LogMagic};
-use thiserror::Error;
+
+pub use crate::keyframes::KeyframesError as ScansError;
+use crate::record::split;
 
 /// A scan with its pose and its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
-    /// The sensor's own number of the scan.
     pub scan: u64,
     /// Time of the scan, the middle of the sweep, ns.
     pub stamp_ns: i64,
@@ -23,11 +24,9 @@ pub struct LoggedScan {
     pub pose: Pose,
     /// Velocity of the sensor, from the motion into the scan; zero where the chain starts.
     pub twist: Twist,
-    /// The points as measured.
     pub points: Vec<SparsePoint>,
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -62,29 +61,20 @@ impl Record for LoggedScan {
     const MAGIC: LogMagic = *b"gyre scans 1   \n";
 
     fn encode(&self, bytes: &mut Vec<u8>) {
-        let Twist {
-            vx_mps,
-            vy_mps,
-            yaw_rate_radps,
-        } = self.twist;
+        let twist = &self.twist;
         let fixed = Fixed {
             seq: self.seq,
             scan: self.scan,
             stamp_ns: self.stamp_ns,
             pose: xy_yaw(&self.pose),
-            twist: [vx_mps, vy_mps, yaw_rate_radps],
+            twist: [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps],
         };
         bytes.extend_from_slice(bytemuck::bytes_of(&fixed));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.points));
     }
 
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (fixed, points) = bytes.split_at_checked(size_of::<Fixed>())?;
-        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        if points.len() % size_of::<SparsePoint>() != 0 {
-            return None;
-        }
-        let points = points.chunks_exact(size_of::<SparsePoint>());
+        let (fixed, points) = split::<Fixed, SparsePoint>(bytes)?;
         let ([x, y, yaw], [vx_mps, vy_mps, yaw_rate_radps]) = (fixed.pose, fixed.twist);
         Some(Self {
             seq: fixed.seq,
@@ -96,23 +86,9 @@ impl Record for LoggedScan {
                 vy_mps,
                 yaw_rate_radps,
             },
-            points: points.map(bytemuck::pod_read_unaligned).collect(),
+            points: points.collect(),
         })
     }
-}
-
-/// An error of the scans of a run.
-#[derive(Debug, Error)]
-pub enum ScansError {
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error("{path} has {scans} scans of {poses} poses: the same command computes them anew")]
-    Missing {
-        path: PathBuf,
-        scans: u64,
-        /// The poses of the journal.
-        poses: u64,
-    },
 }
 
 /// The scans of a run, open for appending.
@@ -131,7 +107,10 @@ impl Scans {
         let scans = log.len() as u64;
         if scans < poses {
             let path = records_path::<LoggedScan>(out);
-            return Err(ScansError::Missing { path, scans, poses });
+            return Err(ScansError::Missing(format!(
+                "{} has {scans} scans of {poses} poses: the same command computes them anew",
+                path.display()
+            )));
         }
         // The end of the scans is before the end of the journal.
         if !ended {

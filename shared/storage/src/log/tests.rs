@@ -45,19 +45,6 @@ fn corrupt(path: &Path, index: usize, byte: usize) {
 }
 
 #[test]
-fn appended_records_are_read_back_and_appended_to() {
-    let (_folder, path) = log_of(50);
-    require_records(&path, 50);
-    let mut log = Log::open(&path, MAGIC).unwrap();
-    assert_eq!(log.len(), 50);
-    log.append(&record(50)).unwrap();
-    require_records(&path, 51);
-    let mut bytes = Vec::new();
-    log.read(50, &mut bytes).unwrap();
-    assert_eq!(bytes, record(50));
-}
-
-#[test]
 fn an_incomplete_record_at_the_end_is_not_seen_and_cut_off_whatever_its_length() {
     let (_folder, path) = log_of(4);
     let complete = fs::read(&path).unwrap();
@@ -210,36 +197,17 @@ fn another_programs_file_is_refused_and_left_as_it_is() {
 }
 
 #[test]
-fn two_processes_do_not_append_to_one_log() {
-    let (_folder, path) = log_of(2);
-    let _first = Log::open(&path, MAGIC).unwrap();
-    assert!(matches!(Log::open(&path, MAGIC), Err(LogError::Busy(_))));
-}
-
-#[test]
 fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
     let (_folder, path) = log_of(0);
     let mut log = Log::open(&path, MAGIC).unwrap();
     log.append(&record(1)).unwrap();
     for _ in 0..10 * LIMIT {
         log.rely().unwrap();
-        let safe = log.file.safe().unwrap_or(0);
+        let safe = log.file.sync.safe().unwrap_or(0);
         assert!(log.changes - safe <= GroupSync::LIMIT);
     }
     // The record is safe, and nothing more is counted.
     assert!(log.changes <= 2 * GroupSync::LIMIT);
-}
-
-#[test]
-fn an_impossibly_long_file_is_refused_at_once() {
-    let (_folder, path) = log_of(3);
-    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(1 << 40).unwrap();
-    let error = LogReader::open(&path, MAGIC).unwrap_err();
-    assert!(
-        matches!(error, LogError::Damaged { record: 3, .. }),
-        "{error}"
-    );
 }
 
 #[test]

@@ -6,7 +6,6 @@ use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     sensor_msgs::Image,
-    std_msgs::Header,
 };
 
 use crate::bags::{
@@ -21,25 +20,21 @@ pub(crate) struct Described {
     pub azimuth_offset: u16,
 }
 
-/// Returns the description in a message of a topic of configurations.
 pub(crate) fn described(form: Form, message: &Message) -> Result<Described, String> {
-    match form {
+    let (radar, azimuth_offset) = match form {
         Form::Numbers => {
             let message: RadarConfigurationMsg = of(message)?;
-            Ok(Described {
-                radar: message.configuration().map_err(|e| e.to_string())?,
-                azimuth_offset: message.azimuth_offset,
-            })
+            (message.configuration(), message.azimuth_offset)
         }
         Form::Bytes => {
             let message: RadarConfigurationMessage = of(message)?;
-            let radar = message.configuration().map_err(|e| e.to_string())?;
-            Ok(Described {
-                radar,
-                azimuth_offset: 0,
-            })
+            (message.configuration(), 0)
         }
-    }
+    };
+    Ok(Described {
+        radar: radar.map_err(|e| e.to_string())?,
+        azimuth_offset,
+    })
 }
 
 /// Calls `each` with the azimuths in a message of a scan topic and their receive times, ns.
@@ -56,38 +51,28 @@ pub(crate) fn azimuths(
     match kind {
         Kind::Azimuths(Form::Numbers) => {
             let azimuth: RadarFftDataMsg = of(message)?;
-            each(azimuth.azimuth(), received_ns(&azimuth.header, message));
+            each(azimuth.azimuth(), azimuth.header.stamp_or(message.log_ns));
         }
         Kind::Azimuths(Form::Bytes) => {
             let azimuth: RadarFftDataMessage = of(message)?;
-            let received_ns = received_ns(&azimuth.header, message);
+            let received_ns = azimuth.header.stamp_or(message.log_ns);
             each(azimuth.azimuth().map_err(|e| e.to_string())?, received_ns);
         }
         Kind::BScans => {
             // The stamp in its header is the radar's.
             let scan: RadarBScanMsg = of(message)?;
-            let rows = scan.rows(radar, *azimuth_offset, message.log_ns);
-            let rows = rows.map_err(|e| e.to_string())?;
+            let rows = scan.rows(radar, *azimuth_offset, message.log_ns)?;
             rows.for_each(|row| each(row.azimuth, row.arrived_ns));
         }
         Kind::Images => {
             let image: Image = of(message)?;
-            let received_ns = received_ns(&image.header, message);
-            let rows = image.rows(radar, *azimuth_offset, received_ns);
-            let rows = rows.map_err(|e| e.to_string())?;
+            let received_ns = image.header.stamp_or(message.log_ns);
+            let rows = image.rows(radar, *azimuth_offset, received_ns)?;
             rows.for_each(|row| each(row.azimuth, row.arrived_ns));
         }
         Kind::Configuration(_) => {}
     }
     Ok(())
-}
-
-/// Returns when the driver received the content of a message, or else when the bag received it.
-fn received_ns(header: &Header, message: &Message) -> i64 {
-    match header.stamp.ns() {
-        0 => message.log_ns,
-        stamp_ns => stamp_ns,
-    }
 }
 
 pub(crate) fn of<T: Ros2Message>(message: &Message) -> Result<T, String> {

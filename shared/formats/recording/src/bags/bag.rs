@@ -22,7 +22,6 @@ use crate::{
 /// The description that a radar gives of itself, or why that cannot be used.
 type OwnDescription = Result<Described, String>;
 
-/// The files of a bag, and the spans of the messages in them.
 pub(crate) struct Bag {
     path: PathBuf,
     pub files: Vec<McapFile>,
@@ -30,7 +29,6 @@ pub(crate) struct Bag {
     spans: Vec<Placed>,
 }
 
-/// A span of a file.
 struct Placed {
     file: usize,
     span: Span,
@@ -44,7 +42,6 @@ struct Placed {
 pub(crate) struct Key {
     /// When the message was received, ns.
     ns: i64,
-    /// The number of its span.
     pub span: u32,
     /// The number in the span, among those that are wanted.
     number: u32,
@@ -58,7 +55,6 @@ const OVERLAP_NS: u64 = 1_000_000_000;
 /// The start of what zstd has compressed. No message in CDR begins so.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// A file with the spans of its messages and the times of all.
 type Timed = (McapFile, Vec<TimedSpan>, Times);
 
 impl Bag {
@@ -101,7 +97,6 @@ impl Bag {
         Ok(bag)
     }
 
-    /// Returns the file of a span.
     pub fn file_of(&self, span: u32) -> Option<&McapFile> {
         self.files.get(self.spans.get(span as usize)?.file)
     }
@@ -118,13 +113,10 @@ impl Bag {
             return Ok(Vec::new());
         };
         let messages = match self.files[placed.file].read(placed.span, wanted) {
-            Err(RecordingError::Damaged { .. }) => Vec::new(),
+            Err(RecordingError::Damaged(_)) => Vec::new(),
             read => read?,
         };
-        if messages
-            .iter()
-            .any(|message| message.data.starts_with(&ZSTD))
-        {
+        if messages.iter().any(|it| it.data.starts_with(&ZSTD)) {
             return Err(compressed(&self.files[placed.file].path));
         }
         let key = |(number, message): (u32, Message)| {
@@ -142,12 +134,9 @@ impl Bag {
     ) -> Result<(), RecordingError> {
         let mut waiting = BTreeMap::new();
         for span in 0..=self.spans.len() as u32 {
-            let ns = self
-                .spans
-                .get(span as usize)
-                .map_or(i64::MAX, |it| it.from_ns);
+            let placed = self.spans.get(span as usize);
             let next = Key {
-                ns,
+                ns: placed.map_or(i64::MAX, |it| it.from_ns),
                 span,
                 number: 0,
             };
@@ -167,40 +156,58 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Describes the radar by its first configuration, or else by its azimuths and the options.
-    /// Also returns notes on the description.
+    /// Describes the radar by its first configuration, or else by its azimuths and the options. Also
+    /// returns where the description is from, to follow the topic in a sentence.
     pub fn describe(
         &mut self,
         topics: &Topics,
         options: &DatasetOptions,
-    ) -> Result<(Described, Origin), RecordingError> {
+    ) -> Result<(Described, String), RecordingError> {
         let (survey, own) = self.survey(topics)?;
         let usual = match &own {
             Some(Ok(own)) => own.radar.encoder_size,
             _ => ENCODER_COUNTS,
         };
-        let shown = survey.other_counts(usual, matches!(own, Some(Ok(_))));
+        let is_own = matches!(own, Some(Ok(_)));
+        let said = if is_own { " as it says" } else { "" };
+        let shown = survey.other_counts(usual, is_own);
         let (size, counts) = match (options.encoder_counts, shown) {
-            (Some(size), _) => (size, CountsOrigin::Configured),
-            (None, Some(size)) => (size, CountsOrigin::Azimuths { usual }),
-            (None, None) => (usual, CountsOrigin::Usual),
+            (Some(size), _) => (size, " as configured".to_owned()),
+            (None, Some(size)) => {
+                let step =
+                    "with these the step from the last azimuth to the first is as the others";
+                (size, format!(", not {usual}{said}: {step}"))
+            }
+            (None, None) if is_own => (usual, " as it says too".to_owned()),
+            (None, None) => (usual, " as most radars have".to_owned()),
         };
-        if let Some(Ok(mut described)) = own {
-            described.radar.encoder_size = size;
-            let radar = RadarOrigin::Itself;
-            return Ok((described, Origin { radar, counts }));
-        }
-        let refused = own.and_then(Result::err);
-        if let (Some(reason), None) = (&refused, options.range_resolution_m) {
-            let reason = format!(
-                "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
-                 dataset.range_resolution_m"
-            );
-            return Err(RecordingError::unreadable(&self.path, reason));
-        }
-        let described = survey.describe(&self.path, options.range_resolution_m, size)?;
-        let radar = RadarOrigin::Scans { refused };
-        Ok((described, Origin { radar, counts }))
+        let resolution_m = options.range_resolution_m;
+        let ((mut described, before), after) = match own {
+            Some(Ok(own)) => ((own, ", ".to_owned()), "as the radar says of itself"),
+            Some(Err(reason)) if resolution_m.is_none() => {
+                let reason = format!(
+                    "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
+                     dataset.range_resolution_m"
+                );
+                return Err(RecordingError::unreadable(&self.path, reason));
+            }
+            refused => {
+                let before = match refused.and_then(Result::err) {
+                    Some(reason) => {
+                        format!("what the radar says of itself cannot be used ({reason})")
+                    }
+                    None => "the radar does not describe itself in the bag".to_owned(),
+                };
+                let described = survey.describe(&self.path, resolution_m, size)?;
+                ((described, format!("; {before}: ")), "are as found")
+            }
+        };
+        let radar = &mut described.radar;
+        radar.encoder_size = size;
+        let (azimuths, bins) = (radar.azimuth_samples, radar.range_in_bins);
+        let found = format!("{azimuths} azimuths of {bins} bins {after}");
+        let note = format!("{before}{found}, {size} encoder counts per turn{counts}");
+        Ok((described, note))
     }
 
     /// Looks at the first messages with scans, and for the first configuration that can be used, or
@@ -235,16 +242,14 @@ impl Bag {
     ) -> Option<OwnDescription> {
         let topic = topics.configuration.as_ref()?;
         let channel = self.file_of(span)?.channels.get(&message.channel)?;
-        match topic.kind {
-            Kind::Configuration(form) if channel.topic == topic.name => {
-                let described = described(form, message);
-                Some(described.and_then(|described| {
-                    let checked = described.radar.check();
-                    checked.map(|()| described).map_err(|e| e.to_string())
-                }))
-            }
-            _ => None,
-        }
+        let Kind::Configuration(form) = topic.kind else {
+            return None;
+        };
+        (channel.topic == topic.name).then(|| {
+            let described = described(form, message)?;
+            let checked = described.radar.check();
+            checked.map(|()| described).map_err(|e| e.to_string())
+        })
     }
 }
 
@@ -252,19 +257,15 @@ impl Bag {
 /// damage, which may hide one, is read as a whole.
 fn timed(path: &Path) -> Result<Timed, RecordingError> {
     let mut file = McapFile::open(path)?;
-    let found = spans(&mut file)?;
-    for span in found.summary {
-        file.read(span, |_| false)?;
-    }
+    let spans = spans(&mut file)?;
     if file.channels.is_empty() || !file.damage.is_empty() {
-        for span in &found.messages {
+        for span in &spans {
             // Damaged spans have no channels.
             let _ = file.read(span.span, |_| false);
         }
     }
-    let times = found.messages.iter().map(|span| span.times_ns);
-    let times = times.fold(None, joined);
-    Ok((file, found.messages, times))
+    let times = spans.iter().map(|span| span.times_ns).fold(None, joined);
+    Ok((file, spans, times))
 }
 
 fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), RecordingError> {
@@ -283,32 +284,4 @@ fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), Re
         name(earlier).display()
     );
     Err(RecordingError::unreadable(folder, reason))
-}
-
-/// The sources of the description of a radar.
-pub(crate) struct Origin {
-    pub radar: RadarOrigin,
-    pub counts: CountsOrigin,
-}
-
-/// The source of azimuths, bins and rotation.
-pub(crate) enum RadarOrigin {
-    /// The radar's own description.
-    Itself,
-    /// Found from azimuths and options.
-    Scans {
-        /// Why its own cannot be used, if there is one.
-        refused: Option<String>,
-    },
-}
-
-/// The source of the encoder counts per turn.
-pub(crate) enum CountsOrigin {
-    Configured,
-    /// The radar's own counts, or the usual ones of most radars.
-    Usual,
-    /// The azimuths, which are no turn with the usual ones.
-    Azimuths {
-        usual: u16,
-    },
 }

@@ -7,19 +7,17 @@ use std::{
 };
 
 use gyre_storage::quoted;
-use mcap::{
-    MAGIC,
-    records::{Record, op},
-};
+use mcap::{MAGIC, records::Record};
 use serde::Deserialize;
 
-use crate::{RecordingError, file::parse};
+use crate::{
+    RecordingError,
+    file::{next, parse},
+};
 
-/// The description of a bag in its folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
 /// The key that a bag's description begins with.
 const INFORMATION: &str = "rosbag2_bagfile_information";
-/// The MCAP profile of bags.
 pub(crate) const PROFILE: &str = "ros2";
 /// The largest description that is read, bytes.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
@@ -59,10 +57,8 @@ fn profile(path: &Path) -> Option<String> {
     let mut head = Vec::new();
     let file = gyre_storage::open(path).ok()?;
     file.take(MAX_HEADER_BYTES).read_to_end(&mut head).ok()?;
-    let record = head.strip_prefix(MAGIC)?.strip_prefix(&[op::HEADER])?;
-    let (length, body) = record.split_first_chunk::<8>()?;
-    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
-    match parse(op::HEADER, body.get(..length)?) {
+    let (opcode, body) = next(&mut head.strip_prefix(MAGIC)?)?;
+    match parse(opcode, body) {
         Ok(Record::Header(header)) => Some(header.profile),
         _ => None,
     }
@@ -82,7 +78,6 @@ struct Information {
     compression_mode: String,
 }
 
-/// The files of a bag.
 #[derive(Debug)]
 pub(crate) struct Files {
     pub paths: Vec<PathBuf>,
@@ -90,7 +85,6 @@ pub(crate) struct Files {
     pub are_in_order: bool,
 }
 
-/// Returns the files of a bag.
 pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
     let is_described = path.is_dir() && has_metadata(path);
     let paths = match path.is_dir() {
@@ -98,22 +92,21 @@ pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
         true => listed(path),
         false => vec![path.to_owned()],
     };
-    if let Some(file) = paths.iter().find(|file| extension(file) == "zstd") {
-        return Err(compressed(file));
+    for file in &paths {
+        match extension(file) {
+            "zstd" => return Err(compressed(file)),
+            "db3" => return Err(database(file)),
+            _ => {}
+        }
     }
-    if let Some(file) = paths.iter().find(|file| extension(file) == "db3") {
-        return Err(database(file));
+    if paths.is_empty() {
+        let reason = "lists no files: there is nothing to read";
+        return Err(RecordingError::unreadable(path, reason));
     }
-    match paths.is_empty() {
-        true => Err(RecordingError::unreadable(
-            path,
-            "lists no files: there is nothing to read",
-        )),
-        false => Ok(Files {
-            are_in_order: is_described || paths.len() == 1,
-            paths,
-        }),
-    }
+    Ok(Files {
+        are_in_order: is_described || paths.len() == 1,
+        paths,
+    })
 }
 
 /// Returns the files that the description of a bag names.
@@ -121,33 +114,30 @@ fn described(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let path = folder.join(METADATA);
     let text = gyre_storage::read_text(&path, MAX_METADATA_BYTES)
         .map_err(|error| RecordingError::io(&path, error))?;
-    let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| {
-        let reason = error.to_string();
-        let reason = reason.lines().next().unwrap_or_default();
-        RecordingError::unreadable(
-            folder,
-            format!(
+    let unreadable = |reason: String| Err(RecordingError::unreadable(folder, reason));
+    let metadata: Result<Metadata, _> = serde_saphyr::from_str(&text);
+    let information = match metadata {
+        Ok(metadata) => metadata.rosbag2_bagfile_information,
+        Err(error) => {
+            let reason = error.to_string();
+            let reason = reason.lines().next().unwrap_or_default();
+            return unreadable(format!(
                 "has a {METADATA} that cannot be read ({reason}): `ros2 bag reindex` writes it anew"
-            ),
-        )
-    })?;
-    let information = metadata.rosbag2_bagfile_information;
-    if information.storage_identifier == "sqlite3" {
-        return Err(database(folder));
-    }
-    if information.storage_identifier != "mcap" {
-        let storage = quoted(&information.storage_identifier);
-        return Err(RecordingError::unreadable(
-            folder,
-            format!(
+            ));
+        }
+    };
+    match information.storage_identifier.as_str() {
+        "mcap" => {}
+        "sqlite3" => return Err(database(folder)),
+        other => {
+            let storage = quoted(other);
+            return unreadable(format!(
                 "is stored as {storage}: `ros2 bag convert` with `storage_id: mcap` makes one that is read"
-            ),
-        ));
+            ));
+        }
     }
-    if !matches!(
-        information.compression_mode.to_lowercase().as_str(),
-        "" | "none"
-    ) {
+    let compression = information.compression_mode.to_lowercase();
+    if !matches!(compression.as_str(), "" | "none") {
         return Err(compressed(folder));
     }
     let files = information.relative_file_paths.into_iter();
@@ -156,22 +146,14 @@ fn described(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
 
 /// Returns a file that the description of a bag names, which is in its folder.
 fn within(folder: &Path, file: &Path) -> Result<PathBuf, RecordingError> {
-    let is_within = |file: &Path| {
-        file.components()
-            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
-    };
+    let mut parts = file.components();
+    let is_within = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     // Bags of the first versions name the folder too.
-    let name = file.file_name().map(Path::new);
-    let candidates = [Some(file).filter(|file| is_within(file)), name];
-    let mut existing = candidates
-        .into_iter()
-        .flatten()
-        .map(|file| folder.join(file));
-    existing.find(|file| file.is_file()).ok_or_else(|| {
-        RecordingError::unreadable(
-            folder,
-            format!("lacks its file {}: copy the whole folder", file.display()),
-        )
+    let candidates = [is_within.then_some(file), file.file_name().map(Path::new)];
+    let mut candidates = candidates.iter().flatten().map(|file| folder.join(file));
+    candidates.find(|file| file.is_file()).ok_or_else(|| {
+        let reason = format!("lacks its file {}: copy the whole folder", file.display());
+        RecordingError::unreadable(folder, reason)
     })
 }
 
@@ -184,7 +166,6 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The error of a bag whose messages or files are compressed.
 pub(crate) fn compressed(path: &Path) -> RecordingError {
     RecordingError::unreadable(
         path,

@@ -3,16 +3,18 @@
 use std::path::Path;
 
 use gyre_datasets::OpenError;
-use gyre_ros2_messages::{decode, sensor_msgs::NavSatFix};
+use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use gyre_samples::{BagFixes, RawFix};
 
-use crate::bags::{Message, RecordingError, bag::Bag, files::files, sensors::Sensor};
+use crate::bags::{RecordingError, azimuths::of, bag::Bag, files::files, sensors::Sensor};
 
 /// A message has a fix, or reports that there is no fix.
 const RECEIVER: Sensor<Option<RawFix>> = Sensor {
     section: "gnss",
     measurements: "fixes of a GNSS receiver",
-    types: &[("sensor_msgs/msg/NavSatFix", fix)],
+    types: &[("sensor_msgs/msg/NavSatFix", |it| {
+        Ok(of::<NavSatFix>(it)?.fix(it.log_ns))
+    })],
 };
 
 /// Reads the fixes of a bag without its scans, on the topic of this name, else on the only topic of
@@ -22,25 +24,19 @@ pub fn fixes(path: &Path, topic: Option<&str>) -> Result<Option<BagFixes>, OpenE
     Ok(read(&mut bag, path, topic)?)
 }
 
-/// As [`fixes`], of an open bag.
 pub(crate) fn read(
     bag: &mut Bag,
     path: &Path,
     wished: Option<&str>,
 ) -> Result<Option<BagFixes>, RecordingError> {
-    let Some(found) = RECEIVER.read(bag, path, wished)? else {
+    let Some((topic, messages)) = RECEIVER.read(bag, path, wished)? else {
         return Ok(None);
     };
-    let messages = found.measurements.len();
-    let fixes: Vec<RawFix> = found.measurements.into_iter().flatten().collect();
+    let count = messages.len();
+    let fixes: Vec<RawFix> = messages.into_iter().flatten().collect();
     Ok(Some(BagFixes {
-        topic: found.topic,
-        without_fix: messages - fixes.len(),
+        topic,
+        without_fix: count - fixes.len(),
         fixes,
     }))
-}
-
-fn fix(message: &Message) -> Result<Option<RawFix>, String> {
-    let fix: NavSatFix = decode(&message.data).map_err(|error| error.to_string())?;
-    Ok(fix.fix(message.log_ns))
 }

@@ -23,7 +23,6 @@ pub(crate) const MAX_SAMPLES: usize = 2000;
 /// The rotation of Navtech's radars, turns per 1000 s, where the times do not show it.
 const ROTATION_MHZ: u16 = 4000;
 
-/// The properties of the radar that a message shows.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     encoder: u16,
@@ -37,7 +36,6 @@ struct Sample {
 pub(crate) struct Survey {
     kind: Kind,
     samples: Vec<Sample>,
-    /// Rows of whole turns.
     turns: Vec<Vec<RowShown>>,
 }
 
@@ -64,15 +62,21 @@ impl Survey {
 
     /// Looks at a message; those that are damaged show nothing.
     pub fn add(&mut self, message: &Message) {
-        let of_image = |image: &Image| (0, image.height as usize, image.width as usize);
+        let log_ns = message.log_ns;
+        let sample = |encoder, azimuths, bins| Sample {
+            encoder,
+            azimuths,
+            bins,
+            log_ns,
+        };
+        let of_image = |image: &Image| sample(0, image.height as usize, image.width as usize);
         let shown = match self.kind {
             Kind::Azimuths(Form::Numbers) => of::<RadarFftDataMsg>(message)
                 .ok()
-                .map(|m| (m.azimuth, 1, m.data.len())),
-            Kind::Azimuths(Form::Bytes) => of::<RadarFftDataMessage>(message).ok().and_then(|m| {
-                let encoder = m.azimuth().ok()?.encoder;
-                Some((encoder, 1, m.data.len()))
-            }),
+                .map(|m| sample(m.azimuth, 1, m.data.len())),
+            Kind::Azimuths(Form::Bytes) => of::<RadarFftDataMessage>(message)
+                .ok()
+                .and_then(|m| Some(sample(m.azimuth().ok()?.encoder, 1, m.data.len()))),
             Kind::BScans => of::<RadarBScanMsg>(message).ok().map(|m| {
                 self.turns.push(written(&m.encoder_values, &m.timestamps));
                 of_image(&m.b_scan_img)
@@ -80,13 +84,7 @@ impl Survey {
             Kind::Images => of::<Image>(message).ok().map(|image| of_image(&image)),
             Kind::Configuration(_) => None,
         };
-        self.samples
-            .extend(shown.map(|(encoder, azimuths, bins)| Sample {
-                encoder,
-                azimuths,
-                bins,
-                log_ns: message.log_ns,
-            }));
+        self.samples.extend(shown);
     }
 
     /// Describes a radar of this depth of a range bin, m, and these encoder counts per turn.
@@ -96,15 +94,18 @@ impl Survey {
         range_resolution_m: Option<f32>,
         encoder_size: u16,
     ) -> Result<Described, RecordingError> {
-        let refuse = |reason: &str| Err(RecordingError::unreadable(path, reason));
-        let Some(range_resolution_m) = range_resolution_m else {
-            return refuse(
-                "has no configuration of its radar (RadarConfigurationMsg): give the depth of a range bin with dataset.range_resolution_m \
-                 (Navtech: 0.0438, 0.0596 or 0.04381)",
-            );
-        };
-        let Some(azimuths) = self.azimuths(encoder_size) else {
-            return refuse("has no messages of its radar that can be read");
+        let azimuths = self.azimuths(encoder_size);
+        let (range_resolution_m, azimuths) = match (range_resolution_m, azimuths) {
+            (Some(range_resolution_m), Some(azimuths)) => (range_resolution_m, azimuths),
+            (None, _) => {
+                let reason = "has no configuration of its radar (RadarConfigurationMsg): give the depth of a range bin with \
+                              dataset.range_resolution_m (Navtech: 0.0438, 0.0596 or 0.04381)";
+                return Err(RecordingError::unreadable(path, reason));
+            }
+            (_, None) => {
+                let reason = "has no messages of its radar that can be read";
+                return Err(RecordingError::unreadable(path, reason));
+            }
         };
         let bins = self.samples.iter().map(|sample| sample.bins).max();
         let small = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
@@ -125,19 +126,17 @@ impl Survey {
     /// times, a turn may lack a blanked sector: then `usual` is used if the radar itself sent it
     /// (`is_said`).
     pub fn other_counts(&self, usual: u16, is_said: bool) -> Option<u16> {
-        let rows = self
-            .samples
-            .iter()
-            .map(|sample| (sample.encoder, sample.log_ns));
+        let rows = self.samples.iter().map(|it| (it.encoder, it.log_ns));
         let rows: Vec<RowShown> = rows.collect();
-        let turns: Vec<&[RowShown]> = match self.kind {
-            Kind::Azimuths(_) => rows.chunk_by(|(a, _), (b, _)| a < b).collect(),
-            _ => self.turns.iter().map(Vec::as_slice).collect(),
+        let is_by_azimuth = matches!(self.kind, Kind::Azimuths(_));
+        let turns: Vec<&[RowShown]> = match is_by_azimuth {
+            true => rows.chunk_by(|(a, _), (b, _)| a < b).collect(),
+            false => self.turns.iter().map(Vec::as_slice).collect(),
         };
         // Of azimuths the first and the last turn are parts of one.
-        let whole = match self.kind {
-            Kind::Azimuths(_) => turns.get(1..turns.len().max(2) - 1).unwrap_or_default(),
-            _ => &turns[..],
+        let whole = match is_by_azimuth {
+            true => turns.get(1..turns.len().max(2) - 1).unwrap_or_default(),
+            false => &turns[..],
         };
         let (unit_ns, turn_ns) = turn_time(&turns).unzip();
         if is_said && turn_ns.is_none() {
@@ -169,7 +168,6 @@ impl Survey {
         Some((usize::from(encoder_size) + step / 2) / step)
     }
 
-    /// Returns the rotation from the receive times of messages.
     fn rotation_mhz(&self, azimuths: usize) -> u16 {
         let measured = || {
             let (first, last) = (self.samples.first()?, self.samples.last()?);
@@ -181,9 +179,8 @@ impl Survey {
             let seconds = last.log_ns.saturating_sub(first.log_ns) as f64 * 1e-9;
             let mhz = 1000.0 * turns / seconds;
             // From one turn in ten seconds to fifty in one.
-            (100.0..=50_000.0)
-                .contains(&mhz)
-                .then(|| mhz.round() as u16)
+            let is_plausible = (100.0..=50_000.0).contains(&mhz);
+            is_plausible.then(|| mhz.round() as u16)
         };
         measured().unwrap_or(ROTATION_MHZ)
     }

@@ -3,25 +3,29 @@
 
 use std::path::Path;
 
-use gyre_ros2_messages::{
-    decode, geometry_msgs::TwistStamped, nav_msgs::Odometry, sensor_msgs::Imu,
-};
+use gyre_ros2_messages::{geometry_msgs::TwistStamped, nav_msgs::Odometry, sensor_msgs::Imu};
 use gyre_samples::{Sample, SampleKind};
 
-use crate::bags::{Message, RecordingError, bag::Bag, sensors::Sensor};
+use crate::bags::{RecordingError, azimuths::of, bag::Bag, sensors::Sensor};
 
 const GYRO: Sensor<Sample> = Sensor {
     section: SampleKind::Gyro.section(),
     measurements: "samples of the gyro",
-    types: &[("sensor_msgs/msg/Imu", gyro)],
+    types: &[("sensor_msgs/msg/Imu", |it| {
+        Ok(of::<Imu>(it)?.sample(it.log_ns))
+    })],
 };
 
 const WHEELS: Sensor<Sample> = Sensor {
     section: SampleKind::Wheels.section(),
     measurements: "samples of the wheels",
     types: &[
-        ("nav_msgs/msg/Odometry", odometry),
-        ("geometry_msgs/msg/TwistStamped", twist),
+        ("nav_msgs/msg/Odometry", |it| {
+            Ok(of::<Odometry>(it)?.sample(it.log_ns))
+        }),
+        ("geometry_msgs/msg/TwistStamped", |it| {
+            Ok(of::<TwistStamped>(it)?.sample(it.log_ns))
+        }),
     ],
 };
 
@@ -34,19 +38,18 @@ const WHEELS: Sensor<Sample> = Sensor {
 pub(crate) fn read(
     bag: &mut Bag,
     path: &Path,
-    of: SampleKind,
+    kind: SampleKind,
     wished: Option<&str>,
 ) -> Result<Option<Vec<Sample>>, RecordingError> {
-    let found = match of {
-        SampleKind::Gyro => GYRO.read(bag, path, wished)?,
-        SampleKind::Wheels => {
-            if wished.is_none() {
-                require_no_speeds(bag, path)?;
-            }
-            WHEELS.read(bag, path, wished)?
-        }
+    let sensor = match kind {
+        SampleKind::Gyro => GYRO,
+        SampleKind::Wheels => WHEELS,
     };
-    Ok(found.map(|found| found.measurements))
+    if kind == SampleKind::Wheels && wished.is_none() {
+        require_no_speeds(bag, path)?;
+    }
+    let found = sensor.read(bag, path, wished)?;
+    Ok(found.map(|(_, samples)| samples))
 }
 
 fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), RecordingError> {
@@ -58,19 +61,4 @@ fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), RecordingError> {
         "has speeds on {listed}: name the topic that is of wheels with wheels.topic, since odometry may be of anything, as the radar's own in a bag that Gyre has exported"
     );
     Err(RecordingError::unreadable(path, reason))
-}
-
-fn gyro(message: &Message) -> Result<Sample, String> {
-    let imu: Imu = decode(&message.data).map_err(|error| error.to_string())?;
-    Ok(imu.sample(message.log_ns))
-}
-
-fn odometry(message: &Message) -> Result<Sample, String> {
-    let odometry: Odometry = decode(&message.data).map_err(|error| error.to_string())?;
-    Ok(odometry.sample(message.log_ns))
-}
-
-fn twist(message: &Message) -> Result<Sample, String> {
-    let twist: TwistStamped = decode(&message.data).map_err(|error| error.to_string())?;
-    Ok(twist.sample(message.log_ns))
 }

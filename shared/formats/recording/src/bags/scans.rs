@@ -1,7 +1,6 @@
 //! The scans of a bag as a dataset.
 
 mod index;
-mod notes;
 
 use std::{
     collections::BTreeMap,
@@ -9,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_colossus::{Constants, SweepAssembler};
+use gyre_colossus::{Azimuth, Constants, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     OpenError, ReadError, check_capacity, turn_ns,
@@ -26,9 +25,7 @@ use crate::bags::{
     topics::Topics,
 };
 use index::{Entry, Index};
-use notes::notes;
 
-/// Opens the scans in a bag.
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_files(path, &files(path)?, options)
@@ -65,7 +62,6 @@ fn open_files(
     Ok(Box::new(Scans::open(path, files, options)?))
 }
 
-/// The scans of a bag.
 struct Scans {
     path: PathBuf,
     bag: Bag,
@@ -86,22 +82,25 @@ impl Scans {
         let mut bag = Bag::open(path, files)?;
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
-        let (described, origin) = bag.describe(&topics, options)?;
+        let (described, source) = bag.describe(&topics, options)?;
         let constants = Constants::from(options);
-        let assembler = SweepAssembler::new(&described.radar, constants);
-        let assembler = assembler.map_err(|error| {
-            RecordingError::unreadable(path, format!("cannot be read: {error}"))
+        let assembler = SweepAssembler::new(&described.radar, constants).map_err(|error| {
+            RecordingError::unreadable(path, format_args!("cannot be read: {error}"))
         })?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
         if let Some(reason) = index.why_none_can_be_read(&topics.scans.name) {
             return Err(RecordingError::unreadable(path, reason));
         }
         let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
-        let mut damage = bag.files.iter().filter_map(|file| file.damage(true));
+        let damages = bag.files.iter().filter_map(|file| file.damage(true));
+        let damages: Vec<String> = damages.collect();
+        let mut notes = vec![format!("Scans are on {}{source}.", topics.scans.name)];
+        notes.extend(index.notes());
+        notes.extend(damages.iter().map(|sentence| format!("{sentence}.")));
         Ok(Self {
-            damage: damage.next(),
+            damage: damages.into_iter().next(),
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
-            notes: notes(&bag, &topics, &described, &origin, &index),
+            notes,
             files: bag.files.iter().map(|file| file.path.clone()).collect(),
             path: path.to_owned(),
             bag,
@@ -111,10 +110,6 @@ impl Scans {
             index,
             kept: (None, BTreeMap::new()),
         })
-    }
-
-    fn assembler(&self) -> Option<SweepAssembler> {
-        SweepAssembler::new(&self.described.radar, self.constants).ok()
     }
 
     /// Reads the messages of scans of some spans, unless they are there.
@@ -147,12 +142,12 @@ impl Scans {
         entry: &Entry,
         mut slot: ScanSlot<'_>,
     ) -> Result<Option<SweepGeometry>, RecordingError> {
-        let Some(mut assembler) = self.assembler() else {
+        let assembler = SweepAssembler::new(&self.described.radar, self.constants);
+        let Ok(mut assembler) = assembler else {
             return Ok(None);
         };
         self.keep(&entry.spans)?;
-        let mut clock = self.index.clock(index);
-        let mut found = None;
+        let (mut clock, mut found) = (self.index.clock(index), None);
         for (key, message) in self.kept.1.range(entry.start.message..) {
             if self.index.repeated.contains(key) {
                 continue;
@@ -161,23 +156,19 @@ impl Scans {
                 true => entry.start.row,
                 false => 0,
             };
+            let each = |azimuth: Azimuth<'_>, received_ns| {
+                if skipped > 0 {
+                    skipped -= 1;
+                    return;
+                }
+                for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
+                    if found.is_none() {
+                        found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                    }
+                }
+            };
             // A damaged one between was left out of the index, too.
-            let _ = azimuths(
-                self.topics.scans.kind,
-                message,
-                &self.described,
-                |azimuth, received_ns| {
-                    if skipped > 0 {
-                        skipped -= 1;
-                        return;
-                    }
-                    for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
-                        if found.is_none() {
-                            found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
-                        }
-                    }
-                },
-            );
+            let _ = azimuths(self.topics.scans.kind, message, &self.described, each);
             if found.is_some() {
                 break;
             }
@@ -272,13 +263,7 @@ impl Dataset for Scans {
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
         check_capacity(self.limits(), &slot)?;
         let path = self.file(index).to_owned();
-        let failed = |error| match error {
-            RecordingError::Io { path, source } => ReadError::Io { path, source },
-            error => ReadError::Damaged {
-                path: path.clone(),
-                reason: error.to_string(),
-            },
-        };
+        let failed = |error: RecordingError| error.of_scan(&path);
         if entry.is_damaged {
             let reason = self.why_damaged(&entry).map_err(failed)?;
             return Err(ReadError::Message {

@@ -3,9 +3,11 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use crate::bags::{Message, RecordingError, bag::Bag};
+use crate::bags::{
+    Message, RecordingError,
+    bag::{Bag, Key},
+};
 
-/// Makes a measurement of a message.
 pub(crate) type Decode<T> = fn(&Message) -> Result<T, String>;
 
 /// A sensor, and how its messages become measurements.
@@ -14,16 +16,11 @@ pub(crate) struct Sensor<T: 'static> {
     pub section: &'static str,
     /// The measurements in words, such as `samples of the gyro`.
     pub measurements: &'static str,
-    /// The types of its messages.
     pub types: &'static [(&'static str, Decode<T>)],
 }
 
-/// The measurements on a topic.
-pub(crate) struct Measured<T> {
-    pub topic: String,
-    /// In the order of their log times.
-    pub measurements: Vec<T>,
-}
+/// The topic of measurements, and those in the order of their log times.
+pub(crate) type Measured<T> = (String, Vec<T>);
 
 impl<T> Sensor<T> {
     /// Reads all measurements on the topic of this name, else on the only topic of the sensor's
@@ -38,28 +35,20 @@ impl<T> Sensor<T> {
             return Ok(None);
         };
         let (mut measurements, mut refused) = (Vec::new(), None);
-        bag.read_in_order(
-            |channel| channel.topic == topic,
-            |_, _, message| match decode(message) {
-                Ok(measurement) => {
-                    measurements.push(measurement);
-                    true
-                }
-                Err(reason) => {
-                    refused = Some(reason);
-                    false
-                }
-            },
-        )?;
+        let each = |_: &Bag, _: Key, message: &Message| {
+            match decode(message) {
+                Ok(measurement) => measurements.push(measurement),
+                Err(reason) => refused = Some(reason),
+            }
+            refused.is_none()
+        };
+        bag.read_in_order(|channel| channel.topic == topic, each)?;
         if let Some(reason) = refused {
             let of = self.measurements;
             let reason = format!("has messages on {topic} that are no {of}: {reason}");
             return Err(RecordingError::unreadable(path, reason));
         }
-        Ok(Some(Measured {
-            topic,
-            measurements,
-        }))
+        Ok(Some((topic, measurements)))
     }
 
     /// Returns the names of the topics that may be of the sensor, in a sentence.
@@ -103,7 +92,6 @@ impl<T> Sensor<T> {
         Err(RecordingError::unreadable(path, reason))
     }
 
-    /// Returns the reason why a topic of this name cannot be read.
     fn why_not(&self, wished: &str, topics: &BTreeMap<String, Decode<T>>) -> String {
         let names: Vec<&str> = self.types.iter().map(|(name, _)| *name).collect();
         let (names, section) = (names.join(" or "), self.section);

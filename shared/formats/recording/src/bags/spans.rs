@@ -10,16 +10,7 @@ use crate::{
 /// Records outside of chunks form a span of their own from this size on, bytes.
 const PLAIN_BYTES: u64 = 4 << 20;
 
-/// The spans of a file: chunks, or records that are read together.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct Spans {
-    /// Those with messages.
-    pub messages: Vec<TimedSpan>,
-    /// Those with the names of all channels, at the end of the file.
-    pub summary: Vec<Span>,
-}
-
-/// A span with messages.
+/// A chunk with messages, or records that are read together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimedSpan {
     pub span: Span,
@@ -27,19 +18,21 @@ pub(crate) struct TimedSpan {
     pub times_ns: Times,
 }
 
-/// Finds the spans of a file.
-pub(crate) fn spans(file: &mut McapFile) -> Result<Spans, RecordingError> {
-    let mut found = Spans::default();
+/// Finds the spans of a file with messages, and learns its channels from the summary at its end.
+pub(crate) fn spans(file: &mut McapFile) -> Result<Vec<TimedSpan>, RecordingError> {
+    let mut found = Vec::new();
     // Records outside of chunks.
     let mut plain: Option<TimedSpan> = None;
     while let Some((opcode, span)) = file.next_record()? {
         let times_ns = file.times_ns(opcode, span)?;
         match opcode {
-            op::SCHEMA | op::CHANNEL if file.is_complete => found.summary.push(span),
+            op::SCHEMA | op::CHANNEL if file.is_complete => {
+                file.read(span, |_| false)?;
+            }
             op::SCHEMA | op::CHANNEL | op::MESSAGE => {
                 // A damaged place parts them.
                 let ends_there = |plain: &mut TimedSpan| plain.span.end() != span.offset;
-                found.messages.extend(plain.take_if(ends_there));
+                found.extend(plain.take_if(ends_there));
                 let plain = plain.get_or_insert(TimedSpan {
                     span: Span { bytes: 0, ..span },
                     times_ns,
@@ -47,14 +40,14 @@ pub(crate) fn spans(file: &mut McapFile) -> Result<Spans, RecordingError> {
                 plain.span.bytes += span.bytes;
                 plain.times_ns = joined(plain.times_ns, times_ns);
             }
-            _ => found.messages.extend(plain.take()),
+            _ => found.extend(plain.take()),
         }
         let is_long = |plain: &mut TimedSpan| plain.span.bytes >= PLAIN_BYTES;
-        found.messages.extend(plain.take_if(is_long));
+        found.extend(plain.take_if(is_long));
         if opcode == op::CHUNK {
-            found.messages.push(TimedSpan { span, times_ns });
+            found.push(TimedSpan { span, times_ns });
         }
     }
-    found.messages.extend(plain);
+    found.extend(plain);
     Ok(found)
 }

@@ -6,7 +6,6 @@ use gyre_storage::quoted;
 
 use crate::bags::{Channel, RecordingError};
 
-/// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Azimuths(Form),
@@ -14,20 +13,17 @@ pub(crate) enum Kind {
     BScans,
     /// Whole turns as images alone.
     Images,
-    /// The radar's description of itself.
     Configuration(Form),
 }
 
 /// The number format of Navtech's driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Form {
-    /// As numbers.
     Numbers,
     /// As arrays of their bytes: the older form, which some have kept under the newer name.
     Bytes,
 }
 
-/// A topic of a radar.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Topic {
     pub name: String,
@@ -68,7 +64,6 @@ impl Topic {
     }
 }
 
-/// The topics that are read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Topics {
     pub scans: Topic,
@@ -85,22 +80,40 @@ impl Topics {
     ) -> Result<Self, RecordingError> {
         let topics: BTreeSet<Topic> = channels.iter().filter_map(|c| Topic::of(c)).collect();
         let candidates = candidates(&topics, wished);
+        let refuse = |reason: String| Err(RecordingError::unreadable(path, reason));
         let scans = match (&candidates[..], wished) {
             ([one], _) => (*one).clone(),
-            ([], Some(wished)) => return Err(no_such_topic(path, &topics, wished)),
-            ([], None) => return Err(no_scans(path, channels)),
-            (several, _) => return Err(ambiguous(path, several)),
+            ([], Some(wished)) => {
+                let all = topics.iter().filter(|topic| topic.has_scans());
+                return refuse(format!(
+                    "has no scans on the topic {wished} (dataset.topic), but on: {}",
+                    names(all.map(|topic| topic.name.as_str()))
+                ));
+            }
+            ([], None) if channels.is_empty() => {
+                return refuse(
+                    "has no topics: it is empty, or damaged from its beginning".to_owned(),
+                );
+            }
+            ([], None) => {
+                return refuse(format!(
+                    "has no scans of a radar: none of its topics ({}) is of a type of Navtech's driver (RadarFftDataMsg, RadarBScanMsg)",
+                    names(channels.iter().map(|channel| channel.topic.as_str()))
+                ));
+            }
+            ([first, ..], _) => {
+                return refuse(format!(
+                    "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
+                    names(candidates.iter().map(|topic| topic.name.as_str())),
+                    first.name
+                ));
+            }
         };
-        let used = channels
-            .iter()
-            .filter(|channel| channel.topic == scans.name);
-        if let Some(channel) = used.into_iter().find(|channel| channel.encoding != "cdr") {
-            let encoding = quoted(&channel.encoding);
-            let reason = format!(
-                "has the messages of {} as {encoding}, expected `cdr`",
-                scans.name
-            );
-            return Err(RecordingError::unreadable(path, reason));
+        let mut used = channels.iter().filter(|it| it.topic == scans.name);
+        if let Some(channel) = used.find(|channel| channel.encoding != "cdr") {
+            let (name, encoding) = (&scans.name, quoted(&channel.encoding));
+            let reason = format!("has the messages of {name} as {encoding}, expected `cdr`");
+            return refuse(reason);
         }
         let near = |topic: &&Topic| common_prefix(&topic.name, &scans.name);
         let configurations = topics.iter().filter(|topic| !topic.has_scans());
@@ -110,7 +123,6 @@ impl Topics {
         })
     }
 
-    /// Returns whether a channel is one of them.
     pub fn has(&self, channel: &Channel) -> bool {
         let configuration = self.configuration.as_ref();
         channel.topic == self.scans.name
@@ -149,35 +161,6 @@ fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     listed.join(", ") + if more { ", ..." } else { "" }
 }
 
-fn no_scans(path: &Path, channels: &[&Channel]) -> RecordingError {
-    let reason = match channels.is_empty() {
-        true => "has no topics: it is empty, or damaged from its beginning".to_owned(),
-        false => format!(
-            "has no scans of a radar: none of its topics ({}) is of a type of Navtech's driver (RadarFftDataMsg, RadarBScanMsg)",
-            names(channels.iter().map(|channel| channel.topic.as_str()))
-        ),
-    };
-    RecordingError::unreadable(path, reason)
-}
-
-fn no_such_topic(path: &Path, topics: &BTreeSet<Topic>, wished: &str) -> RecordingError {
-    let all = topics.iter().filter(|topic| topic.has_scans());
-    let reason = format!(
-        "has no scans on the topic {wished} (dataset.topic), but on: {}",
-        names(all.map(|topic| topic.name.as_str()))
-    );
-    RecordingError::unreadable(path, reason)
-}
-
-fn ambiguous(path: &Path, several: &[&Topic]) -> RecordingError {
-    let reason = format!(
-        "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
-        names(several.iter().map(|topic| topic.name.as_str())),
-        several[0].name
-    );
-    RecordingError::unreadable(path, reason)
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -192,73 +175,42 @@ mod tests {
         }
     }
 
-    fn choose(channels: &[Channel], wished: Option<&str>) -> Result<Topics, String> {
+    fn choose(topics: &[(&str, &str)]) -> Result<Topics, RecordingError> {
+        let channels = topics.iter().map(|(topic, of)| channel(topic, of));
+        let channels: Vec<Channel> = channels.collect();
         let channels: Vec<&Channel> = channels.iter().collect();
-        Topics::choose(Path::new("b"), &channels, wished).map_err(|error| error.to_string())
+        Topics::choose(Path::new("b"), &channels, None)
     }
 
     #[test]
     fn topics_are_found_by_type_whatever_their_package_is() {
-        let topics = choose(
-            &[
-                channel("/camera", "sensor_msgs/msg/Image"),
-                channel("/odom", "nav_msgs/msg/Odometry"),
-                channel(
-                    "/left/configuration_data",
-                    "navtech_msgs/msg/RadarConfigurationMsg",
-                ),
-                channel(
-                    "/right/configuration_data",
-                    "navtech_msgs/msg/RadarConfigurationMsg",
-                ),
-                channel("/right/b_scan_msg", "vtr_radar_msgs/msg/RadarBScanMsg"),
-            ],
-            None,
-        )
-        .unwrap();
+        let configuration = "navtech_msgs/msg/RadarConfigurationMsg";
+        let topics = choose(&[
+            ("/camera", "sensor_msgs/msg/Image"),
+            ("/odom", "nav_msgs/msg/Odometry"),
+            ("/left/configuration_data", configuration),
+            ("/right/configuration_data", configuration),
+            ("/right/b_scan_msg", "vtr_radar_msgs/msg/RadarBScanMsg"),
+        ]);
+        let topics = topics.unwrap();
         assert_eq!(topics.scans.kind, Kind::BScans);
-        assert_eq!(
-            topics.configuration.unwrap().name,
-            "/right/configuration_data"
-        );
+        let nearest = topics.configuration.unwrap().name;
+        assert_eq!(nearest, "/right/configuration_data");
     }
 
     #[test]
     fn numbers_as_bytes_are_told_by_the_definition() {
         let mut newer = channel("/fft", "nav_messages/msg/RadarFftDataMsg");
-        assert_eq!(
-            Topic::of(&newer).unwrap().kind,
-            Kind::Azimuths(Form::Numbers)
-        );
+        let kind = |newer: &Channel| Topic::of(newer).unwrap().kind;
+        assert_eq!(kind(&newer), Kind::Azimuths(Form::Numbers));
         newer.schema = "uint8[] angle\nuint8[] azimuth\n".to_owned();
-        assert_eq!(Topic::of(&newer).unwrap().kind, Kind::Azimuths(Form::Bytes));
+        assert_eq!(kind(&newer), Kind::Azimuths(Form::Bytes));
     }
 
     #[test]
-    fn one_of_several_topics_must_be_chosen() {
-        let both = [
-            channel("/b_scan_msg", "navtech_msgs/msg/RadarBScanMsg"),
-            channel("/fft_data", "navtech_msgs/msg/RadarFftDataMsg"),
-        ];
-        let refused = choose(&both, None).unwrap_err();
-        assert!(refused.contains("--set dataset.topic="), "{refused}");
-        assert_eq!(
-            choose(&both, Some("/b_scan_msg")).unwrap().scans.kind,
-            Kind::BScans
-        );
-        let refused = choose(&both, Some("/radar")).unwrap_err();
-        assert!(refused.contains("/fft_data"), "{refused}");
-    }
-
-    #[test]
-    fn a_bag_without_a_radar_says_what_it_has() {
-        let refused = choose(&[channel("/camera", "sensor_msgs/msg/Image")], None).unwrap_err();
-        assert!(
-            refused.contains("no scans of a radar") && refused.contains("/camera"),
-            "{refused}"
-        );
-        assert!(choose(&[], None).unwrap_err().contains("no topics"));
-        let image = [channel("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];
-        assert_eq!(choose(&image, None).unwrap().scans.kind, Kind::Images);
+    fn images_are_a_radars_if_the_driver_names_them_so() {
+        assert!(choose(&[("/camera", "sensor_msgs/msg/Image")]).is_err());
+        let image = [("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];
+        assert_eq!(choose(&image).unwrap().scans.kind, Kind::Images);
     }
 }

@@ -4,6 +4,7 @@ mod metadata;
 
 use std::{
     collections::BTreeMap,
+    fmt::Display,
     fs::{self, File},
     io::{self, BufWriter},
     marker::PhantomData,
@@ -28,14 +29,12 @@ const LEVEL: u32 = 1;
 /// For whom `ros2 bag play` keeps the last message of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept {
-    /// For nobody: durability `volatile`.
     ForNobody,
     /// For subscribers that come later: durability `transient_local`, as `/tf_static` and maps have
     /// it.
     ForLater,
 }
 
-/// A topic of a bag that is written.
 #[derive(Debug)]
 pub struct Topic<T> {
     index: usize,
@@ -47,17 +46,11 @@ pub struct Topic<T> {
 pub struct BagWriter {
     path: PathBuf,
     aside: PathBuf,
-    /// The file within the folder.
     file_name: Option<String>,
     mcap: Writer<BufWriter<File>>,
-    topics: Vec<Written>,
+    topics: Vec<Described>,
     times: Option<(i64, i64)>,
     committed: bool,
-}
-
-struct Written {
-    channel: u16,
-    described: Described,
 }
 
 impl BagWriter {
@@ -66,26 +59,21 @@ impl BagWriter {
         require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let aside = path.with_file_name(format!(".{name}.tmp"));
-        let is_file = path
-            .extension()
-            .is_some_and(|extension| extension == "mcap");
+        let is_file = path.extension().is_some_and(|it| it == "mcap");
         let file_name = (!is_file).then(|| format!("{name}_0.mcap"));
-        if let Some(parent) = path
-            .parent()
-            .filter(|parent| !parent.as_os_str().is_empty())
-        {
-            fs::create_dir_all(parent).map_err(|e| unwritable(path, e.to_string()))?;
+        let failed = |error: io::Error| unwritable(path, error);
+        let parent = path.parent().unwrap_or(Path::new(""));
+        if !parent.as_os_str().is_empty() {
+            fs::create_dir_all(parent).map_err(failed)?;
         }
         let file = match &file_name {
             None => aside.clone(),
             Some(name) => aside.join(name),
         };
-        let file = create_aside(&aside, &file)
-            .map_err(|error| unwritable(path, error.to_string()))?
-            .ok_or_else(|| {
-                let reason = "another command is writing it; wait for that, or give another name";
-                unwritable(path, reason.to_owned())
-            })?;
+        let Some(file) = create_aside(&aside, &file).map_err(failed)? else {
+            let reason = "another command is writing it; wait for that, or give another name";
+            return Err(unwritable(path, reason));
+        };
         // Another command may have come to its end meanwhile.
         require_new(path)?;
         let options = WriteOptions::new()
@@ -100,7 +88,7 @@ impl BagWriter {
             path: path.to_owned(),
             aside,
             file_name,
-            mcap: mcap.map_err(|error| unwritable(path, error.to_string()))?,
+            mcap: mcap.map_err(|error| unwritable(path, error))?,
             topics: Vec::new(),
             times: None,
             committed: false,
@@ -113,16 +101,16 @@ impl BagWriter {
         kept: Kept,
     ) -> Result<Topic<T>, RecordingError> {
         let definition = T::DEFINITION;
-        let described = Described {
+        let mut described = Described {
+            channel: 0,
             name: name.to_owned(),
             type_name: definition.type_name(),
             qualities: metadata::qualities(kept),
             messages: 0,
         };
-        let channel = self
-            .add_channel(&described, &definition.text())
-            .map_err(|error| unwritable(&self.path, error.to_string()))?;
-        self.topics.push(Written { channel, described });
+        let channel = self.add_channel(&described, &definition.text());
+        described.channel = channel.map_err(|error| unwritable(&self.path, error))?;
+        self.topics.push(described);
         Ok(Topic {
             index: self.topics.len() - 1,
             message: PhantomData,
@@ -130,10 +118,8 @@ impl BagWriter {
     }
 
     fn add_channel(&mut self, topic: &Described, schema: &str) -> Result<u16, McapError> {
-        let type_name = &topic.type_name;
-        let schema = self
-            .mcap
-            .add_schema(type_name, "ros2msg", schema.as_bytes())?;
+        let (name, schema) = (&topic.type_name, schema.as_bytes());
+        let schema = self.mcap.add_schema(name, "ros2msg", schema)?;
         let qualities = ("offered_qos_profiles".to_owned(), topic.qualities.clone());
         let metadata = BTreeMap::from([qualities]);
         self.mcap.add_channel(schema, &topic.name, "cdr", &metadata)
@@ -146,57 +132,56 @@ impl BagWriter {
         log_ns: i64,
         message: &T,
     ) -> Result<(), RecordingError> {
-        let data = encode(message)?;
-        let written = &mut self.topics[topic.index];
+        let data = encode(message)
+            .map_err(|error| RecordingError::Other(format!("cannot write a message: {error}")))?;
+        let topic = &mut self.topics[topic.index];
         let time = u64::try_from(log_ns).unwrap_or_default();
         let header = MessageHeader {
-            channel_id: written.channel,
-            sequence: written.described.messages as u32,
+            channel_id: topic.channel,
+            sequence: topic.messages as u32,
             log_time: time,
             publish_time: time,
         };
-        written.described.messages += 1;
+        topic.messages += 1;
         let (first, last) = self.times.unwrap_or((log_ns, log_ns));
         self.times = Some((first.min(log_ns), last.max(log_ns)));
-        self.mcap
-            .write_to_known_channel(&header, &data)
-            .map_err(|error| unwritable(&self.path, error.to_string()))
+        let written = self.mcap.write_to_known_channel(&header, &data);
+        written.map_err(|error| unwritable(&self.path, error))
     }
 
     /// Returns the names of the topics, and how many messages each has.
     pub fn counts(&self) -> impl Iterator<Item = (&str, u64)> {
-        let topics = self.topics.iter().map(|topic| &topic.described);
+        let topics = self.topics.iter();
         topics.map(|topic| (topic.name.as_str(), topic.messages))
     }
 
-    /// Ends the bag, and gives it its name.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
-        let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
-        self.mcap.finish().map_err(|error| failed(&error))?;
+        let failed = |error: io::Error| unwritable(&path, error);
+        self.mcap
+            .finish()
+            .map_err(|error| unwritable(&path, error))?;
         let mut files = Vec::new();
         if let Some(file) = &self.file_name {
-            let topics: Vec<&Described> = self.topics.iter().map(|t| &t.described).collect();
-            let text = metadata::text(file, &topics, self.times);
+            let text = metadata::text(file, &self.topics, self.times);
             let description = self.aside.join(METADATA);
-            fs::write(&description, text).map_err(|error| failed(&error))?;
+            fs::write(&description, text).map_err(failed)?;
             files.extend([self.aside.join(file), description]);
         }
         // A power failure leaves no name of a bag without its content.
         files.push(self.aside.clone());
         for file in files {
             let synchronised = File::open(file).and_then(|file| file.sync_all());
-            synchronised.map_err(|error| failed(&error))?;
+            synchronised.map_err(failed)?;
         }
-        fs::rename(&self.aside, &self.path).map_err(|error| failed(&error))?;
+        fs::rename(&self.aside, &self.path).map_err(failed)?;
         self.committed = true;
         let folder = self.path.parent().map_or(Ok(()), gyre_storage::sync_folder);
-        folder.map_err(|error| failed(&error))
+        folder.map_err(|error| unwritable(&path, error))
     }
 }
 
 impl Drop for BagWriter {
-    /// Removes a bag that is not complete.
     fn drop(&mut self) {
         if !self.committed {
             remove(&self.aside);
@@ -225,11 +210,9 @@ fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
 }
 
 fn require_new(path: &Path) -> Result<(), RecordingError> {
+    let there = "it exists; remove it, or give another name";
     match path.exists() {
-        true => Err(unwritable(
-            path,
-            "it exists; remove it, or give another name".to_owned(),
-        )),
+        true => Err(unwritable(path, there)),
         false => Ok(()),
     }
 }
@@ -239,9 +222,6 @@ fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }
 
-fn unwritable(path: &Path, reason: String) -> RecordingError {
-    RecordingError::Unwritable {
-        path: path.to_owned(),
-        reason,
-    }
+fn unwritable(path: &Path, reason: impl Display) -> RecordingError {
+    RecordingError::Other(format!("cannot write {}: {reason}", path.display()))
 }

@@ -5,12 +5,12 @@ use gyre_ros2_messages::messages::RadarConfigurationMessage;
 use super::*;
 
 /// The messages of turns, each changed.
-fn changed(turns: usize, mut change: impl FnMut(usize, &mut RadarBScanMsg)) -> Messages {
+fn changed(turns: usize, change: impl Fn(&mut RadarBScanMsg)) -> Messages {
     let (writer, mut messages) = (ScanMessages::new(radar(), "radar"), Messages::default());
     messages.add(CONFIGURATION, START_NS, &writer.configuration(START_NS));
     for turn in 0..turns {
         let mut message = writer.b_scan(scan(turn).view());
-        change(turn, &mut message);
+        change(&mut message);
         let end_ns = START_NS + TURN_NS * (turn as i64 + 1);
         messages.add(B_SCANS, end_ns, &message);
     }
@@ -34,18 +34,6 @@ fn with_older_configuration(mut messages: Messages, bin_size: f64) -> Messages {
 }
 
 #[test]
-fn the_depth_of_a_bin_of_older_drivers_is_a_double() {
-    for (bin_size, expected_m) in [(438.0, 0.0438), (0.0438, 0.0438)] {
-        let folder = Folder::new();
-        let path = folder.bag(&with_older_configuration(b_scans(4), bin_size));
-        let mut dataset = opened(&path);
-        let scan = read(dataset.as_mut(), 1).unwrap();
-        assert_eq!(scan.geometry.range_resolution_m, expected_m, "{bin_size}");
-        assert_has_turns(dataset.as_mut(), 4);
-    }
-}
-
-#[test]
 fn a_configuration_that_no_radar_has_is_refused_with_its_reason() {
     let folder = Folder::new();
     let path = folder.bag(&with_older_configuration(b_scans(4), 1e7));
@@ -63,58 +51,16 @@ fn a_configuration_that_no_radar_has_is_refused_with_its_reason() {
     assert!(notes.contains("cannot be used"), "{notes}");
 }
 
-/// As FoMo's converter writes them.
-#[test]
-fn times_of_rows_in_microseconds_are_read() {
-    let messages = changed(24, |_, message| {
-        for stamp in &mut message.timestamps {
-            *stamp /= 1_000;
-        }
-    });
-    let folder = Folder::new();
-    let mut dataset = opened(&folder.bag(&messages));
-    assert_eq!(dataset.len(), 24);
-    let found = read(dataset.as_mut(), 20).unwrap();
-    let micros = |ns: &i64| ns / 1_000 * 1_000;
-    let expected: Vec<i64> = scan(20).stamp_ns.iter().map(micros).collect();
-    assert_eq!(found.stamp_ns, expected);
-}
-
 #[test]
 fn images_that_are_no_powers_are_refused_and_named() {
     let folder = Folder::new();
-    let sixteen = changed(3, |_, message| {
+    let sixteen = changed(3, |message| {
         message.b_scan_img.encoding = "mono16".to_owned()
     });
     let sentence = refused(&folder.bag(&sixteen));
     for words in ["none can be decoded", "`mono16`", "`mono8`"] {
         assert!(sentence.contains(words), "{sentence}");
     }
-    let without = changed(3, |_, message| message.encoder_values.clear());
-    let sentence = refused(&folder.bag(&without));
-    assert!(
-        sentence.contains("40 rows of powers, but 0 encoder values and 40 times"),
-        "{sentence}"
-    );
-}
-
-#[test]
-fn one_message_that_is_no_scan_is_named_with_its_reason() {
-    let folder = Folder::new();
-    let messages = changed(4, |turn, message| {
-        if turn == 2 {
-            message.timestamps.clear();
-        }
-    });
-    let mut dataset = opened(&folder.bag(&messages));
-    assert_eq!(dataset.len(), 4);
-    let error = read(dataset.as_mut(), 2).err().unwrap().to_string();
-    let reason = "40 rows of powers, but 40 encoder values and 0 times";
-    assert!(error.contains(reason), "{error}");
-    assert!(!error.contains("download"), "{error}");
-    let notes = dataset.notes().join(" ");
-    assert!(notes.contains(reason), "{notes}");
-    assert_is(&read(dataset.as_mut(), 3).unwrap(), 3);
 }
 
 #[test]

@@ -23,11 +23,9 @@ impl RadarFftDataMsg {
 impl RadarFftDataMessage {
     /// Returns the azimuth as the radar sent it.
     pub fn azimuth(&self) -> Result<Azimuth<'_>, BadMessage> {
+        let sweep_counter = number::<Self, 2>("sweep_counter", &self.sweep_counter)?;
         Ok(Azimuth {
-            sweep_counter: u16::from_be_bytes(number::<Self, 2>(
-                "sweep_counter",
-                &self.sweep_counter,
-            )?),
+            sweep_counter: u16::from_be_bytes(sweep_counter),
             encoder: u16::from_be_bytes(number::<Self, 2>("azimuth", &self.azimuth)?),
             seconds: number::<Self, 4>("ntp_seconds", &self.ntp_seconds)?,
             split_seconds: number::<Self, 4>("ntp_split_seconds", &self.ntp_split_seconds)?,
@@ -41,8 +39,6 @@ pub(super) fn number<T: Ros2Message, const N: usize>(
     field: &str,
     bytes: &[u8],
 ) -> Result<[u8; N], BadMessage> {
-    bytes.try_into().map_err(|_| BadMessage::Field {
-        type_name: T::DEFINITION.type_name(),
-        reason: format!("`{field}` has {} bytes, expected {N}", bytes.len()),
-    })
+    let reason = || format!("`{field}` has {} bytes, expected {N}", bytes.len());
+    bytes.try_into().map_err(|_| BadMessage::of::<T>(reason()))
 }

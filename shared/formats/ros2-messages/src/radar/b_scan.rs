@@ -1,43 +1,11 @@
 //! Messages of one turn.
 
 use gyre_colossus::{Azimuth, Configuration, Powers};
-use thiserror::Error;
 
 use crate::{navtech_msgs::RadarBScanMsg, sensor_msgs::Image};
 
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// A message that is no scan.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum BadScan {
-    #[error("its pixels are `{encoding}`, expected `8UC1` or `mono8`")]
-    Encoding { encoding: String },
-    #[error(
-        "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
-    )]
-    Size {
-        /// Bytes of pixels.
-        bytes: usize,
-        /// Rows.
-        height: u32,
-        /// Bytes of a row.
-        step: u32,
-        /// Columns.
-        width: u32,
-    },
-    #[error(
-        "it has {rows} rows of powers, but {encoders} encoder values and {stamps} times, and needs one of each for a row"
-    )]
-    Rows {
-        /// Rows of the image.
-        rows: usize,
-        /// Encoder values.
-        encoders: usize,
-        stamps: usize,
-    },
-}
-
-/// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedAzimuth<'a> {
     pub azimuth: Azimuth<'a>,
@@ -57,26 +25,26 @@ impl RadarBScanMsg {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = TimedAzimuth<'a>> + 'a, BadScan> {
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'a>> + 'a, String> {
         let image = PowerImage::of(&self.b_scan_img, azimuth_offset)?;
         let (encoders, stamps) = (&self.encoder_values, &self.timestamps);
         if encoders.len() != image.height || stamps.len() != image.height {
-            return Err(BadScan::Rows {
-                rows: image.height,
-                encoders: encoders.len(),
-                stamps: stamps.len(),
-            });
+            return Err(format!(
+                "it has {} rows of powers, but {} encoder values and {} times, and needs one of each for a row",
+                image.height,
+                encoders.len(),
+                stamps.len()
+            ));
         }
-        let time = TurnTime::new(radar, arrived_ns);
+        let arrival_ns = arrival(radar, arrived_ns);
         let unit_ns = unit_ns(radar, encoders, stamps);
         let has_clock = stamps.iter().any(|stamp| *stamp != 0);
         let has_turned = encoders.iter().any(|encoder| *encoder != 0);
         let mut last = None;
         let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
-            let is_written = if has_clock {
-                *stamp != 0
-            } else {
-                *encoder != 0 || (*row == 0 && has_turned)
+            let is_written = match has_clock {
+                true => *stamp != 0,
+                false => *encoder != 0 || (*row == 0 && has_turned),
             };
             let follows = last.is_none_or(|last| last < *encoder);
             if is_written && follows {
@@ -86,12 +54,11 @@ impl RadarBScanMsg {
         };
         let places = encoders.iter().zip(stamps).enumerate();
         let places = places.map(|(row, (encoder, stamp))| (row, *encoder, *stamp));
-        Ok(places
-            .filter(written)
-            .map(move |(row, encoder, stamp)| TimedAzimuth {
-                azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
-                arrived_ns: time.arrived_ns(encoder),
-            }))
+        let rows = places.filter(written);
+        Ok(rows.map(move |(row, encoder, stamp)| TimedAzimuth {
+            azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
+            arrived_ns: arrival_ns(encoder),
+        }))
     }
 }
 
@@ -108,9 +75,8 @@ fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
     let apart = |unit: &u64| (advance * *unit as f64 / expected_ns).ln().abs();
     // Of times that do not advance all are equally far: they are as they should be.
     let units = [1, 1_000, 1_000_000].into_iter();
-    units
-        .min_by(|a, b| apart(a).total_cmp(&apart(b)))
-        .unwrap_or(1)
+    let nearest = units.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.unwrap_or(1)
 }
 
 impl Image {
@@ -121,15 +87,15 @@ impl Image {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, BadScan> {
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, String> {
         let image = PowerImage::of(self, azimuth_offset)?;
-        let time = TurnTime::new(radar, arrived_ns);
+        let arrival_ns = arrival(radar, arrived_ns);
         let encoder_size = u64::from(radar.encoder_size);
         Ok((0..image.height).map(move |row| {
             let encoder = (row as u64 * encoder_size / image.height as u64) as u16;
             TimedAzimuth {
                 azimuth: azimuth(encoder, 0, image.row(row)),
-                arrived_ns: time.arrived_ns(encoder),
+                arrived_ns: arrival_ns(encoder),
             }
         }))
     }
@@ -146,7 +112,6 @@ fn azimuth(encoder: u16, stamp: u64, powers: &[u8]) -> Azimuth<'_> {
     }
 }
 
-/// The rows of an image of powers.
 #[derive(Clone, Copy)]
 struct PowerImage<'a> {
     data: &'a [u8],
@@ -158,30 +123,30 @@ struct PowerImage<'a> {
 }
 
 impl<'a> PowerImage<'a> {
-    fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, BadScan> {
+    fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, String> {
         if !matches!(image.encoding.as_str(), "8UC1" | "mono8") {
-            return Err(BadScan::Encoding {
-                encoding: image.encoding.chars().take(20).collect(),
-            });
+            let encoding: String = image.encoding.chars().take(20).collect();
+            return Err(format!(
+                "its pixels are `{encoding}`, expected `8UC1` or `mono8`"
+            ));
         }
-        let fits = image.width > 0
-            && image.height > 0
-            && image.step >= image.width
-            && u64::from(image.height) * u64::from(image.step) == image.data.len() as u64;
+        let (height, width, step) = (image.height, image.width, image.step);
+        let bytes = image.data.len();
+        let fits = width > 0
+            && height > 0
+            && step >= width
+            && u64::from(height) * u64::from(step) == bytes as u64;
         if !fits {
-            return Err(BadScan::Size {
-                bytes: image.data.len(),
-                height: image.height,
-                step: image.step,
-                width: image.width,
-            });
+            return Err(format!(
+                "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
+            ));
         }
-        let height = image.height as usize;
+        let height = height as usize;
         Ok(Self {
             data: &image.data,
             height,
-            width: image.width as usize,
-            step: image.step as usize,
+            width: width as usize,
+            step: step as usize,
             offset: usize::from(azimuth_offset) % height,
         })
     }
@@ -192,25 +157,13 @@ impl<'a> PowerImage<'a> {
     }
 }
 
-/// Times of receipt within a turn.
-#[derive(Clone, Copy)]
-struct TurnTime {
-    end_ns: i64,
-    encoder_size: f64,
-    period_ns: f64,
-}
-
-impl TurnTime {
-    fn new(radar: &Configuration, end_ns: i64) -> Self {
-        Self {
-            end_ns,
-            encoder_size: f64::from(radar.encoder_size.max(1)),
-            period_ns: radar.period_ns() as f64,
-        }
-    }
-
-    fn arrived_ns(&self, encoder: u16) -> i64 {
-        let left = 1.0 - f64::from(encoder) / self.encoder_size;
-        self.end_ns.saturating_sub((left * self.period_ns) as i64)
+/// Returns the time of receipt, ns, of an azimuth of an encoder count in a turn that has ended at
+/// `end_ns`.
+fn arrival(radar: &Configuration, end_ns: i64) -> impl Fn(u16) -> i64 + use<> {
+    let counts = f64::from(radar.encoder_size.max(1));
+    let period_ns = radar.period_ns() as f64;
+    move |encoder| {
+        let left = 1.0 - f64::from(encoder) / counts;
+        end_ns.saturating_sub((left * period_ns) as i64)
     }
 }

@@ -20,7 +20,6 @@ const DEPTHS_M: RangeInclusive<f64> = 1e-3..=5.0;
 const MAX_TURNS_PER_S: u16 = 50;
 
 impl RadarConfigurationMsg {
-    /// Returns the radar's description of itself.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         Ok(Configuration {
             azimuth_samples: self.azimuth_samples,
@@ -51,11 +50,8 @@ impl RadarConfigurationMsg {
 }
 
 impl RadarConfigurationMessage {
-    /// Returns the radar's description of itself.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
-        let short = |field, bytes: &[u8]| {
-            Ok::<u16, BadMessage>(u16::from_be_bytes(number::<Self, 2>(field, bytes)?))
-        };
+        let short = |field, bytes: &[u8]| number::<Self, 2>(field, bytes).map(u16::from_be_bytes);
         // Unlike the others: the driver copies the double as its computer has it.
         let bin_size = f64::from_le_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
         let rate = short("expected_rotation_rate", &self.expected_rotation_rate)?;
@@ -73,13 +69,11 @@ impl RadarConfigurationMessage {
 fn resolution_m<T: Ros2Message>(bin_size: f64) -> Result<f32, BadMessage> {
     let candidates = [bin_size / BIN_SIZES, bin_size];
     let depth_m = candidates.into_iter().find(|m| DEPTHS_M.contains(m));
-    depth_m.map(|m| m as f32).ok_or_else(|| BadMessage::Field {
-        type_name: T::DEFINITION.type_name(),
-        reason: format!(
-            "`bin_size` is {bin_size:e}, and no radar has bins of that many 0.1 mm or m: {} to {} m are known",
-            DEPTHS_M.start(),
-            DEPTHS_M.end()
-        ),
+    depth_m.map(|m| m as f32).ok_or_else(|| {
+        let (least, most) = (DEPTHS_M.start(), DEPTHS_M.end());
+        BadMessage::of::<T>(format_args!(
+            "`bin_size` is {bin_size:e}, and no radar has bins of that many 0.1 mm or m: {least} to {most} m are known"
+        ))
     })
 }
 

@@ -18,7 +18,6 @@ const ROUNDING_RAD: f64 = 2e-6;
 /// The counts of an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
-    /// Counts per turn.
     pub counts: u16,
     /// True if the angles of the scan are such counts, but for rounding.
     pub is_exact: bool,
@@ -30,18 +29,12 @@ impl Encoder {
     /// priority.
     pub fn of(azimuth_rad: &[f32], known: Option<u16>) -> Self {
         let rows = u16::try_from(azimuth_rad.len()).unwrap_or(u16::MAX);
-        let even = [Some(rows), rows.checked_mul(2), rows.checked_mul(4)];
-        let candidates = [known]
-            .into_iter()
-            .chain(even)
-            .chain([Some(5600), Some(5595)]);
-        let candidates: Vec<u16> = candidates
-            .flatten()
-            .filter(|counts| *counts >= 16)
-            .collect();
+        let [twice, four_times] = [2, 4].map(|times| rows.checked_mul(times));
+        let candidates = [known, Some(rows), twice, four_times, Some(5600), Some(5595)];
         let all = |is: fn(f32, u16) -> bool| {
-            let mut candidates = candidates.iter().copied();
-            candidates.find(|counts| azimuth_rad.iter().all(|rad| is(*rad, *counts)))
+            let mut candidates = candidates.into_iter().flatten();
+            let is_it = |counts: &u16| azimuth_rad.iter().all(|rad| is(*rad, *counts));
+            candidates.find(|counts| *counts >= 16 && is_it(counts))
         };
         let found = all(is_count).or_else(|| all(is_near_count));
         Self {
@@ -71,7 +64,6 @@ fn is_near_count(azimuth_rad: f32, counts: u16) -> bool {
     apart.abs() < ROUNDING_RAD || (TAU - apart.abs()).abs() < ROUNDING_RAD
 }
 
-/// Writes scans as messages of Navtech's driver.
 #[derive(Clone, Debug)]
 pub struct ScanMessages {
     radar: Configuration,
@@ -89,7 +81,6 @@ impl ScanMessages {
         }
     }
 
-    /// Returns the radar's description of itself.
     pub fn configuration(&self, stamp_ns: i64) -> RadarConfigurationMsg {
         RadarConfigurationMsg::of(&self.radar, self.header(stamp_ns))
     }

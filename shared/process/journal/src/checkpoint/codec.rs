@@ -2,9 +2,7 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{
-    Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState,
-};
+use gyre_scan_matching::{Anchor, Heading, Keyframe, TrackerState, Verdict, WheelState};
 use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, UnitComplex};
 
@@ -12,21 +10,9 @@ use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, Unit
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-const TRACKER_WORDS: usize = DOPPLER + WHEEL_WORDS;
-const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word for its presence; bias, yaw bias, scale, covariance; the last verdict.
-const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
-/// A word for their presence; scale, offset, three dead reckonings and the time of the last; both
-/// covariances; whether they slip.
-const WHEEL_WORDS: usize = 1 + 6 + 4 + 9 + 1;
-const ANCHOR_WORDS: usize = 9;
-/// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
-/// its velocity by Doppler.
-const REST: usize = 4 + 2 * ANCHOR_WORDS;
-const STANDSTILL: usize = REST + 8;
-const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
-const WHEELS: usize = HEADING + HEADING_WORDS;
-const DOPPLER: usize = WHEELS + WHEEL_WORDS;
+/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the velocity
+/// by Doppler.
+const TRACKER_WORDS: usize = 4 + 2 * 9 + 8 + 12 + 21 + 2 * 21;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, displacement by the search,
 /// corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = CORNERS + 4;
@@ -39,20 +25,10 @@ pub(super) const fn state_bytes(max_keyframes: usize) -> usize {
     8 * (STATE_WORDS + NAME_WORDS * max_keyframes)
 }
 
-/// The header of a state's slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct StateHeader {
-    /// The item after which the state was written.
-    pub item: u64,
-    /// The checksum of the item's motion.
-    pub motion: u64,
-}
-
 /// The name of a keyframe's content: two keyframes of one scan can differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
     pub id: u64,
-    /// The checksum of the slot.
     pub check: u64,
 }
 
@@ -66,211 +42,176 @@ fn set_word(bytes: &mut [u8], k: usize, word: u64) {
     bytes[8 * k..8 * k + 8].copy_from_slice(&word.to_le_bytes());
 }
 
-fn pose_words(pose: &Isometry2<f64>) -> [u64; 4] {
+fn pose_values(pose: &Isometry2<f64>) -> [f64; 4] {
     [
         pose.translation.x,
         pose.translation.y,
         pose.rotation.re,
         pose.rotation.im,
     ]
-    .map(f64::to_bits)
 }
 
 /// Restores a pose bit for bit, without normalizing its rotation.
-fn pose_from(words: &[u64]) -> Isometry2<f64> {
-    let [x, y, re, im] = [0, 1, 2, 3].map(|k| f64::from_bits(words[k]));
+fn pose_from([x, y, re, im]: [f64; 4]) -> Isometry2<f64> {
     Isometry2::from_parts(
         Translation2::new(x, y),
         UnitComplex::new_unchecked(Complex::new(re, im)),
     )
 }
 
-fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
-    let mut words = [0; TRACKER_WORDS];
-    words[..4].copy_from_slice(&pose_words(&state.pose));
-    for (k, anchor) in state.anchors.iter().enumerate() {
-        let words = &mut words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
-        if let Some(anchor) = anchor {
-            words[0] = 1;
-            words[1..5].copy_from_slice(&pose_words(&anchor.pose));
-            let twist = anchor.twist;
-            words[5..].copy_from_slice(
-                &[
-                    twist.vx_mps,
-                    twist.vy_mps,
-                    twist.yaw_rate_radps,
-                    anchor.age_s,
-                ]
-                .map(f64::to_bits),
-            );
+/// Takes the words of a state in their order: one that writes them is given each, and one that
+/// reads them replaces it.
+struct Words<F>(F);
+
+impl<F: FnMut(&mut u64)> Words<F> {
+    fn real(&mut self, value: &mut f64) {
+        let mut word = value.to_bits();
+        (self.0)(&mut word);
+        *value = f64::from_bits(word);
+    }
+
+    fn reals<'a>(&mut self, values: impl IntoIterator<Item = &'a mut f64>) {
+        values.into_iter().for_each(|value| self.real(value));
+    }
+
+    fn count(&mut self, value: &mut u32) {
+        let mut word = u64::from(*value);
+        (self.0)(&mut word);
+        *value = word as u32;
+    }
+
+    fn flag(&mut self, value: &mut bool) {
+        let mut count = u32::from(*value);
+        self.count(&mut count);
+        *value = count == 1;
+    }
+
+    fn pose(&mut self, pose: &mut Isometry2<f64>) {
+        let mut values = pose_values(pose);
+        self.reals(&mut values);
+        *pose = pose_from(values);
+    }
+
+    /// A word for its presence, and the words of its fields, which are zero without it.
+    fn optional<T: Copy>(
+        &mut self,
+        value: &mut Option<T>,
+        zero: T,
+        fields: impl FnOnce(&mut Self, &mut T),
+    ) {
+        let (mut is_there, mut content) = (value.is_some(), value.unwrap_or(zero));
+        self.flag(&mut is_there);
+        fields(self, &mut content);
+        *value = is_there.then_some(content);
+    }
+
+    fn anchor(&mut self, anchor: &mut Option<Anchor>) {
+        let zero = Anchor {
+            pose: pose_from([0.0; 4]),
+            twist: Twist::default(),
+            age_s: 0.0,
+        };
+        self.optional(anchor, zero, |words, it| {
+            words.pose(&mut it.pose);
+            words.reals([&mut it.twist.vx_mps, &mut it.twist.vy_mps]);
+            words.reals([&mut it.twist.yaw_rate_radps, &mut it.age_s]);
+        });
+    }
+
+    fn heading(&mut self, heading: &mut Option<Heading>) {
+        let zero = Heading {
+            bias_radps: 0.0,
+            yaw_bias_rad: 0.0,
+            scale: 0.0,
+            covariance: Matrix4::zeros(),
+            verdict: Verdict::Agrees,
+        };
+        self.optional(heading, zero, |words, it| {
+            words.reals([&mut it.bias_radps, &mut it.yaw_bias_rad, &mut it.scale]);
+            words.reals(it.covariance.iter_mut());
+            let mut verdict = it.verdict as u32;
+            words.count(&mut verdict);
+            it.verdict = match verdict {
+                2 => Verdict::Refused,
+                1 => Verdict::Doubted,
+                _ => Verdict::Agrees,
+            };
+        });
+    }
+
+    fn wheels(&mut self, wheels: &mut Option<WheelState>) {
+        let zero = WheelState {
+            scale: 0.0,
+            offset_m: 0.0,
+            covariance: Matrix2::zeros(),
+            slips: false,
+            since_match_m: 0.0,
+            since_match_s: 0.0,
+            since_match_rad: 0.0,
+            since_place_s: 0.0,
+            unmatched: Matrix3::zeros(),
+        };
+        self.optional(wheels, zero, |words, it| {
+            words.reals([&mut it.scale, &mut it.offset_m, &mut it.since_match_m]);
+            words.reals([&mut it.since_match_s, &mut it.since_match_rad]);
+            words.real(&mut it.since_place_s);
+            words.reals(it.covariance.iter_mut());
+            words.reals(it.unmatched.iter_mut());
+            words.flag(&mut it.slips);
+        });
+    }
+
+    fn tracker(&mut self, state: &mut TrackerState) {
+        self.pose(&mut state.pose);
+        for anchor in &mut state.anchors {
+            self.anchor(anchor);
         }
-    }
-    let rest = [
-        state.mean_overlap.to_bits(),
-        state.mean_weight.to_bits(),
-        state.doubtful.into(),
-        state.unmatched.into(),
-        state.along_walls.into(),
-        state.sliding.into(),
-        state.ahead_m.x.to_bits(),
-        state.ahead_m.y.to_bits(),
-    ];
-    words[REST..STANDSTILL].copy_from_slice(&rest);
-    words[STANDSTILL..HEADING].copy_from_slice(&standstill_words(&state.standstill));
-    if let Some(heading) = &state.heading {
-        words[HEADING..WHEELS].copy_from_slice(&heading_words(heading));
-    }
-    if let Some(wheels) = &state.wheels {
-        words[WHEELS..DOPPLER].copy_from_slice(&wheel_words(wheels));
-    }
-    if let Some(doppler) = &state.doppler {
-        words[DOPPLER..].copy_from_slice(&wheel_words(doppler));
-    }
-    words
-}
-
-fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
-    let mut words = [1; HEADING_WORDS];
-    words[1] = heading.bias_radps.to_bits();
-    words[2] = heading.yaw_bias_rad.to_bits();
-    words[3] = heading.scale.to_bits();
-    let covariance = words[4..].iter_mut().zip(&heading.covariance);
-    covariance.for_each(|(word, value)| *word = value.to_bits());
-    words[20] = heading.verdict as u64;
-    words
-}
-
-fn heading_from(words: &[u64]) -> Option<Heading> {
-    let value = |k: usize| f64::from_bits(words[k]);
-    (words[0] == 1).then(|| Heading {
-        bias_radps: value(1),
-        yaw_bias_rad: value(2),
-        scale: value(3),
-        covariance: Matrix4::from_fn(|row, column| value(4 + row + 4 * column)),
-        verdict: match words[20] {
-            2 => Verdict::Refused,
-            1 => Verdict::Doubted,
-            _ => Verdict::Agrees,
-        },
-    })
-}
-
-fn wheel_words(wheels: &WheelState) -> [u64; WHEEL_WORDS] {
-    let mut words = [1; WHEEL_WORDS];
-    let state = [
-        wheels.scale,
-        wheels.offset_m,
-        wheels.since_match_m,
-        wheels.since_match_s,
-        wheels.since_match_rad,
-        wheels.since_place_s,
-    ];
-    let covariances = wheels.covariance.iter().chain(&wheels.unmatched);
-    let values = state.iter().chain(covariances).map(|it| it.to_bits());
-    let values = values.chain([wheels.slips.into()]);
-    words[1..]
-        .iter_mut()
-        .zip(values)
-        .for_each(|(word, value)| *word = value);
-    words
-}
-
-fn wheels_from(words: &[u64]) -> Option<WheelState> {
-    let value = |k: usize| f64::from_bits(words[k]);
-    (words[0] == 1).then(|| WheelState {
-        scale: value(1),
-        offset_m: value(2),
-        since_match_m: value(3),
-        since_match_s: value(4),
-        since_match_rad: value(5),
-        since_place_s: value(6),
-        covariance: Matrix2::from_fn(|row, column| value(7 + row + 2 * column)),
-        unmatched: Matrix3::from_fn(|row, column| value(11 + row + 3 * column)),
-        slips: words[20] == 1,
-    })
-}
-
-fn standstill_words(standstill: &Standstill) -> [u64; STANDSTILL_WORDS] {
-    let mut words = [0; STANDSTILL_WORDS];
-    words[..4].copy_from_slice(&pose_words(&standstill.reported));
-    words[4..8].copy_from_slice(&pose_words(&standstill.anchor));
-    words[8..].copy_from_slice(&[
-        standstill.scans.into(),
-        standstill.time_s.to_bits(),
-        standstill.jitter.to_bits(),
-        standstill.jitter_scans.into(),
-    ]);
-    words
-}
-
-fn standstill_from(words: &[u64]) -> Standstill {
-    Standstill {
-        reported: pose_from(words),
-        anchor: pose_from(&words[4..]),
-        scans: words[8] as u32,
-        time_s: f64::from_bits(words[9]),
-        jitter: f64::from_bits(words[10]),
-        jitter_scans: words[11] as u32,
+        self.reals([&mut state.mean_overlap, &mut state.mean_weight]);
+        self.count(&mut state.doubtful);
+        self.count(&mut state.unmatched);
+        self.count(&mut state.along_walls);
+        self.count(&mut state.sliding);
+        self.reals(state.ahead_m.iter_mut());
+        let standstill = &mut state.standstill;
+        self.pose(&mut standstill.reported);
+        self.pose(&mut standstill.anchor);
+        self.count(&mut standstill.scans);
+        self.reals([&mut standstill.time_s, &mut standstill.jitter]);
+        self.count(&mut standstill.jitter_scans);
+        self.heading(&mut state.heading);
+        self.wheels(&mut state.wheels);
+        self.wheels(&mut state.doppler);
     }
 }
 
-fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
-    let anchor = |k: usize| {
-        let words = &words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
-        let [vx_mps, vy_mps, yaw_rate_radps, age_s] =
-            [5, 6, 7, 8].map(|k| f64::from_bits(words[k]));
-        (words[0] == 1).then(|| Anchor {
-            pose: pose_from(&words[1..5]),
-            twist: Twist {
-                vx_mps,
-                vy_mps,
-                yaw_rate_radps,
-            },
-            age_s,
-        })
-    };
-    let rest = &words[REST..];
-    TrackerState {
-        pose: pose_from(words),
-        anchors: [anchor(0), anchor(1)],
-        mean_overlap: f64::from_bits(rest[0]),
-        mean_weight: f64::from_bits(rest[1]),
-        doubtful: rest[2] as u32,
-        unmatched: rest[3] as u32,
-        along_walls: rest[4] as u32,
-        sliding: rest[5] as u32,
-        ahead_m: [6, 7].map(|k| f64::from_bits(rest[k])).into(),
-        standstill: standstill_from(&words[STANDSTILL..]),
-        heading: heading_from(&words[HEADING..]),
-        wheels: wheels_from(&words[WHEELS..]),
-        doppler: wheels_from(&words[DOPPLER..]),
-    }
-}
-
-/// Fills the slot of a state with these keyframes, oldest first.
+/// Fills the slot of the state after an item, whose motion has this checksum, with these keyframes,
+/// oldest first.
 pub(super) fn encode_state(
-    header: StateHeader,
+    (item, motion): (u64, u64),
     keyframes: &[Name],
     state: &TrackerState,
     slot: &mut [u8],
 ) {
     slot.fill(0);
+    let (mut state, mut at) = (*state, 0);
+    let mut put = |word: u64| {
+        at += 1;
+        set_word(slot, at, word);
+    };
+    let head = [item, motion, keyframes.len() as u64];
+    head.into_iter().for_each(&mut put);
+    Words(|word: &mut u64| put(*word)).tracker(&mut state);
     let names = keyframes.iter().flat_map(|name| [name.id, name.check]);
-    [header.item, header.motion, keyframes.len() as u64]
-        .into_iter()
-        .chain(tracker_words(state))
-        .chain(names)
-        .enumerate()
-        .for_each(|(k, value)| set_word(slot, k + 1, value));
+    names.for_each(put);
     Checksum::First.seal(slot);
 }
 
-/// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
+/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
 /// first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,
-) -> Option<(StateHeader, TrackerState)> {
+) -> Option<((u64, u64), TrackerState)> {
     if !Checksum::First.is_right(slot) {
         return None;
     }
@@ -278,30 +219,33 @@ pub(super) fn decode_state(
     if count > ((slot.len() / 8 - STATE_WORDS) / NAME_WORDS) as u64 {
         return None;
     }
-    let words = std::array::from_fn(|k| word(slot, k + 4));
+    let (mut state, mut at) = (TrackerState::default(), 3);
+    let take = |value: &mut u64| {
+        at += 1;
+        *value = word(slot, at);
+    };
+    Words(take).tracker(&mut state);
     keyframes.clear();
     keyframes.extend((0..count as usize).map(|k| Name {
         id: word(slot, STATE_WORDS + NAME_WORDS * k),
         check: word(slot, STATE_WORDS + NAME_WORDS * k + 1),
     }));
-    Some((StateHeader { item, motion }, tracker_from(&words)))
+    Some(((item, motion), state))
 }
 
 /// Fills the slot of a keyframe, and returns the name of its content.
 pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
     set_word(slot, 1, keyframe.id);
-    let ahead = [keyframe.ahead_m.x, keyframe.ahead_m.y].map(f64::to_bits);
-    pose_words(&keyframe.pose)
-        .into_iter()
-        .chain(ahead)
-        .enumerate()
-        .for_each(|(k, value)| set_word(slot, k + 2, value));
+    let ahead = [keyframe.ahead_m.x, keyframe.ahead_m.y];
+    let values = pose_values(&keyframe.pose).into_iter().chain(ahead);
+    for (k, value) in values.enumerate() {
+        set_word(slot, k + 2, value.to_bits());
+    }
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images().into_iter().enumerate() {
-        corner
-            .iter()
-            .enumerate()
-            .for_each(|(k, value)| set_word(slot, CORNERS + 2 * level + k, *value as u64));
+        for (k, value) in corner.iter().enumerate() {
+            set_word(slot, CORNERS + 2 * level + k, *value as u64);
+        }
         slot[at..]
             .iter_mut()
             .zip(cells)
@@ -326,8 +270,9 @@ pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
 /// Decodes the keyframe of this name; false if the slot has a different one.
 pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) -> bool {
     keyframe.id = word(slot, 1);
-    keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));
-    keyframe.ahead_m = [6, 7].map(|k| f64::from_bits(word(slot, k))).into();
+    let value = |k: usize| f64::from_bits(word(slot, k));
+    keyframe.pose = pose_from([2, 3, 4, 5].map(value));
+    keyframe.ahead_m = [6, 7].map(value).into();
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images_mut().into_iter().enumerate() {
         *corner = [0, 1].map(|k| word(slot, CORNERS + 2 * level + k) as i64);
@@ -348,11 +293,23 @@ mod tests {
     /// Each word of a state is of a field that comes back.
     #[test]
     fn no_field_of_a_state_is_lost() {
-        let mut words = std::array::from_fn(|k| k as u64 + 2);
-        let flags = [4, 4 + ANCHOR_WORDS, HEADING, WHEELS, DOPPLER];
-        let slips = [WHEELS + WHEEL_WORDS - 1, DOPPLER + WHEEL_WORDS - 1];
-        flags.into_iter().chain(slips).for_each(|k| words[k] = 1);
-        words[HEADING + HEADING_WORDS - 1] = Verdict::Refused as u64;
-        assert_eq!(tracker_words(&tracker_from(&words)), words);
+        let mut words: Vec<u64> = (2..).take(TRACKER_WORDS).collect();
+        let (anchors, heading, wheels, doppler) = ([4, 13], 42, 63, 84);
+        for flag in anchors.into_iter().chain([heading, wheels, doppler]) {
+            words[flag] = 1;
+        }
+        words[wheels - 1] = Verdict::Refused as u64;
+        // Whether they slip.
+        (words[doppler - 1], words[TRACKER_WORDS - 1]) = (1, 1);
+        let (mut state, mut given) = (TrackerState::default(), words.iter());
+        let found = |state: &mut TrackerState| {
+            let mut found = Vec::new();
+            Words(|word: &mut u64| found.push(*word)).tracker(state);
+            found
+        };
+        assert_eq!(found(&mut state)[heading..], [0; 63], "they are not there");
+        Words(|word: &mut u64| *word = given.next().copied().unwrap_or_default())
+            .tracker(&mut state);
+        assert_eq!(found(&mut state), words);
     }
 }

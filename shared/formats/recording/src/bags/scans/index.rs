@@ -20,7 +20,6 @@ use crate::bags::{
 /// Turns among which one of the same time is looked for.
 const RECENT: usize = 8;
 
-/// Place of an azimuth in a bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
     pub message: Key,
@@ -28,14 +27,12 @@ pub(super) struct Place {
     pub row: u32,
 }
 
-/// A scan.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
     /// The azimuth before its first one, which shows the assembler where the scan begins.
     pub start: Place,
     /// The azimuth that completes it.
     pub end: Place,
-    /// The spans of its messages.
     pub spans: RangeInclusive<u32>,
     pub stamp_ns: i64,
     pub logged_ns: i64,
@@ -52,9 +49,7 @@ pub(super) struct Index {
     counters: Counters,
     /// Messages of turns that others have too.
     pub repeated: BTreeSet<Key>,
-    /// Messages that cannot be decoded.
     damaged_messages: u64,
-    /// Why the first of these messages cannot be decoded.
     first_damage: Option<String>,
     /// Azimuths in those that can be.
     azimuths: u64,
@@ -69,14 +64,13 @@ impl Index {
         assembler: SweepAssembler,
     ) -> Result<Self, RecordingError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
-        bag.read_in_order(
-            |channel| channel.topic == topics.scans.name,
-            |_, key, message| {
-                indexing.add(key, message);
-                true
-            },
-        )?;
-        Ok(indexing.finish())
+        let add = |_: &Bag, key: Key, message: &Message| {
+            indexing.add(key, message);
+            true
+        };
+        bag.read_in_order(|channel| channel.topic == topics.scans.name, add)?;
+        indexing.index.counters = indexing.assembler.counters();
+        Ok(indexing.index)
     }
 
     /// Returns the clock as it was at the beginning of a scan.
@@ -92,22 +86,20 @@ impl Index {
             return None;
         }
         let (lost, azimuths) = (&self.counters, self.azimuths);
-        let broken = lost.broken_sweeps;
+        let (invalid, incomplete) = (lost.invalid_azimuths, lost.incomplete_sweeps);
         Some(match &self.first_damage {
             Some(reason) if azimuths == 0 => {
                 format!("has messages on {topic}, of which none can be decoded: {reason}")
             }
             _ if azimuths == 0 => format!("has no messages on {topic} that can be read"),
-            _ if broken > 0 => format!(
+            _ if lost.broken_sweeps > 0 => format!(
                 "has {azimuths} azimuths on {topic}, but their times do not advance as the radar turns, by its encoder and its rotation"
             ),
-            _ if lost.invalid_azimuths > 0 => format!(
-                "has {azimuths} azimuths on {topic}, of which {} have encoder values beyond a turn: set dataset.encoder_counts",
-                lost.invalid_azimuths
+            _ if invalid > 0 => format!(
+                "has {azimuths} azimuths on {topic}, of which {invalid} have encoder values beyond a turn: set dataset.encoder_counts"
             ),
             _ => format!(
-                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {} turns of which more than half is missing",
-                lost.incomplete_sweeps
+                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {incomplete} turns of which more than half is missing"
             ),
         })
     }
@@ -144,16 +136,12 @@ impl Index {
                 "azimuths have more bins than the radar says, and are cut.",
             ),
         ];
-        for (count, what) in losses {
-            if count > 0 {
-                notes.push(format!("{count} {what}"));
-            }
-        }
+        let losses = losses.into_iter().filter(|(count, _)| *count > 0);
+        notes.extend(losses.map(|(count, what)| format!("{count} {what}")));
         notes
     }
 }
 
-/// An index that is being made.
 struct Indexing {
     kind: Kind,
     described: Described,
@@ -164,11 +152,9 @@ struct Indexing {
     /// Azimuths that the clock holds back.
     held: Vec<Place>,
     previous: Option<Place>,
-    /// The start of the next scan.
     start: Option<Place>,
     /// The spans of its azimuths so far.
     spans: RangeInclusive<u32>,
-    /// The newest turns.
     recent: VecDeque<u64>,
     index: Index,
 }
@@ -283,7 +269,6 @@ impl Indexing {
         self.keep_clock();
     }
 
-    /// Keeps the clock where it has changed.
     fn keep_clock(&mut self) {
         if self.clock.found() == self.found {
             return;
@@ -310,19 +295,12 @@ impl Indexing {
             });
         }
     }
-
-    fn finish(mut self) -> Index {
-        self.index.counters = self.assembler.counters();
-        self.index
-    }
 }
 
-/// Returns the span of a place.
 fn only(place: Place) -> RangeInclusive<u32> {
     place.message.span..=place.message.span
 }
 
-/// Returns the spans, extended by the span of a place.
 fn joined(spans: &RangeInclusive<u32>, place: Place) -> RangeInclusive<u32> {
     let span = place.message.span;
     span.min(*spans.start())..=span.max(*spans.end())

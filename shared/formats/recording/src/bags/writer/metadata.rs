@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::Kept;
 
-/// A topic of a bag.
 pub(super) struct Described {
+    pub channel: u16,
     pub name: String,
     pub type_name: String,
     /// The qualities of service, as YAML.
@@ -31,7 +31,7 @@ pub(super) fn qualities(kept: Kept) -> String {
 
 /// Returns the description of a bag with one file, from the first to the last time in it, ns
 /// since 1970.
-pub(super) fn text(file: &str, topics: &[&Described], times: Option<(i64, i64)>) -> String {
+pub(super) fn text(file: &str, topics: &[Described], times: Option<(i64, i64)>) -> String {
     let (first_ns, last_ns) = times.unwrap_or_default();
     let duration_ns = last_ns - first_ns;
     let messages: u64 = topics.iter().map(|topic| topic.messages).sum();
@@ -60,21 +60,9 @@ pub(super) fn text(file: &str, topics: &[&Described], times: Option<(i64, i64)>)
     text
 }
 
-/// Returns a text as YAML between double quotes.
+/// Returns a text between double quotes, as JSON and YAML have it.
 fn quoted(text: &str) -> String {
-    let mut quoted = String::from('"');
-    for letter in text.chars() {
-        match letter {
-            '"' | '\\' => quoted.extend(['\\', letter]),
-            '\n' => quoted.push_str("\\n"),
-            letter if letter.is_control() => {
-                let _ = write!(quoted, "\\u{:04x}", letter as u32);
-            }
-            letter => quoted.push(letter),
-        }
-    }
-    quoted.push('"');
-    quoted
+    serde_json::Value::from(text).to_string()
 }
 
 #[cfg(test)]

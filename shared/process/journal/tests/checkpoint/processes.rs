@@ -1,29 +1,20 @@
-#![allow(clippy::unwrap_used)]
-use gyre_geometry::SparsePoint;
-use gyre_scan_matching::RefinementConfig;
-
-use nalgebra::Vector2;
-
-use nalgebra::Isometry2;
+//! Processes that are started one after the other, as the stage is, with one file.
 
 use super::*;
 
-const WINDOW: usize = 2;
-const SCANS: u64 = 60;
-const INTERVAL_S: f64 = 0.25;
-
 /// A small map with a keyframe for each second scan: slots are reused after about twenty scans.
-fn config() -> RefinementConfig {
+fn small() -> RefinementConfig {
     RefinementConfig {
         keyframes: 2,
-        cell_m: 1.0,
         reach_m: 30.0,
-        ..Default::default()
+        ..config()
     }
 }
 
+const DRIVE: u64 = 60;
+
 /// The scan of two rows of posts, `metres` along the road.
-fn scan(metres: f64) -> Vec<SparsePoint> {
+fn posts(metres: f64) -> Vec<SparsePoint> {
     let post = |k: i32| {
         [
             f64::from(7 * k % 29) * 7.0 - metres % 7.0 - 90.0,
@@ -47,12 +38,9 @@ struct Process {
 
 impl Process {
     fn start(path: &Path) -> Self {
-        let refiner = Refiner::new(&config(), 100).unwrap();
-        let checkpoint =
-            Checkpoint::open(path, WINDOW, config().keyframes, refiner.keyframe_cells()).unwrap();
         Self {
-            refiner,
-            checkpoint,
+            refiner: Refiner::new(&small(), 512).unwrap(),
+            checkpoint: open_with(path, &small(), 2),
             next: None,
         }
     }
@@ -79,7 +67,7 @@ impl Process {
                 Isometry2::identity()
             }
             Some(previous) => {
-                let [later, earlier] = [item, previous].map(|k| scan(k as f64 * speed));
+                let [later, earlier] = [item, previous].map(|k| posts(k as f64 * speed));
                 let searched = Isometry2::new(Vector2::new(speed, 0.0), 0.0);
                 self.refiner
                     .refine(item, &later, &earlier, &searched, INTERVAL_S)
@@ -103,8 +91,8 @@ impl Process {
 fn a_process_resumes_from_any_item_of_earlier_processes() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let alone = Process::start(&path("alone")).items(0..SCANS, 1.0);
-    for reached in (1..SCANS - 2).step_by(2) {
+    let alone = Process::start(&path("alone")).items(0..DRIVE, 1.0);
+    for reached in (1..DRIVE - 2).step_by(2) {
         for repeated in 0..4 {
             let path = path(&format!("{reached}-{repeated}"));
             Process::start(&path).items(0..=reached, 1.0);
@@ -130,12 +118,12 @@ fn states_of_other_scans_are_replaced() {
     for from in [0, 1, 2, 3, 20, 21] {
         let mut alone = Process::start(&path(&format!("alone-{from}")));
         alone.items(0..from, 1.0);
-        let alone = alone.items(from..SCANS, 2.0);
+        let alone = alone.items(from..DRIVE, 2.0);
         for reached in from..from + 3 {
             let path = path(&format!("{from}-{reached}"));
             Process::start(&path).items(0..from + 3, 1.0);
             let mut motions = Process::start(&path).items(from..=reached, 2.0);
-            motions.extend(Process::start(&path).items(reached + 1..SCANS, 2.0));
+            motions.extend(Process::start(&path).items(reached + 1..DRIVE, 2.0));
             assert_eq!(motions, alone, "from {from}, killed again after {reached}");
         }
     }
