@@ -103,7 +103,7 @@ mod tests {
                 ..SimulationConfig::default()
             };
             let simulator = Simulator::new(&config).expect("a drive");
-            let fixes = super::fixes(&simulator).unwrap_or_default();
+            let fixes = fixes(&simulator).unwrap_or_default();
             (simulator, fixes)
         };
         let (simulator, fixes) = simulated(false);

@@ -2,7 +2,7 @@
 
 use nalgebra::Point2;
 
-use crate::body::{Body, Scatterer, Wall};
+use crate::body::{Body, Scatterer};
 use crate::occlusion::WallGrid;
 
 /// Metres a side of the tiles that scatterers are sorted into.

@@ -124,7 +124,8 @@ fn an_image_alone_is_evenly_spaced() {
 
 #[test]
 fn images_that_are_not_of_powers_are_refused() {
-    let edits: [(fn(&mut RadarBScanMsg), &str); 4] = [
+    type Edit = fn(&mut RadarBScanMsg);
+    let edits: [(Edit, &str); 4] = [
         (|it| it.b_scan_img.encoding = "rgb8".to_owned(), "pixels"),
         (|it| it.b_scan_img.height = u32::MAX, "rows of 8 bytes"),
         (|it| it.b_scan_img.width = 0, "for 0 bins"),

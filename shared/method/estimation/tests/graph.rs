@@ -1,6 +1,6 @@
 //! The pose graph against a dense batch solution, against the trajectory filter, and on odd input.
 
-use crate::common::{Batch, Drive, ODOMETRY, apart, dead_reckoning, exact, rms_apart};
+use crate::common::{Batch, Drive, ODOMETRY, apart, dead_reckoning, exact};
 use gyre_estimation::{
     Constraint, GraphOptions, Kernel, Kind, Outcome, PoseGraph, TrajectoryFilter,
 };

@@ -107,7 +107,7 @@ fn energy_normalisation_removes_the_bias_toward_zero_shift() {
             ..TranslationConfig::default()
         };
         let configs = (RotationConfig::default(), config);
-        let error = |seed| {
+        let error = |seed: u64| {
             let scene = crate::common::scatterers(5000, 60.0, 900 + seed);
             let (earlier, later) = pair_of(&scene, n, cell_m, 2.5, motion);
             search(n, cell_m, &configs, &earlier, &later).1.x_m - motion.x
