@@ -75,10 +75,10 @@ impl Target {
         let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
         counts.executed += 1;
         counts.peak_bytes = counts.peak_bytes.max(peak_bytes);
+        let limit_bytes = self.limit_bytes;
         assert!(
-            peak_bytes <= self.limit_bytes,
-            "{peak_bytes} bytes of memory, more than {}",
-            self.limit_bytes
+            peak_bytes <= limit_bytes,
+            "{peak_bytes} bytes, more than {limit_bytes}"
         );
         if let Err(error) = result {
             counts.refused += 1;
@@ -89,16 +89,12 @@ impl Target {
 
 impl Drop for Target {
     fn drop(&mut self) {
-        let Counts {
-            executed,
-            refused,
-            peak_bytes,
-        } = *self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        let counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        let (name, executed, refused) = (self.name, counts.executed, counts.refused);
+        let peak_mb = counts.peak_bytes as f64 / 1e6;
         let _ = writeln!(
             std::io::stderr(),
-            "{}: {executed} inputs, {refused} refused, {:.1} MB of memory at most",
-            self.name,
-            peak_bytes as f64 / 1e6
+            "{name}: {executed} inputs, {refused} refused, {peak_mb:.1} MB of memory at most"
         );
     }
 }
@@ -111,11 +107,8 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 pub fn assert_sentence(error: &impl Display) {
     let text = error.to_string();
     assert!(!text.trim().is_empty(), "an empty error");
-    assert!(
-        text.len() <= LONGEST_SENTENCE,
-        "{} bytes: {text:.200}",
-        text.len()
-    );
+    let bytes = text.len();
+    assert!(bytes <= LONGEST_SENTENCE, "{bytes} bytes: {text:.200}");
     // Other control characters of names and words are replaced where the sentence is printed.
     assert!(!text.contains(['\n', '\r']), "{text:?}");
     // Quoted text is part of the input.

@@ -63,10 +63,7 @@ fn scan(turn: usize) -> OwnedScan {
         scan.stamp_ns[row] = START_NS + (250_000_000 * turn + 15_625_000 * row) as i64;
         scan.flags[row] = flag::MEASURED;
     }
-    scan.bytes
-        .iter_mut()
-        .zip((0..=u8::MAX).cycle())
-        .for_each(|(byte, k)| *byte = k);
+    scan.bytes = (0..AZIMUTHS * BINS).map(|k| k as u8).collect();
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
         bins: BINS,
@@ -95,31 +92,25 @@ struct Form {
 /// The messages of a bag.
 fn messages(form: Form) -> Vec<Message> {
     let described = ScanMessages::new(radar(), "radar").configuration(START_NS);
-    let mut writer = ScanMessages::new(
-        Configuration {
-            encoder_size: form.encoder_size.unwrap_or(radar().encoder_size),
-            ..radar()
-        },
-        "radar",
-    );
+    let mut sent = radar();
+    sent.encoder_size = form.encoder_size.unwrap_or(sent.encoder_size);
+    let mut writer = ScanMessages::new(sent, "radar");
     let mut messages = vec![Message::of("/configuration", START_NS, &described)];
     for turn in 0..TURNS {
         let scan = scan(turn);
         let end_ns = scan.stamp_ns[AZIMUTHS - 1];
-        match form.by_azimuth {
-            true => messages.extend(
-                writer
-                    .azimuths(scan.view())
-                    .map(|azimuth| Message::of("/fft_data", azimuth.header.stamp.ns(), &azimuth)),
-            ),
-            false => {
-                let mut turn = writer.b_scan(scan.view());
-                if form.has_microseconds {
-                    turn.timestamps.iter_mut().for_each(|ns| *ns /= 1_000);
-                }
-                messages.push(Message::of("/b_scan_msg", end_ns, &turn));
+        if form.by_azimuth {
+            for azimuth in writer.azimuths(scan.view()) {
+                let stamp_ns = azimuth.header.stamp.ns();
+                messages.push(Message::of("/fft_data", stamp_ns, &azimuth));
             }
+            continue;
         }
+        let mut turn = writer.b_scan(scan.view());
+        if form.has_microseconds {
+            turn.timestamps.iter_mut().for_each(|ns| *ns /= 1_000);
+        }
+        messages.push(Message::of("/b_scan_msg", end_ns, &turn));
     }
     messages
 }
@@ -134,10 +125,8 @@ fn write(path: &Path, messages: &[Message], chunks: bool) {
         .calculate_chunk_crcs(false);
     let mut mcap: Writer<fs::File> = options.create(fs::File::create(path).unwrap()).unwrap();
     for (sequence, message) in messages.iter().enumerate() {
-        let text = message.text.as_bytes();
-        let schema = mcap
-            .add_schema(&message.type_name, "ros2msg", text)
-            .unwrap();
+        let (name, text) = (&message.type_name, message.text.as_bytes());
+        let schema = mcap.add_schema(name, "ros2msg", text).unwrap();
         let channel = mcap.add_channel(schema, message.topic, "cdr", &BTreeMap::new());
         let header = MessageHeader {
             channel_id: channel.unwrap(),
@@ -160,22 +149,14 @@ fn use_bag(path: &Path) -> Result<(), Failure> {
         match dataset.read(index, scan.slot()) {
             Ok(geometry) => {
                 scan.geometry = geometry;
-                assert!(
-                    scan.view()
-                        .azimuth_rad
-                        .iter()
-                        .all(|azimuth| azimuth.is_finite())
-                );
+                assert!(scan.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
                 assert_eq!(Some(geometry.stamp_ns), dataset.nominal_stamp_ns(index));
             }
             Err(error) => refused = Some(error),
         }
         assert!(dataset.file(index).starts_with(path));
     }
-    match refused {
-        Some(error) => Err(error.into()),
-        None => Ok(()),
-    }
+    refused.map_or(Ok(()), |error| Err(error.into()))
 }
 
 #[derive(Clone, Debug, TypeGenerator)]
@@ -294,10 +275,7 @@ fn a_bag_without_edits_is_accepted() {
         write_parts(&parts, messages(form), &[(2, 10), (1, 9)]);
         use_bag(&parts).unwrap();
         let dataset = gyre_recording::bags::open(&parts, &DatasetOptions::default()).unwrap();
-        assert_eq!(
-            (dataset.len(), dataset.files().len()),
-            (TURNS, 3),
-            "{form:?}"
-        );
+        let (scans, files) = (dataset.len(), dataset.files().len());
+        assert_eq!((scans, files), (TURNS, 3), "{form:?}");
     }
 }

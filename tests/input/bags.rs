@@ -39,12 +39,11 @@ fn bag(run: &Run, name: &str) -> PathBuf {
 /// Returns the independent reader's report about the bag of a run, and about a bag with a radar
 /// that looks to the left; `None` where it is not installed.
 fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
-    let can = Command::new(python())
-        .args(["-c", "import rosbags, numpy"])
-        .output();
-    if !can.is_ok_and(|output| output.status.success()) {
+    let mut can = Command::new(python());
+    can.args(["-c", "import rosbags, numpy"]);
+    if !can.output().is_ok_and(|output| output.status.success()) {
         println!(
-            "skipped: {} has no package rosbags, or GYRE_PYTHON names another",
+            "skipped: {} has no rosbags, or GYRE_PYTHON names another",
             python()
         );
         return None;
@@ -96,13 +95,8 @@ fn real_scans_are_taken_back_to_the_same_motions() {
     export(run.out(), &path, &[]).succeeded();
     let again = Run::of_file(&configuration).data(&path);
     assert_eq!(again.complete(), motions);
-    let inspected = inspect(&path, &[]);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("ros2-bag"),
-        "{}",
-        inspected.stdout
-    );
+    let inspected = inspect(&path, &[]).succeeded().stdout.clone();
+    assert!(inspected.contains("ros2-bag"), "{inspected}");
 }
 
 #[test]
@@ -192,15 +186,13 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
         assert_ne!(says, is_zero, "{key}: {}", exported.stderr);
     }
     assert!(!exported.stderr.contains("interpolated"));
-    assert!(
-        exported.stdout.contains("/radar_data/fft_data 9600"),
-        "{}",
-        exported.stdout
-    );
-    Run::small().data(&path).finish().refused_with(&[
+    let said = &exported.stdout;
+    assert!(said.contains("/radar_data/fft_data 9600"), "{said}");
+    let words = [
         "scans on several topics",
         "--set dataset.topic=/radar_data/",
-    ]);
+    ];
+    Run::small().data(&path).finish().refused_with(&words);
     let motions = run.complete();
     let again = replayed(&run, &path).set("dataset.topic='/radar_data/fft_data'");
     assert_eq!(again.complete(), motions);
@@ -221,9 +213,8 @@ fn a_damaged_scan_is_skipped_and_counted() {
     let bytes = fs::read(&path).unwrap();
     // Zstandard's signature begins the content of each chunk; the fifth one has scans.
     let magic = [0x28, 0xb5, 0x2f, 0xfd];
-    let chunks: Vec<usize> = (0..bytes.len() - 4)
-        .filter(|at| bytes[*at..*at + 4] == magic)
-        .collect();
+    let chunks = (0..bytes.len() - 4).filter(|at| bytes[*at..*at + 4] == magic);
+    let chunks: Vec<usize> = chunks.collect();
     let mut damaged = bytes.clone();
     damaged[chunks[chunks.len() / 2] + 1000] ^= 0xff;
     fs::write(&path, damaged).unwrap();
@@ -238,13 +229,8 @@ fn a_damaged_scan_is_skipped_and_counted() {
     let cut = bag(&run, "cut.mcap");
     fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
     again(&cut, &["has no end behind byte"]);
-    let inspected = inspect(&cut, &[]);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("has no end"),
-        "{}",
-        inspected.stdout
-    );
+    let inspected = inspect(&cut, &[]).succeeded().stdout.clone();
+    assert!(inspected.contains("has no end"), "{inspected}");
 }
 
 #[test]

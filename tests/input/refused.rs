@@ -26,10 +26,9 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
     for image in recording::images(empty.path()) {
         recording::truncate(&image, 0);
     }
-    let set = |sentences: &[&str]| {
-        sentences
-            .iter()
-            .fold(Run::of_recording(), |run, it| run.set(it))
+    let set = |settings: &[&str]| {
+        let settings = settings.iter();
+        settings.fold(Run::of_recording(), |run, it| run.set(it))
     };
     let slam = "slam.kind=graph";
     for (run, words) in [
@@ -122,9 +121,8 @@ fn a_dataset_of_truncated_images_alone_is_reported() {
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 5000);
     }
-    run_of(recording.path())
-        .finish()
-        .failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
+    let ended = run_of(recording.path()).finish();
+    ended.failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
 }
 
 // A bad scan among good ones.
@@ -136,43 +134,31 @@ fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     let run = run_of(recording.path());
     run.finish().succeeded();
     let summary = run.summary();
-    assert_eq!(
-        (
-            &summary["published"],
-            &summary["processed"],
-            &summary["unreadable"]
-        ),
-        (&7.into(), &7.into(), &1.into())
-    );
-    assert_eq!(
-        (&summary["dropped"], &summary["breaks"]),
-        (&0.into(), &0.into())
-    );
+    for (key, count) in [
+        ("published", 7),
+        ("processed", 7),
+        ("unreadable", 1),
+        ("dropped", 0),
+        ("breaks", 0),
+    ] {
+        assert_eq!(summary[key], count, "{key}");
+    }
     let rows = odometry::rows(&run.odometry());
     odometry::assert_unbroken(&rows);
-    assert!(
-        rows.len() == 6 && rows.iter().all(|row| row.scan != bad as u64),
-        "{rows:?}"
-    );
+    assert_eq!(rows.len(), 6);
+    assert!(rows.iter().all(|row| row.scan != bad as u64), "{rows:?}");
     let log = run.result("log.jsonl");
-    let reported = log
-        .lines()
-        .filter(|line| line.contains("WARN") && line.contains(reason))
-        .count();
-    assert_eq!(reported, 1, "{log}");
+    let is_reported = |line: &&str| line.contains("WARN") && line.contains(reason);
+    assert_eq!(log.lines().filter(is_reported).count(), 1, "{log}");
 }
 
 #[test]
 fn an_image_that_cannot_be_read_is_skipped_wherever_it_is() {
     for bad in [0, 4, 7] {
-        skips(bad, "truncated", |image| {
-            recording::truncate(image, 100_000)
-        });
+        let truncate = |image: &Path| recording::truncate(image, 100_000);
+        skips(bad, "truncated", truncate);
     }
-}
-
-#[test]
-fn an_image_of_another_size_is_skipped() {
+    // An image of another size.
     skips(4, "most images of the dataset are", |image| {
         recording::resize(image, 1000, 400)
     });
@@ -191,10 +177,9 @@ fn a_time_longer_than_any_run_is_no_limit() {
 #[test]
 fn a_stage_command_that_does_not_exist_is_reported() {
     for stage in STAGES {
-        let run =
-            Run::of_recording().set(&format!("stages.{stage}.command=['/no/such/program', 'x']"));
-        run.finish()
-            .failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
+        let command = format!("stages.{stage}.command=['/no/such/program', 'x']");
+        let ended = Run::of_recording().set(&command).finish();
+        ended.failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
     }
 }
 
@@ -208,20 +193,21 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_reported() {
     stage("maskin").refused_with(&["`maskin`", "masking"]);
     let ended = stage("masking");
     assert_eq!(ended.code(), Some(2));
+    let said = &ended.stderr;
     assert!(
-        ended.stderr.lines().count() == 1 && ended.stderr.contains("gyre run"),
-        "{}",
-        ended.stderr
+        said.lines().count() == 1 && said.contains("gyre run"),
+        "{said}"
     );
 }
 
 #[test]
-fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
+fn too_little_shared_memory_is_reported_with_the_need_and_just_enough_suffices() {
     let run = Run::of_recording();
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
+    let with = |options: &str| run.with_tmpfs(Path::new(SHARED_MEMORY), options);
+    let Some(small) = with("size=1m") else {
         return;
     };
-    let ended = run.start_as(command).finish();
+    let ended = run.start_as(small).finish();
     ended.refused_with(&[
         "/dev/shm has 1.0 MB free",
         "the run needs",
@@ -229,37 +215,10 @@ fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
         "--shm-size",
     ]);
     assert!(!run.out().join("journal").exists(), "before the first scan");
-}
-
-#[test]
-fn shared_memory_that_cannot_be_written_is_reported() {
-    let run = Run::of_recording();
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "ro,size=1g") else {
-        return;
-    };
-    run.start_as(command)
-        .finish()
-        .refused_with(&["/dev/shm", "writable tmpfs"]);
-}
-
-#[test]
-fn just_enough_shared_memory_suffices() {
-    let run = Run::of_recording();
-    let Some(small) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
-        return;
-    };
-    let said = run.start_as(small).finish().stderr;
-    let needed: f64 = said
-        .split("needs ")
-        .nth(1)
-        .unwrap()
-        .split(' ')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
+    let read_only = run.start_as(with("ro,size=1g").unwrap()).finish();
+    read_only.refused_with(&["/dev/shm", "writable tmpfs"]);
+    let (_, needed) = ended.stderr.split_once("needs ").unwrap();
+    let needed: f64 = needed.split(' ').next().unwrap().parse().unwrap();
     let size = format!("size={}k", (needed * 1e6 / 1024.0) as u64 + 200);
-    run.start_as(run.with_tmpfs(Path::new(SHARED_MEMORY), &size).unwrap())
-        .finish()
-        .succeeded();
+    run.start_as(with(&size).unwrap()).finish().succeeded();
 }

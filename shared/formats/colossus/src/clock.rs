@@ -28,15 +28,6 @@ pub enum ByteOrder {
     Big,
 }
 
-impl fmt::Display for ByteOrder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Little => "little-endian",
-            Self::Big => "big-endian",
-        })
-    }
-}
-
 /// The unit of split seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplitUnit {
@@ -55,15 +46,6 @@ impl SplitUnit {
     }
 }
 
-impl fmt::Display for SplitUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Nanoseconds => "nanoseconds",
-            Self::Microseconds => "microseconds",
-        })
-    }
-}
-
 /// The encoding of an azimuth's time. The default is what most radars send.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockFormat {
@@ -71,6 +53,19 @@ pub struct ClockFormat {
     pub order: ByteOrder,
     /// Unit of the split seconds.
     pub unit: SplitUnit,
+}
+
+impl fmt::Display for ClockFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match (self.order, self.unit) {
+            (ByteOrder::Little, SplitUnit::Nanoseconds) => "little-endian seconds and nanoseconds",
+            (ByteOrder::Little, SplitUnit::Microseconds) => {
+                "little-endian seconds and microseconds"
+            }
+            (ByteOrder::Big, SplitUnit::Nanoseconds) => "big-endian seconds and nanoseconds",
+            (ByteOrder::Big, SplitUnit::Microseconds) => "big-endian seconds and microseconds",
+        })
+    }
 }
 
 impl ClockFormat {
@@ -124,12 +119,10 @@ pub enum FoundClock {
 impl fmt::Display for FoundClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unix(ClockFormat { order, unit }) => {
-                write!(f, "The radar sends its time as {order} seconds and {unit}.")
-            }
-            Self::Uptime(ClockFormat { order, unit }) => write!(
+            Self::Unix(format) => write!(f, "The radar sends its time as {format}."),
+            Self::Uptime(format) => write!(
                 f,
-                "The radar does not know the time: its {order} seconds and {unit} are counted from this host's time at the first azimuth."
+                "The radar does not know the time: its {format} are counted from this host's time at the first azimuth."
             ),
             Self::Arrival => f.write_str(
                 "The radar's time does not advance as it turns: azimuths have this host's time at which they arrive.",
@@ -220,15 +213,11 @@ impl RadarClock {
 
     /// Finds the clock from this azimuth and one held back, or holds this one back too.
     fn find(&mut self, azimuth: &Azimuth<'_>, arrived_ns: i64) {
-        let format = self
-            .held
-            .iter()
-            .find_map(|(earlier, _)| self.format(&earlier.azimuth(), azimuth, arrived_ns));
+        let of = |earlier: &KeptAzimuth| self.format(&earlier.azimuth(), azimuth, arrived_ns);
+        let format = self.held.iter().find_map(|(earlier, _)| of(earlier));
         if let (Some(format), Some((first, first_arrived_ns))) = (format, self.held.first()) {
-            let first = first.azimuth();
-            let unix = format.is_unix(azimuth);
-            self.offset_ns = first_arrived_ns.saturating_sub(format.ns(&first));
-            self.found = Some(match unix {
+            self.offset_ns = first_arrived_ns.saturating_sub(format.ns(&first.azimuth()));
+            self.found = Some(match format.is_unix(azimuth) {
                 true => FoundClock::Unix(format),
                 false => FoundClock::Uptime(format),
             });

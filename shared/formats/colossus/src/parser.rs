@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::malformed::{MalformedDatagram, MalformedMessage};
+use crate::malformed::Malformed;
 use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSION, decode};
 
 /// The most bytes that [`Parser::space`] promises.
@@ -36,9 +36,7 @@ pub enum Damage {
     #[error("a message is cut short: another one starts within its payload")]
     CutShort,
     #[error(transparent)]
-    Malformed(#[from] MalformedMessage),
-    #[error(transparent)]
-    Datagram(#[from] MalformedDatagram),
+    Malformed(#[from] Malformed),
 }
 
 /// A buffer that is filled from a socket, and the messages in it.
@@ -148,11 +146,9 @@ impl Parser {
         let pending = &self.buffer[self.start..self.end];
         if self.before > 0 && !pending.is_empty() && agree(pending, &SIGNATURE[self.before..]) {
             // The signature has begun in the last message.
-            let whole = self.before + pending.len() >= SIGNATURE.len();
-            return if whole {
-                Err(Damage::CutShort)
-            } else {
-                Ok(None)
+            return match self.before + pending.len() >= SIGNATURE.len() {
+                true => Err(Damage::CutShort),
+                false => Ok(None),
             };
         }
         if !agree(pending, &SIGNATURE) {

@@ -152,23 +152,21 @@ pub trait Dataset: Send {
 
 /// Checks that a slot is as large as the limits of a dataset.
 pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-    let slices = [
+    for (what, needed, actual) in [
         ("bytes", limits.bytes, slot.bytes.len()),
         ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
         ("stamps", limits.azimuths, slot.stamp_ns.len()),
         ("flags", limits.azimuths, slot.flags.len()),
-    ];
-    match slices
-        .into_iter()
-        .find(|(_, needed, actual)| actual < needed)
-    {
-        None => Ok(()),
-        Some((what, needed, actual)) => Err(ReadError::SlotTooSmall {
-            what,
-            needed,
-            actual,
-        }),
+    ] {
+        if actual < needed {
+            return Err(ReadError::SlotTooSmall {
+                what,
+                needed,
+                actual,
+            });
+        }
     }
+    Ok(())
 }
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
@@ -225,10 +223,9 @@ fn open_found(
         format => match profiles::Profile::of(format) {
             Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),
             None => {
-                let path = found.folder.display();
-                return Err(OpenError::Recording(format!(
-                    "{path} is a folder of images, and the format `{format}` is not of images"
-                )));
+                let fault =
+                    format!("is a folder of images, and the format `{format}` is not of images");
+                return Err(OpenError::at(&found.folder, fault));
             }
         },
     })

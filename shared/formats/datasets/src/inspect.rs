@@ -1,7 +1,5 @@
-//! Summary of a dataset and of its faults: `gyre inspect`.
-//!
-//! Each part of the inspection adds its figures, its printed lines and its findings to the
-//! [`Report`].
+//! Summary of a dataset and of its faults: `gyre inspect`. Each part of the inspection adds its
+//! figures, its printed lines and its findings to the [`Report`].
 
 mod ground_truth;
 mod logs;
@@ -140,9 +138,8 @@ impl fmt::Display for Report {
 struct ScansRead {
     scans_read: usize,
     rows: rows::Survey,
-    /// Scans that could not be read, and why the first could not.
+    /// Scans that could not be read, and why.
     unreadable: Vec<Value>,
-    first_error: String,
     /// The last scan.
     scan: OwnedScan,
 }
@@ -156,7 +153,6 @@ impl ScansRead {
             scans_read: 0,
             rows: rows::Survey::default(),
             unreadable: Vec::new(),
-            first_error: String::new(),
             scan: OwnedScan::with_limits(dataset.limits()),
         };
         for index in dataset.scans().step_by(step) {
@@ -167,13 +163,9 @@ impl ScansRead {
                     read.rows.add(&read.scan.view());
                 }
                 Err(error) => {
-                    let error = error.to_string();
-                    let file = dataset.file(index);
-                    read.unreadable
-                        .push(json!({"scan": index, "file": file, "error": error}));
-                    if read.unreadable.len() == 1 {
-                        read.first_error = error;
-                    }
+                    let (file, error) = (dataset.file(index), error.to_string());
+                    let of_scan = json!({"scan": index, "file": file, "error": error});
+                    read.unreadable.push(of_scan);
                 }
             }
         }
@@ -183,13 +175,11 @@ impl ScansRead {
     fn images(&self, report: &mut Report, dataset: &dyn Dataset, options: &DatasetOptions) {
         let (scans, scans_read) = (report.scans, self.scans_read);
         report.line("format", report.format.to_string());
-        report.line(
-            "scans",
-            match scans_read < scans {
-                true => format!("{scans} ({scans_read} of them read)"),
-                false => scans.to_string(),
-            },
-        );
+        let of_them = match scans_read < scans {
+            true => format!(" ({scans_read} of them read)"),
+            false => String::new(),
+        };
+        report.line("scans", format!("{scans}{of_them}"));
         report.figure("scans_read", scans_read);
         let (image, transposed) = (dataset.image_size(), dataset.is_transposed());
         let side = match transposed {
@@ -201,10 +191,8 @@ impl ScansRead {
         report.figure("transposed", transposed);
         let (geometry, azimuths) = (self.scan.geometry, self.rows.most_rows());
         let (bins, bin_m) = (geometry.bins, geometry.range_resolution_m);
-        report.line(
-            "sweep",
-            format!("{azimuths} azimuths x {bins} range bins, clockwise"),
-        );
+        let sweep = format!("{azimuths} azimuths x {bins} range bins, clockwise");
+        report.line("sweep", sweep);
         report.figure("azimuths", azimuths);
         report.figure("bins", bins);
         let offset_m = geometry.range_offset_m;
@@ -213,10 +201,8 @@ impl ScansRead {
             false => format!(", offset {offset_m} m"),
         };
         let max_range_m = self.scan.view().range_m(bins as f32 - 1.0);
-        report.line(
-            "range",
-            format!("{bin_m:.6} m per bin{offset}, to {max_range_m:.1} m"),
-        );
+        let range = format!("{bin_m:.6} m per bin{offset}, to {max_range_m:.1} m");
+        report.line("range", range);
         for (name, value) in [
             ("range_resolution_m", bin_m),
             ("range_offset_m", offset_m),
@@ -225,9 +211,8 @@ impl ScansRead {
             // The number with the decimals that an f32 has.
             report.figure(name, value.to_string().parse::<f64>().ok());
         }
-        if matches!(report.format, Format::Oxford | Format::Oord)
-            && options.range_resolution_m.is_none()
-        {
+        let is_oxford = matches!(report.format, Format::Oxford | Format::Oord);
+        if is_oxford && options.range_resolution_m.is_none() {
             report.find(format!(
                 "The range resolution is {bin_m} m: with the 0.0432 m of the development kit, paths are more than 1 % short."
             ));
@@ -238,9 +223,9 @@ impl ScansRead {
         if report.scans == 1 {
             report.find("There is only one scan, but a motion requires two.".to_owned());
         }
-        if !self.unreadable.is_empty() {
+        if let Some(first) = self.unreadable.first() {
             let indices = self.unreadable.iter().map(|it| it["scan"].to_string());
-            let (places, first) = (some(indices), &self.first_error);
+            let (places, first) = (some(indices), first["error"].as_str().unwrap_or_default());
             let (count, all) = (self.unreadable.len(), self.scans_read);
             report.find(format!(
                 "{count} of {all} scans cannot be read (scans {places}): {first}."
@@ -258,9 +243,8 @@ fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
             return report.figure("velocity", Value::Null);
         }
         Err(error) => {
-            let error = error.to_string();
+            let (error, none) = (error.to_string(), Value::Null);
             let text = format!("unknown: {error}");
-            let none = Value::Null;
             let figures =
                 json!({"velocity_mps": none, "sigma_mps": none, "bearings": 0, "error": error});
             (text, figures)

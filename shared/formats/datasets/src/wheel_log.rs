@@ -73,10 +73,7 @@ impl WheelLog {
     }
 
     fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
-        Ok(Self::with(
-            examine(raw, unit_is_assumed, path, &SPEEDS)?,
-            path,
-        ))
+        examine(raw, unit_is_assumed, path, &SPEEDS).map(|examined| Self::with(examined, path))
     }
 
     fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {

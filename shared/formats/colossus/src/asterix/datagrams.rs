@@ -2,10 +2,10 @@
 
 use std::mem;
 
-use super::{MalformedDatagram, Video, assembly::Assembly, decode};
+use super::{Video, assembly::Assembly, decode};
 use crate::configuration::Configuration;
 use crate::message::Message;
-use crate::parser::{Damage, Event};
+use crate::parser::Event;
 
 /// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
@@ -102,7 +102,10 @@ impl Datagrams {
                 self.filled = bytes;
                 message(&self.ended, self.encoder_size)
             }
-            Err(malformed) => Some(damaged(malformed, bytes)),
+            Err(malformed) => Some(Event::Damaged {
+                reason: malformed.into(),
+                skipped_bytes: bytes,
+            }),
         }
     }
 
@@ -154,13 +157,6 @@ impl Datagrams {
 fn message(azimuth: &Assembly, encoder_size: u16) -> Option<Event<'_>> {
     let azimuth = azimuth.azimuth(encoder_size)?;
     Some(Event::Message(Message::Azimuth(azimuth)))
-}
-
-fn damaged(malformed: MalformedDatagram, bytes: usize) -> Event<'static> {
-    Event::Damaged {
-        reason: Damage::Datagram(malformed),
-        skipped_bytes: bytes,
-    }
 }
 
 #[cfg(test)]

@@ -29,14 +29,6 @@ pub(super) struct Seam {
     ns: f64,
 }
 
-/// The azimuths missing between two of a sweep.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gap {
-    count: usize,
-    counts: f64,
-    ns: f64,
-}
-
 impl Grid {
     pub(super) fn new(configuration: &Configuration) -> Self {
         Self {
@@ -74,11 +66,13 @@ impl Grid {
         (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
     }
 
-    pub(super) fn gap(&self, last: Reading, here: Reading) -> Gap {
+    /// Returns the azimuths missing between two of a sweep.
+    pub(super) fn gap(&self, last: Reading, here: Reading) -> Empty {
         let counts = self.counts(last, here);
         let rows = (counts / self.step).round().max(1.0);
-        Gap {
+        Empty {
             count: rows as usize - 1,
+            from: (last.encoder.into(), last.stamp_ns),
             counts: counts / rows,
             ns: elapsed_ns(last, here) / rows,
         }
@@ -88,23 +82,24 @@ impl Grid {
         let to_zero = f64::from(self.encoder_size - last.encoder);
         // Positions before zero, which zero itself is not.
         let before_zero = (to_zero / self.step).ceil() as usize - 1;
+        // The step across zero may be shorter than the others.
+        let counts = self.step;
         if self.is_break(last, here) {
             // Nothing is known of the time in between: both sweeps are continued at the radar's
             // rotation.
             return Seam {
                 trailing: before_zero,
                 leading: (f64::from(here.encoder) / self.step) as usize,
-                counts: self.step,
+                counts,
                 ns: self.step * self.ns_per_count,
             };
         }
-        let Gap { count, ns, .. } = self.gap(last, here);
+        let Empty { count, ns, .. } = self.gap(last, here);
         let trailing = before_zero.min(count);
         Seam {
             trailing,
             leading: count - trailing,
-            // The step across zero may be shorter than the others.
-            counts: self.step,
+            counts,
             ns,
         }
     }
@@ -119,23 +114,11 @@ impl Grid {
     }
 }
 
-impl Gap {
-    /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn forward(&self, last: Reading, fits: usize) -> Empty {
-        Empty {
-            count: self.count.min(fits),
-            from: (last.encoder.into(), last.stamp_ns),
-            counts: self.counts,
-            ns: self.ns,
-        }
-    }
-}
-
 impl Seam {
-    /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn trailing(&self, last: Reading, fits: usize) -> Empty {
+    /// Returns the rows after `last`.
+    pub(super) fn trailing(&self, last: Reading) -> Empty {
         Empty {
-            count: self.trailing.min(fits),
+            count: self.trailing,
             from: (last.encoder.into(), last.stamp_ns),
             counts: self.counts,
             ns: self.ns,
@@ -147,12 +130,10 @@ impl Seam {
         let count = self.leading.min(fits);
         let rows = (count + 1) as f64;
         let before_ns = (rows * self.ns).round() as i64;
+        let encoder = f64::from(here.encoder) - rows * self.counts;
         Empty {
             count,
-            from: (
-                f64::from(here.encoder) - rows * self.counts,
-                here.stamp_ns.saturating_sub(before_ns),
-            ),
+            from: (encoder, here.stamp_ns.saturating_sub(before_ns)),
             counts: self.counts,
             ns: self.ns,
         }

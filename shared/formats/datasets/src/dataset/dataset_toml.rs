@@ -1,8 +1,4 @@
-//! `dataset.toml`: options stored with a recording.
-//!
-//! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they
-//! are best stored beside its recordings. Simulated recordings include the file. Options given
-//! explicitly take precedence.
+//! `dataset.toml`: options stored with a recording. Options given explicitly take precedence.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -19,18 +15,16 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     for path in places.map(|folder| folder.join(FILE)) {
         let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
             Ok(text) => text,
-            Err(error)
-                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
-            {
-                continue;
-            }
-            Err(source) => return Err(OpenError::Io { path, source }),
+            Err(error) => match error.kind() {
+                ErrorKind::NotFound | ErrorKind::NotADirectory => continue,
+                _ => return Err(OpenError::io(&path, error)),
+            },
         };
-        let invalid = |error: toml::de::Error| OpenError::DatasetToml {
-            path: path.clone(),
-            reason: reason(&text, &error),
-        };
-        return toml::from_str(&text).map_err(invalid);
+        return toml::from_str(&text).map_err(|error| {
+            let reason = reason(&text, &error);
+            let fault = format!("does not hold keys of the section [dataset]: {reason}");
+            OpenError::at(&path, fault)
+        });
     }
     Ok(DatasetOptions::default())
 }

@@ -46,10 +46,7 @@ impl SeriesPosition {
 /// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
 /// half of the images, and a second file of the same number.
 pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
-    let io_error = |source| OpenError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io_error = |source| OpenError::io(folder, source);
     let mut names: Vec<OsString> = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
         names.extend(png_name(&entry.map_err(io_error)?).map_err(io_error)?);
@@ -64,39 +61,30 @@ pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
 
 /// Returns a sentence on files that are left out.
 pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {
-    let named: Vec<String> = left_out
-        .iter()
-        .take(MAX_NAMED)
-        .map(|name| format!("`{}`", name.to_string_lossy()))
-        .collect();
-    let (named, more) = (named.join(", "), left_out.len().saturating_sub(MAX_NAMED));
-    let rest = match more {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    match left_out.len() {
-        0 => None,
-        1 => Some(format!("1 image is left out, {because}: {named}.")),
-        n => Some(format!(
-            "{n} images are left out, {because}: {named}{rest}."
-        )),
+    let named = left_out.iter().take(MAX_NAMED);
+    let named = named.map(|name| format!("`{}`", name.to_string_lossy()));
+    let mut named = named.collect::<Vec<_>>().join(", ");
+    if left_out.len() > MAX_NAMED {
+        named += &format!(" and {} more", left_out.len() - MAX_NAMED);
     }
+    let are = match left_out.len() {
+        0 => return None,
+        1 => "1 image is".to_owned(),
+        n => format!("{n} images are"),
+    };
+    Some(format!("{are} left out, {because}: {named}."))
 }
 
 /// Divides names into the names of the series, in order, and the others.
 fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
     let (hidden, shown): (Vec<_>, Vec<_>) = names.into_iter().partition(is_hidden);
-    let numbers: HashSet<i64> = shown
-        .iter()
-        .filter_map(|n| file_number(Path::new(n)))
-        .collect();
-    let (copies, shown): (Vec<_>, Vec<_>) = shown
-        .into_iter()
-        .partition(|name| copied_number(name).is_some_and(|number| numbers.contains(&number)));
-    let placed = shown
-        .into_iter()
-        .map(|name| (SeriesPosition::of(Path::new(&name)), name));
-    let (mut placed, strangers) = most(placed.collect());
+    let numbers = shown.iter().filter_map(|name| file_number(Path::new(name)));
+    let numbers: HashSet<i64> = numbers.collect();
+    let is_copy =
+        |name: &OsString| copied_number(name).is_some_and(|number| numbers.contains(&number));
+    let (copies, shown): (Vec<_>, Vec<_>) = shown.into_iter().partition(is_copy);
+    let placed = |name: OsString| (SeriesPosition::of(Path::new(&name)), name);
+    let (mut placed, strangers) = most(shown.into_iter().map(placed).collect());
     placed.sort_unstable_by(|(a, one), (b, other)| a.cmp(b).then_with(|| natural(one, other)));
     let (mut kept, mut others) = (Vec::<OsString>::new(), [hidden, copies, strangers].concat());
     let mut last = None;

@@ -10,14 +10,14 @@ use super::images::Images;
 use super::options::DatasetOptions;
 use super::profiles::MULRAN_RESOLUTION_M;
 use super::stamp;
-use super::transposed::{FirstAzimuth, TransposedScans, Turn};
+use super::transposed::{TransposedScans, Turn};
 
 const STAMPS: &str = "Files are named by the time of the last column; columns are spread uniformly over a turn, which is the time since \
                       the previous file, and the time of a scan is the mean of its columns'.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
     let mut scans = TransposedScans::open(found, options, STAMPS, |_| MULRAN_RESOLUTION_M)?;
-    scans.first_azimuth = FirstAzimuth::HalfAStep;
+    scans.first_azimuth = 0.5;
     let ends_ns = (0..scans.images.len())
         .map(|index| end_ns(&scans.images, index))
         .collect::<Result<Vec<_>, _>>()?;
@@ -40,12 +40,9 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
 }
 
 fn end_ns(images: &Images, index: usize) -> Result<i64, OpenError> {
-    images
-        .name_stamp_ns(index)
-        .ok_or_else(|| OpenError::UnknownLayout {
-            path: images.file(index).to_owned(),
-            reason: "a MulRan image is named by its time in ns, of the years 2015 to 2040"
-                .to_owned(),
-            remedy: "rename it, or set the `format` that it is of",
-        })
+    images.name_stamp_ns(index).ok_or_else(|| {
+        let reason = "a MulRan image is named by its time in ns, of the years 2015 to 2040";
+        let remedy = "rename it, or set the `format` that it is of";
+        OpenError::unknown_layout(images.file(index), reason, remedy)
+    })
 }

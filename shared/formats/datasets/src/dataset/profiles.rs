@@ -64,7 +64,7 @@ pub(crate) struct Profile {
 }
 
 /// A format: its folders relative to the root, and the parameters of its metadata columns.
-type Known = (Format, &'static [&'static str], Option<Profile>);
+pub(crate) type Known = (Format, &'static [&'static str], Option<Profile>);
 
 /// The development kit of Oxford gives 0.0432 m for a bin: then paths are 1.4 % shorter than the
 /// ground truth.
@@ -174,22 +174,15 @@ impl Profile {
         options: &DatasetOptions,
     ) -> Self {
         let (before_m, until_ns) = BOREAS_BEFORE;
-        let start_ns = first_image.and_then(FirstImage::start_ns);
+        let start_ns = first_image.and_then(|image| image.row_ns(0));
         if format == Format::Boreas && start_ns.is_some_and(|ns| ns < until_ns) {
             self.range_resolution_m = before_m;
         }
-        Self {
-            range_resolution_m: options
-                .range_resolution_m
-                .unwrap_or(self.range_resolution_m),
-            range_offset_m: options.range_offset_m.unwrap_or(self.range_offset_m),
-            doppler_s: options.doppler_s.unwrap_or(self.doppler_s),
-            azimuth_eccentricity_rad: options
-                .azimuth_eccentricity_rad
-                .unwrap_or(self.azimuth_eccentricity_rad),
-            encoder_counts: options.encoder_counts.unwrap_or(self.encoder_counts),
-            azimuth_source: options.azimuth_source.unwrap_or(self.azimuth_source),
-            ..self
+        macro_rules! take {
+            ($($option:ident)*) => { $(self.$option = options.$option.unwrap_or(self.$option);)* };
         }
+        take!(range_resolution_m range_offset_m doppler_s azimuth_eccentricity_rad);
+        take!(encoder_counts azimuth_source);
+        self
     }
 }

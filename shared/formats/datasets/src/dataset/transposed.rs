@@ -2,7 +2,7 @@
 //! from straight ahead.
 
 use super::detect::Found;
-use super::eccentricity;
+use super::eccentricity::correct_eccentricity;
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
 use super::format::Format;
@@ -26,27 +26,17 @@ pub(crate) struct Turn {
     pub(crate) logged_ns: i64,
 }
 
-/// The azimuth of the first column.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) enum FirstAzimuth {
-    /// Straight ahead.
-    #[default]
-    Ahead,
-    /// Half a step to the right.
-    HalfAStep,
-}
-
 /// The scans of a folder, with scratch memory for the transposition. Images that are wider than
 /// high are not transposed.
-#[derive(Debug)]
 pub(crate) struct TransposedScans {
     pub(crate) images: Images,
     /// One per image.
     pub(crate) turns: Vec<Turn>,
     /// Time of a turn, of those without gaps between, ns. The caller sets it with the turns.
     pub(crate) period_ns: i64,
-    /// The caller sets it if it is not the default.
-    pub(crate) first_azimuth: FirstAzimuth,
+    /// The azimuth of the first column, steps clockwise from ahead. The caller sets it if it is not
+    /// 0.
+    pub(crate) first_azimuth: f64,
     pub(crate) notes: Vec<String>,
     format: Format,
     stamp_meaning: &'static str,
@@ -80,7 +70,7 @@ impl TransposedScans {
             images,
             turns: Vec::new(),
             period_ns: 0,
-            first_azimuth: FirstAzimuth::default(),
+            first_azimuth: 0.0,
             notes,
             format,
             stamp_meaning,
@@ -112,12 +102,7 @@ impl TransposedScans {
             return Ok(());
         }
         let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
-        Err(OpenError::WrongImage {
-            path: self.images.file(0).to_owned(),
-            actual: self.images.size,
-            format: self.format,
-            reason,
-        })
+        Err(self.images.wrong(self.format, &reason))
     }
 
     pub(crate) fn azimuths(&self) -> usize {
@@ -130,10 +115,11 @@ impl TransposedScans {
 
     /// Decodes an image, azimuth x range bin.
     fn decode(&mut self, index: usize, into: &mut [u8]) -> Result<(), ReadError> {
+        let rows = self.images.size.height;
         if !self.is_transposed() {
-            return self.images.decode(index, into);
+            return self.images.decode(index, rows..=rows, into).map(|_| ());
         }
-        self.images.decode(index, &mut self.scratch)?;
+        self.images.decode(index, rows..=rows, &mut self.scratch)?;
         transpose(&self.scratch, self.azimuths(), into);
         Ok(())
     }
@@ -145,8 +131,10 @@ impl TransposedScans {
         }
     }
 
+    /// The mean time of columns that are spread uniformly over a period.
     fn stamp_ns(&self, turn: &Turn) -> i64 {
-        turn.start_ns + mean_after_start_ns(turn.period_ns, self.azimuths())
+        let n = self.azimuths() as i64;
+        turn.start_ns + turn.period_ns * (n - 1) / (2 * n)
     }
 }
 
@@ -175,7 +163,7 @@ impl Dataset for TransposedScans {
     }
 
     fn files(&self) -> &FileList {
-        self.images.files()
+        &self.images.files
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
@@ -192,10 +180,6 @@ impl Dataset for TransposedScans {
 
     fn stamp_meaning(&self) -> &'static str {
         self.stamp_meaning
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        None
     }
 
     fn notes(&self) -> &[String] {
@@ -223,22 +207,15 @@ impl Dataset for TransposedScans {
         }
         let bytes = &mut slot.bytes[..azimuths * bins];
         self.decode(index, bytes)?;
+        // No image is before the first one.
         let before = index.checked_sub(1);
-        let lost = match &self.stale {
-            Some(stale) if before.is_some_and(|before| stale.has(before)) => {
-                stale.count(bytes, bins)
-            }
-            // No image is before the first one.
-            _ => 0,
-        };
+        let has_before = |stale: &&StaleRows| before.is_some_and(|before| stale.has(before));
+        let stale = self.stale.as_ref().filter(has_before);
+        let lost = stale.map_or(0, |stale| stale.count(bytes, bins));
         self.remember(index, Some(bytes));
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
-        let first = match self.first_azimuth {
-            FirstAzimuth::Ahead => 0.0,
-            FirstAzimuth::HalfAStep => 0.5,
-        };
-        fill_uniform(azimuth_rad, first);
-        eccentricity::correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
+        fill_uniform(azimuth_rad, self.first_azimuth);
+        correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
         let assumed = match self.stale {
             Some(_) => flag::ASSUMED,
             None => 0,
@@ -261,12 +238,6 @@ impl Dataset for TransposedScans {
             stamp_ns: self.stamp_ns(&turn),
         })
     }
-}
-
-/// Mean time of `azimuths` columns spread uniformly over a period, relative to the first, ns.
-fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
-    let n = azimuths as i64;
-    period_ns * (n - 1) / (2 * n)
 }
 
 /// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same

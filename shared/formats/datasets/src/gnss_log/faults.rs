@@ -61,27 +61,26 @@ fn is_zero(count: &usize) -> bool {
 impl GnssFaults {
     /// Returns the number of rows that are not among the fixes.
     pub fn left_out(&self) -> usize {
-        self.unreadable
-            + self.without_fix
-            + self.not_a_number
-            + self.off_the_earth
-            + self.zero
-            + self.repeated
-            + self.frozen
-            + self.jumps
+        let used = self.out_of_order + self.of_unknown_status + self.too_certain;
+        let all = self.named().iter().map(|(count, _)| count).sum::<usize>();
+        all - used
     }
 
     /// Returns the reason why none of so many entries is a usable fix.
     pub(super) fn without_usable(&self, all: usize) -> String {
-        let named = self.named().into_iter();
-        let named: Vec<String> = named
-            .map(|(count, what)| format!("{count} {what}"))
-            .collect();
-        let named = match named.is_empty() {
-            true => String::new(),
-            false => format!(" ({})", named.join(", ")),
+        let named = match self.listed() {
+            Some(listed) => format!(" ({listed})"),
+            None => String::new(),
         };
         format!("none of its {all} entries is a usable fix{named}")
+    }
+
+    /// Returns the counts that are not zero as a text; `None` without faults.
+    pub(crate) fn listed(&self) -> Option<String> {
+        let named = self.named().into_iter();
+        let named = named.map(|(count, what)| format!("{count} {what}"));
+        let listed = named.collect::<Vec<_>>().join(", ");
+        (!listed.is_empty()).then_some(listed)
     }
 
     /// Returns the counts that are not zero, with their names.

@@ -69,18 +69,25 @@ const MULRAN_WITHOUT_RATES: usize = 8;
 
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
+impl GyroColumns {
+    /// Columns in rad/s and m/s².
+    fn known(stamp: Stamp, rates: [usize; 3], accelerations: [usize; 3]) -> Self {
+        Self {
+            stamp,
+            rates,
+            rate_unit: 1.0,
+            unit_is_assumed: false,
+            accelerations: Some((accelerations, 1.0)),
+        }
+    }
+}
+
 impl Columns for GyroColumns {
     type Entry = Sample;
 
     fn by_number(columns: usize) -> Result<Self, String> {
         match columns {
-            MULRAN => Ok(Self {
-                stamp: Stamp::first(false),
-                rates: [8, 9, 10],
-                rate_unit: 1.0,
-                unit_is_assumed: false,
-                accelerations: Some(([11, 12, 13], 1.0)),
-            }),
+            MULRAN => Ok(Self::known(Stamp::first(false), [8, 9, 10], [11, 12, 13])),
             MULRAN_WITHOUT_RATES => Err(format!(
                 "as the first version of MulRan's xsens_imu.csv it has orientations and no angular rates, but {MULRAN} columns have them: download the recording anew"
             )),
@@ -93,13 +100,7 @@ impl Columns for GyroColumns {
     fn by_names(header: &Header) -> Result<Self, String> {
         let names = header.names();
         if names == FOMO {
-            return Ok(Self {
-                stamp: Stamp::first(true),
-                rates: [1, 2, 3],
-                rate_unit: 1.0,
-                unit_is_assumed: false,
-                accelerations: Some(([4, 5, 6], 1.0)),
-            });
+            return Ok(Self::known(Stamp::first(true), [1, 2, 3], [4, 5, 6]));
         }
         let Some((rates, unit)) = vector(header, RATES, &RATE_UNITS) else {
             let hint = match header.find("ins_status") {
@@ -134,12 +135,13 @@ impl Columns for GyroColumns {
         let stamp_ns = self.stamp.ns(row)?;
         let rates = read(self.rates, self.rate_unit)?;
         let accelerations = self.accelerations.and_then(|(at, factor)| read(at, factor));
-        Some(sample(stamp_ns, rates, accelerations.unwrap_or_default()))
+        let accelerations = accelerations.unwrap_or_default();
+        Some(sample(stamp_ns, [rates, accelerations]))
     }
 }
 
 /// A sample of rates and accelerations, which are zero if one of them is not finite.
-pub(super) fn sample(stamp_ns: i64, rates: [f64; 3], accelerations: [f64; 3]) -> Sample {
+pub(super) fn sample(stamp_ns: i64, [rates, accelerations]: [[f64; 3]; 2]) -> Sample {
     let are_finite = accelerations.iter().all(|value| value.is_finite());
     let [x, y, z] = rates;
     let [ax, ay, az] = if are_finite { accelerations } else { [0.0; 3] };

@@ -47,16 +47,16 @@ impl Jumps {
 /// Leaves out samples of a kind, in the order of their stamps, that jump away from those before and
 /// back to those after them.
 pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
-    let value = match kind {
-        SampleKind::Gyro => 2,
-        SampleKind::Wheels => 0,
+    let (value, per_s) = match kind {
+        SampleKind::Gyro => (2, YAW_RADPS2),
+        SampleKind::Wheels => (0, SPEED_MPS2),
     };
     let all: &[Sample] = samples;
-    let limits = Limits::of(all, kind, value);
+    let at_least = at_least(all, per_s, value);
     let step = |from: usize, to: usize| {
         let change = all[to].values[value] - all[from].values[value];
-        let is_jump = limits.is_jump(change, seconds(all, from, to));
-        is_jump.then_some(change)
+        let most = at_least.max(per_s * seconds(all, from, to));
+        (change.abs() > most).then_some(change)
     };
     let mut jumps = Jumps::default();
     let mut is_left_out = vec![false; all.len()];
@@ -84,34 +84,16 @@ pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
     jumps
 }
 
-/// The fastest change of a value.
-struct Limits {
-    per_s: f64,
-    /// Whatever the time between two samples, which are closer together where stamps jitter.
-    at_least: f64,
-}
-
-impl Limits {
-    fn of(samples: &[Sample], kind: SampleKind, value: usize) -> Self {
-        let per_s = match kind {
-            SampleKind::Gyro => YAW_RADPS2,
-            SampleKind::Wheels => SPEED_MPS2,
-        };
-        let pairs = || 1..samples.len();
-        let period_s = median(pairs().map(|k| seconds(samples, k - 1, k))).unwrap_or_default();
-        let change = |k: usize| (samples[k].values[value] - samples[k - 1].values[value]).abs();
-        let mut changes: Vec<f64> = pairs().map(change).collect();
-        changes.sort_unstable_by(f64::total_cmp);
-        let usual = changes.get((USUAL_SHARE * changes.len() as f64) as usize);
-        Self {
-            per_s,
-            at_least: (per_s * period_s).max(UNUSUAL * usual.copied().unwrap_or_default()),
-        }
-    }
-
-    fn is_jump(&self, change: f64, time_s: f64) -> bool {
-        change.abs() > self.at_least.max(self.per_s * time_s)
-    }
+/// The change of a value that is no jump, whatever the time between two samples, which are closer
+/// together where stamps jitter.
+fn at_least(samples: &[Sample], per_s: f64, value: usize) -> f64 {
+    let pairs = || 1..samples.len();
+    let period_s = median(pairs().map(|k| seconds(samples, k - 1, k))).unwrap_or_default();
+    let change = |k: usize| (samples[k].values[value] - samples[k - 1].values[value]).abs();
+    let mut changes: Vec<f64> = pairs().map(change).collect();
+    changes.sort_unstable_by(f64::total_cmp);
+    let usual = changes.get((USUAL_SHARE * changes.len() as f64) as usize);
+    (per_s * period_s).max(UNUSUAL * usual.copied().unwrap_or_default())
 }
 
 fn seconds(samples: &[Sample], from: usize, to: usize) -> f64 {

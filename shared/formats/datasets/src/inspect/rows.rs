@@ -68,10 +68,8 @@ impl Survey {
         self.first_rad = Some((min.min(first), max.max(first)));
         let steps: Vec<f64> = steps_rad(scan).collect();
         let median_rad = median(steps.iter().copied()).unwrap_or(0.0);
-        self.lost += steps
-            .iter()
-            .map(|s| ((s / median_rad).round() as u64).saturating_sub(1))
-            .sum::<u64>();
+        let lost = |step: &f64| ((step / median_rad).round() as u64).saturating_sub(1);
+        self.lost += steps.iter().map(lost).sum::<u64>();
         self.steps_rad.push(median_rad);
     }
 
@@ -106,10 +104,8 @@ impl Survey {
             true => format!("{min:.2}"),
             false => format!("{min:.2} to {max:.2}"),
         };
-        report.line(
-            "azimuths",
-            format!("{source}, step {step_deg:.3} deg, first at {first} deg"),
-        );
+        let azimuths = format!("{source}, step {step_deg:.3} deg, first at {first} deg");
+        report.line("azimuths", azimuths);
         report.figure("encoder_counts", encoder_counts);
         let (chirps, words) = match self.with_chirps {
             0 => ("unknown", "unknown"),
@@ -117,10 +113,8 @@ impl Survey {
             _ => ("mixed", "known in some scans"),
         };
         let (rows, not_measured, lost) = (self.rows, self.not_measured, self.lost);
-        report.line(
-            "rows",
-            format!("{rows}, {not_measured} not measured, {lost} lost; chirps {words}"),
-        );
+        let text = format!("{rows}, {not_measured} not measured, {lost} lost; chirps {words}");
+        report.line("rows", text);
         let figures = json!({
             "rows": rows,
             "in_scan": self.in_scan.unwrap_or_default(),
@@ -187,10 +181,8 @@ impl Survey {
             let deviation = (*squares as f64 / rows - mean * mean).max(0.0).sqrt();
             mean > RINGING_BRIGHTNESS * overall && deviation <= RINGING_VARIATION * mean
         };
-        let quiet = self
-            .power
-            .windows(QUIET_BINS)
-            .position(|bins| !bins.iter().any(rings));
+        let mut windows = self.power.windows(QUIET_BINS);
+        let quiet = windows.position(|bins| !bins.iter().any(rings));
         quiet.unwrap_or(0)
     }
 }

@@ -59,37 +59,26 @@ pub(super) struct Stall {
 impl Timing {
     /// Adds the printed lines and the findings.
     pub(super) fn add_to(&self, report: &mut Report) {
-        let (start, seconds) = (
-            self.first_ns as f64 * 1e-9,
-            (self.last_ns - self.first_ns) as f64 * 1e-9,
-        );
-        report.line(
-            "time",
-            format!("{start:.3} s since 1970, for {seconds:.3} s"),
-        );
+        let start = self.first_ns as f64 * 1e-9;
+        let seconds = (self.last_ns - self.first_ns) as f64 * 1e-9;
+        let time = format!("{start:.3} s since 1970, for {seconds:.3} s");
+        report.line("time", time);
         let (stalls, gaps) = (self.stalls.len(), self.gaps.len());
         let missing = self.missing_scans;
         if self.period_s > 0.0 {
             let ((max, min), period) = (self.logged_interval_s, self.period_s);
             let jitter = self.jitter_s * 1e3;
-            report.line(
-                "period",
-                format!(
-                    "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
-                ),
+            let period = format!(
+                "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
             );
-            report.line(
-                "gaps",
-                format!("{missing} scans missing in {gaps} places; {stalls} host stalls"),
-            );
+            report.line("period", period);
+            let gaps = format!("{missing} scans missing in {gaps} places; {stalls} host stalls");
+            report.line("gaps", gaps);
         }
         if stalls > 0 {
             let worst = self.stalls.iter().map(|s| s.delay_s).fold(0.0, f64::max);
-            let places = self
-                .stalls
-                .iter()
-                .map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s));
-            let places = some(places);
+            let places = self.stalls.iter();
+            let places = some(places.map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s)));
             let times = match stalls {
                 1 => "once".to_owned(),
                 n => format!("{n} times"),
@@ -99,18 +88,10 @@ impl Timing {
             ));
         }
         if gaps > 0 {
-            let places = self
-                .gaps
-                .iter()
-                .map(|g| format!("{} ({} missing)", g.scan, g.missing));
-            let scans = match missing {
-                1 => "scan is",
-                _ => "scans are",
-            };
-            report.find(format!(
-                "{missing} {scans} missing, before scans {}.",
-                some(places)
-            ));
+            let places = self.gaps.iter();
+            let places = some(places.map(|g| format!("{} ({} missing)", g.scan, g.missing)));
+            let scans = if missing == 1 { "scan is" } else { "scans are" };
+            report.find(format!("{missing} {scans} missing, before scans {places}."));
         }
         if !self.backwards.is_empty() {
             let places = some(self.backwards.iter().map(ToString::to_string));
@@ -121,15 +102,10 @@ impl Timing {
 
 /// Examines the times of all scans; `None` if a scan has no time.
 pub(super) fn examine(dataset: &dyn Dataset) -> Option<Timing> {
-    let all = 0..dataset.len();
-    let used: Vec<i64> = all
-        .clone()
-        .map(|i| dataset.nominal_stamp_ns(i))
-        .collect::<Option<_>>()?;
-    let logged: Vec<i64> = all
-        .map(|i| dataset.logged_stamp_ns(i))
-        .collect::<Option<_>>()?;
-    times(&used, &logged)
+    let all = || 0..dataset.len();
+    let used: Option<Vec<i64>> = all().map(|i| dataset.nominal_stamp_ns(i)).collect();
+    let logged: Option<Vec<i64>> = all().map(|i| dataset.logged_stamp_ns(i)).collect();
+    times(&used?, &logged?)
 }
 
 /// `used` are the times that the scans are read with, `logged` those recorded by the host.
@@ -138,17 +114,9 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
     let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
     let delay_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, (on_clock, on_host)) in used_s
-        .iter()
-        .copied()
-        .zip(logged_s.iter().copied())
-        .enumerate()
-    {
-        let scan = i + 1;
-        if period_s > 0.0
-            && on_clock > GAP_PERIODS * period_s
-            && !catches_up(&logged_s[scan..], period_s)
-        {
+    for (scan, (&on_clock, &on_host)) in (1..).zip(used_s.iter().zip(&logged_s)) {
+        let is_long = period_s > 0.0 && on_clock > GAP_PERIODS * period_s;
+        if is_long && !catches_up(&logged_s[scan..], period_s) {
             let missing = ((on_clock / period_s).round() as u32 - 1) as usize;
             gaps.push(Gap {
                 scan,
@@ -178,10 +146,8 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
 }
 
 fn intervals_s(stamps: &[i64]) -> Vec<f64> {
-    stamps
-        .windows(2)
-        .map(|w| (w[1] - w[0]) as f64 * 1e-9)
-        .collect()
+    let steps = stamps.windows(2);
+    steps.map(|w| (w[1] - w[0]) as f64 * 1e-9).collect()
 }
 
 /// Delay of each logged stamp relative to the most prompt one.
@@ -193,33 +159,23 @@ fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
 
 /// Returns whether the scans after a long interval arrive faster than the sensor period.
 fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
-    let next = afterwards
-        .iter()
-        .copied()
-        .take(AFTERWARDS)
-        .take_while(|s| *s < STALL_PERIODS * period_s);
+    let next = afterwards.iter().copied().take(AFTERWARDS);
+    let next = next.take_while(|s| *s < STALL_PERIODS * period_s);
     median(next).is_some_and(|s| s < CATCH_UP_PERIODS * period_s)
 }
 
 fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
-    let regular = || {
-        logged_s
-            .iter()
-            .map(|s| s - period_s)
-            .filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s)
-    };
-    let count = regular().count().max(1);
-    (regular().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
+    let apart = logged_s.iter().map(|s| s - period_s);
+    let regular = apart.filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s);
+    let regular: Vec<f64> = regular.collect();
+    let squares = regular.iter().map(|d| d * d).sum::<f64>();
+    (squares / regular.len().max(1) as f64).sqrt()
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {
-    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
-    if values.is_empty() {
-        (0.0, 0.0)
-    } else {
-        (max, min)
-    }
+    let max = values.iter().copied().reduce(f64::max);
+    let min = values.iter().copied().reduce(f64::min);
+    (max.unwrap_or(0.0), min.unwrap_or(0.0))
 }
 
 #[cfg(test)]

@@ -85,10 +85,7 @@ fn a_stale_row_with_a_time_makes_no_scan() {
         let mut before = Vec::new();
         for scan in 0..3 {
             let start = START_US + scan * PERIOD_US;
-            let sweep = Sweep {
-                start,
-                ..Sweep::default()
-            };
+            let sweep = Sweep::at(start);
             let mut pixels = sweep.pixels();
             if scan == 1 {
                 let measured = (sweep.rows - 2) * sweep.width();
