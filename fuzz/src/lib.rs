@@ -47,7 +47,6 @@ pub struct Target {
     _alone: MutexGuard<'static, ()>,
 }
 
-/// The outcomes of the inputs.
 #[derive(Default)]
 struct Counts {
     executed: u64,

@@ -17,11 +17,9 @@ const UNUSED: &str =
 /// The address where a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// Host and port of the radar, which is connected to by TCP.
     Tcp(String),
     /// The destination of the radar's datagrams.
     Udp {
-        /// A multicast group, or an address of this machine, and the port.
         to: SocketAddrV4,
         /// The address of this machine on the radar's network; unspecified: the system chooses.
         interface: Ipv4Addr,

@@ -45,7 +45,6 @@ const BLOCK_BYTES: [usize; 3] = [4, 64, 256];
 const COLOSSUS_UDP_VERSION: u8 = 2;
 const COLOSSUS_UDP_IDS: std::ops::RangeInclusive<u8> = 10..=50;
 
-/// A video message: a part of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Video<'a> {
     /// Number of the message, incremented with each one; wraps.
@@ -54,7 +53,6 @@ struct Video<'a> {
     angle: u16,
     /// Depth of a bin, m.
     resolution_m: f32,
-    /// First bin.
     first: usize,
     /// Bytes per bin, 1 or 2.
     bin_bytes: usize,
@@ -96,7 +94,6 @@ fn encoder(angle: u16, encoder_size: u16) -> u16 {
     count.round() as u16 % size
 }
 
-/// The items of a message, from first to last.
 struct Items<'a> {
     rest: &'a [u8],
 }
@@ -126,7 +123,6 @@ impl<'a> Items<'a> {
         }
     }
 
-    /// Takes an item that begins with a number of blocks.
     fn blocks(&mut self, block: usize, item: &str) -> Result<&'a [u8], Malformed> {
         let [blocks] = self.take(item)?;
         self.bytes(usize::from(blocks) * block, item)
@@ -232,7 +228,6 @@ struct Header {
     resolution_m: f32,
 }
 
-/// Takes the video header, in nanoseconds or femtoseconds.
 fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
     let (bytes, per_second): ([u8; 12], f64) = if has & 1 << 9 != 0 {
         (items.take("I240/040")?, NANO)

@@ -24,14 +24,12 @@ pub enum ByteOrder {
     /// Least significant byte first.
     #[default]
     Little,
-    /// Most significant byte first.
     Big,
 }
 
 /// The unit of split seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplitUnit {
-    /// Nanoseconds.
     #[default]
     Nanoseconds,
     Microseconds,
@@ -94,7 +92,6 @@ impl ClockFormat {
         })
     }
 
-    /// Returns whether the split seconds are less than a second.
     fn holds(self, azimuth: &Azimuth<'_>) -> bool {
         self.number(azimuth.split_seconds) * self.unit.ns() < SECOND_NS
     }
@@ -107,7 +104,6 @@ impl ClockFormat {
 /// The clock of a radar. Its `Display` is one sentence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FoundClock {
-    /// The radar has the time.
     Unix(ClockFormat),
     /// The radar measures time from another start, such as its own. The host's time at the first
     /// azimuth is added.
@@ -145,7 +141,6 @@ pub struct RadarClock {
     found: Option<FoundClock>,
     /// Host's time minus radar's time; 0 if the radar has the time.
     offset_ns: i64,
-    /// The first azimuths with their times of arrival, until the clock is found.
     held: Vec<(KeptAzimuth, i64)>,
 }
 
@@ -211,7 +206,6 @@ impl RadarClock {
         }
     }
 
-    /// Finds the clock from this azimuth and one held back, or holds this one back too.
     fn find(&mut self, azimuth: &Azimuth<'_>, arrived_ns: i64) {
         let of = |earlier: &KeptAzimuth| self.format(&earlier.azimuth(), azimuth, arrived_ns);
         let format = self.held.iter().find_map(|(earlier, _)| of(earlier));

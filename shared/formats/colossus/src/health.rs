@@ -44,11 +44,9 @@ pub struct Reading {
 /// The quality of a reading, as the radar judges it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HealthStatus {
-    /// It is beyond its limits.
     Unhealthy,
     Warning,
     Healthy,
-    /// The radar does not report it.
     #[default]
     Unknown,
 }

@@ -31,11 +31,9 @@ pub(crate) mod id {
 /// A message of a radar or of a client.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message<'a> {
-    /// The connection is alive: id 1.
     KeepAlive,
     /// The radar's description of itself: id 10.
     Configuration(Configuration),
-    /// The powers of one azimuth: id 30 (8 bits) or 31 (16 bits).
     Azimuth(Azimuth<'a>),
     /// A client's request.
     Request(Request),
@@ -58,7 +56,6 @@ pub enum Request {
     /// Send the health every 10 s.
     StartHealth = 23,
     StopHealth = 24,
-    /// Send azimuths of full length: no contours, which may vary in their number of bins.
     StartNonContourFft = 140,
 }
 

@@ -19,7 +19,6 @@ pub enum Event<'a> {
     /// Bytes that are no message; they are skipped.
     Damaged {
         reason: Damage,
-        /// Bytes up to the next message.
         skipped_bytes: usize,
     },
 }

@@ -5,7 +5,6 @@ use crate::malformed::Malformed;
 /// The wire type of a float.
 pub(crate) const FOUR_BYTES: u64 = 5;
 
-/// The value of a field, as far as its wire type determines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value<'a> {
     Number(u64),
@@ -51,7 +50,6 @@ pub(crate) fn fields<'a>(
     Ok(())
 }
 
-/// Returns number and value of the first field, and what follows.
 fn field(protobuf: &[u8]) -> Option<(u64, Value<'_>, &[u8])> {
     let (tag, rest) = varint(protobuf)?;
     let number = tag >> 3;

@@ -54,17 +54,14 @@ pub struct Sweep {
     pub missing: usize,
 }
 
-/// The fate of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// Dropped: the sweep has begun before.
     Waiting,
     Open,
-    /// Dropped: the sweep is complete.
     Complete,
 }
 
-/// Encoder count and time of an azimuth.
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     encoder: u16,
@@ -82,7 +79,6 @@ pub struct SweepAssembler {
     range_resolution_m: f32,
     state: State,
     last: Option<Reading>,
-    /// The first azimuth of the next sweep, where the last one was returned in its place.
     kept: Option<(Reading, Seam)>,
     kept_azimuth: KeptAzimuth,
     counters: Counters,
@@ -189,7 +185,6 @@ impl SweepAssembler {
         }
     }
 
-    /// Adds an azimuth of the same turn as the last.
     fn proceed(
         &mut self,
         last: Reading,

@@ -50,7 +50,6 @@ impl LineError {
     }
 }
 
-/// Parses a format of trajectory files.
 type Parse = fn(&str) -> Result<Trajectory, LineError>;
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
@@ -103,7 +102,6 @@ pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
     places.find(|path| path.is_file())
 }
 
-/// Rejects one time for several places.
 fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     let mut first = 0;
@@ -125,7 +123,6 @@ fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
     Ok(())
 }
 
-/// Returns the parser for the format of the first line.
 fn detect(text: &str) -> Result<Parse, String> {
     let (_, first) = lines(text).next().ok_or("it is empty")?;
     let commas = first.split(',').count();
@@ -215,7 +212,6 @@ fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N],
     Ok(found)
 }
 
-/// Returns a field of a csv row.
 fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
     let field = row.split(',').nth(column).map(str::trim);
     field.ok_or_else(|| LineError::new(line, format!("column {} is missing", column + 1)))
@@ -236,7 +232,6 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     })
 }
 
-/// Rejects times that run backwards.
 fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
     match stamps.last() {
         Some(last) if next < *last => {

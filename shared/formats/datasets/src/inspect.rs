@@ -35,7 +35,6 @@ pub struct Report {
     pub figures: Map<String, Value>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
-    /// The printed figures: a name and a text.
     #[serde(skip)]
     lines: Vec<(String, String)>,
 }
@@ -115,7 +114,6 @@ impl Report {
         self.findings.push(sentence);
     }
 
-    /// Returns the name of a file in the dataset.
     fn name_of(&self, file: &Path) -> String {
         let name = file.strip_prefix(&self.root).unwrap_or(file);
         name.display().to_string()
@@ -134,13 +132,10 @@ impl fmt::Display for Report {
     }
 }
 
-/// Results of reading the scans.
 struct ScansRead {
     scans_read: usize,
     rows: rows::Survey,
-    /// Scans that could not be read, and why.
     unreadable: Vec<Value>,
-    /// The last scan.
     scan: OwnedScan,
 }
 
@@ -235,7 +230,6 @@ impl ScansRead {
     }
 }
 
-/// Adds the velocity of the radar by the Doppler shift of a scan whose chirps alternate.
 fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
     let min_range_m = PointsConfig::default().min_range_m;
     let (text, figures) = match DopplerEstimator::default().estimate(scan, min_range_m) {
@@ -268,7 +262,6 @@ fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
     report.figure("velocity", figures);
 }
 
-/// Lists the first items, and counts the rest.
 fn some(items: impl ExactSizeIterator<Item = String>) -> String {
     let more = items.len().saturating_sub(MAX_LISTED);
     let named = items.take(MAX_LISTED).collect::<Vec<_>>().join(", ");

@@ -40,7 +40,6 @@ pub enum LogError {
         "{of}.kind is that of a live sensor, but the scans are of a recording: set it to `auto`, `log` or `none`"
     )]
     Live { of: &'static str },
-    /// The log cannot be read, or cannot be used: a sentence.
     #[error("{0}")]
     Unusable(String),
     #[error(
@@ -78,7 +77,6 @@ impl LogError {
     }
 }
 
-/// Returns the sensor of a section in words.
 fn one(section: &str) -> &str {
     match section {
         "gyro" => "a gyro",
@@ -116,12 +114,10 @@ pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
     [Some(folder), above].into_iter().flatten()
 }
 
-/// Reads the text of a log.
 pub(crate) fn text(path: &Path, of: &'static str) -> Result<String, LogError> {
     gyre_storage::read_text(path, MAX_BYTES).map_err(|e| LogError::unreadable(of, path, e))
 }
 
-/// Reads a log that is a table.
 pub(crate) fn rows<C: Columns>(path: &Path, of: &'static str) -> Result<Rows<C>, LogError> {
     Rows::of(&text(path, of)?).map_err(|reason| LogError::unknown(of, path, reason))
 }

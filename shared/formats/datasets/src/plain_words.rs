@@ -24,7 +24,6 @@ pub fn in_plain_words(key: &str, message: &str) -> Option<String> {
     Some(format!("{key} is {found}, but must be {must}"))
 }
 
-/// Names a type of Rust, or what serde calls it. A list is shown with the text that was found.
 fn must_be(expected: &str, text: Option<&str>) -> String {
     let fixed = match expected {
         "u8" => "a whole number from 0 to 255",

@@ -15,15 +15,11 @@ use crate::{
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
 #[derive(Debug)]
 pub enum ScanSamples {
-    /// There are none.
     None,
-    /// From logs.
     Log {
         track: SampleTrack,
-        /// A sentence for each kind of fault in a log, with its path.
         faults: Vec<String>,
     },
-    /// Recorded with the scans of a run, whatever their stamps: the samples of these kinds.
     Recorded(Vec<SampleKind>),
 }
 
@@ -128,7 +124,6 @@ impl ScanSamples {
         }
     }
 
-    /// The samples that a recording has, of the kinds that are used.
     fn recorded(gyro: &GyroConfig, wheels: &WheelsConfig) -> Self {
         let gyro = gyro.is_used().then_some(SampleKind::Gyro);
         let wheels = wheels.is_used().then_some(SampleKind::Wheels);

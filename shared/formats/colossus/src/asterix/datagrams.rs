@@ -29,20 +29,16 @@ pub struct Datagrams {
     /// Bytes of the datagram in the buffer; 0: none.
     filled: usize,
     described: Option<Configuration>,
-    /// Number of the newest message.
     newest: Option<u32>,
     open: Assembly,
-    /// The azimuth that was returned last, when the datagram in the buffer is still to be handled.
     ended: Assembly,
     /// A datagram of the radar has come, with or without powers.
     has_part: bool,
 }
 
-/// The result of a datagram.
 enum Step {
     Nothing,
     Description(Configuration),
-    /// The open azimuth is complete.
     Complete,
     /// The azimuth before this datagram's has ended; the datagram is still to be handled.
     Ended,

@@ -8,13 +8,11 @@ use super::powers::PowerOrder;
 use crate::configuration::Configuration;
 use crate::message::Powers;
 
-/// Rows of azimuths that did not arrive, evenly spaced.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Empty {
     pub(super) count: usize,
     /// Encoder count and time of the row before the first.
     pub(super) from: (f64, i64),
-    /// Counts from row to row.
     pub(super) counts: f64,
     /// Time from row to row, ns.
     pub(super) ns: f64,
@@ -26,9 +24,7 @@ pub(super) struct RowWriter {
     pub(super) limits: ScanLimits,
     pub(super) bins: usize,
     encoder_size: f64,
-    /// Number of rows, measured or not.
     pub(super) written: usize,
-    /// Number of rows that were not measured.
     pub(super) missing: usize,
     order: PowerOrder,
 }
@@ -50,7 +46,6 @@ impl RowWriter {
         }
     }
 
-    /// Number of rows that a turn may have beside those written.
     pub(super) fn left(&self) -> usize {
         self.limits.azimuths - self.written
     }
@@ -66,7 +61,6 @@ impl RowWriter {
         assert!(fits, "the slot is smaller than the limits");
     }
 
-    /// Writes a row that was measured at an encoder count and time.
     pub(super) fn write_measured(
         &mut self,
         place: (f64, i64),

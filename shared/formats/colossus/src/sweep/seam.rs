@@ -7,23 +7,19 @@ use crate::configuration::Configuration;
 /// Where it differs by more, a turn or more is missing, or the clock was set.
 const BREAK_TURNS: f64 = 0.75;
 
-/// The encoder counts and times of a turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     encoder_size: u16,
-    /// Counts from azimuth to azimuth.
     step: f64,
     ns_per_count: f64,
 }
 
-/// The azimuths missing between the last one of a sweep and the first one of the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seam {
     /// Number of those before zero.
     trailing: usize,
     /// Number of those after zero.
     leading: usize,
-    /// Counts from row to row.
     counts: f64,
     /// Time from row to row, ns.
     ns: f64,
@@ -44,29 +40,24 @@ impl Grid {
         (count <= self.encoder_size).then_some(count % self.encoder_size)
     }
 
-    /// Returns whether no other azimuth fits between zero and this one.
     pub(super) fn is_first(&self, encoder: u16) -> bool {
         f64::from(encoder) < self.step
     }
 
-    /// Returns whether no further azimuth fits into the turn.
     pub(super) fn is_last(&self, last: Reading) -> bool {
         f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
     }
 
-    /// Returns the number of azimuths between one and the end of its turn.
     pub(super) fn azimuths_after(&self, last: Reading) -> f64 {
         (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
     }
 
-    /// Returns whether the time between two azimuths differs from the rotation between them.
     pub(super) fn is_break(&self, last: Reading, here: Reading) -> bool {
         let expected_ns = self.counts(last, here) * self.ns_per_count;
         let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;
         (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
     }
 
-    /// Returns the azimuths missing between two of a sweep.
     pub(super) fn gap(&self, last: Reading, here: Reading) -> Empty {
         let counts = self.counts(last, here);
         let rows = (counts / self.step).round().max(1.0);
@@ -104,7 +95,6 @@ impl Grid {
         }
     }
 
-    /// Encoder counts from one azimuth to the next, of less than a turn.
     fn counts(&self, last: Reading, here: Reading) -> f64 {
         let counts = f64::from(here.encoder) - f64::from(last.encoder);
         match counts < 0.0 {

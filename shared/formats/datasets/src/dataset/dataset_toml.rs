@@ -9,7 +9,6 @@ use crate::in_plain_words;
 /// File name, beside the folder of images or in it.
 const FILE: &str = "dataset.toml";
 
-/// Reads the file in the root of a dataset or its parent. Without a file, all options are unset.
 pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     let places = [Some(root), root.parent()].into_iter().flatten();
     for path in places.map(|folder| folder.join(FILE)) {
@@ -29,7 +28,6 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     Ok(DatasetOptions::default())
 }
 
-/// Returns the error, with the key of its line.
 fn reason(text: &str, error: &toml::de::Error) -> String {
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.and_then(|before| before.rsplit('\n').next());

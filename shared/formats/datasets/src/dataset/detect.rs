@@ -14,10 +14,8 @@ use super::image_source::ImageSource;
 use super::images::Images;
 use super::profiles::{KNOWN, Known, Profile};
 
-/// A located dataset, the input of the readers.
 pub(crate) struct Found {
     pub(crate) format: Format,
-    /// The folder of images.
     pub(crate) folder: PathBuf,
     pub(crate) images: Images,
     /// Sentences on files that are left out, and on the format, if it was detected from the first
@@ -38,7 +36,6 @@ impl Found {
         }
     }
 
-    /// Returns a dataset whose files are known.
     pub(crate) fn listed(root: &Path, format: Format, files: FileList) -> Result<Self, OpenError> {
         let folder = files.get(0).and_then(Path::parent).unwrap_or(root);
         let folder = folder.to_owned();
@@ -97,7 +94,6 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     })
 }
 
-/// Returns whether the presence of row times in the images differs from the format.
 fn is_other_form(format: Format, image: &FirstImage) -> bool {
     let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
     image.has_stamps() != has_stamps
@@ -207,7 +203,6 @@ fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     found.map(|(format, ..)| *format)
 }
 
-/// Returns the format that fits the first image best, and what shows it.
 fn by_image(
     root: &Path,
     folder: &Path,
@@ -252,7 +247,6 @@ fn evidence(image: &FirstImage) -> String {
 /// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// Scores how well a format fits the first image.
 fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     let Some(profile) = Profile::of(format).filter(|it| it.bins.is_some()) else {
         return NEVER;

@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 /// Paths in one piece of memory, as there may be hundreds of thousands.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileList {
-    /// All paths, each with a NUL behind it.
     bytes: Vec<u8>,
-    /// Positions of the NULs.
     ends: Vec<usize>,
 }
 

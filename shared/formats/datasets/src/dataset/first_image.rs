@@ -10,14 +10,11 @@ use super::stamp;
 /// to, ns.
 const SAME_TIME_NS: i64 = 5_000_000;
 
-/// The time in the sweep that an image is named by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NamedBy {
-    /// The time of the first row.
     Start,
     /// The time of row `n / 2 - 1`.
     Middle,
-    /// The time of the last row.
     End,
 }
 
@@ -31,7 +28,6 @@ impl NamedBy {
     }
 }
 
-/// The metadata of the first image that can be read.
 pub(crate) struct FirstImage {
     rows: Vec<RowMetadata>,
     bins: usize,
@@ -57,7 +53,6 @@ impl FirstImage {
         self.bins
     }
 
-    /// Returns whether every row has a plausible time.
     pub(crate) fn has_stamps(&self) -> bool {
         (0..self.rows.len()).all(|row| self.row_ns(row).is_some())
     }
@@ -73,12 +68,10 @@ impl FirstImage {
         stamp::to_ns(self.rows.get(row)?.stamp)
     }
 
-    /// Returns whether byte 10 is the direction of the chirp.
     pub(crate) fn chirps_alternate(&self) -> bool {
         chirps_alternate(self.rows.iter().map(|row| row.byte_ten))
     }
 
-    /// Returns whether byte 10 is 0 in every row.
     pub(crate) fn byte_ten_is_zero(&self) -> bool {
         self.rows.iter().all(|row| row.byte_ten == 0)
     }
@@ -107,7 +100,6 @@ impl FirstImage {
         Some((intervals().min()?, intervals().max()?, mean))
     }
 
-    /// The turn of the rows.
     pub(crate) fn turn(&self) -> EncoderTurn {
         let counts = self.rows.iter().map(|row| row.count).collect();
         EncoderTurn::new(counts, |row| self.row_ns(row))

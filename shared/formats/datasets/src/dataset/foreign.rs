@@ -9,7 +9,6 @@ use super::error::OpenError;
 /// Bytes that identify the type of a file: the signature of a tar archive is the last of them.
 const HEAD_BYTES: u64 = 512;
 
-/// Where a signature begins, the signature, and the kind of the file with what to do.
 type Kind = (usize, &'static [u8], &'static str);
 
 const BAG: &str = "a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags), and name that folder";
@@ -47,7 +46,6 @@ pub fn foreign(path: &Path) -> Option<OpenError> {
     Some(OpenError::at(path, packed.or_else(other)?))
 }
 
-/// Returns the same for the first of these files in a folder, by name.
 pub(crate) fn foreign_in(folder: &Path) -> Option<OpenError> {
     let entries = fs::read_dir(folder).ok()?.flatten();
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();

@@ -14,20 +14,16 @@ use super::stamp;
 /// Files that are named at most where several are left out.
 const MAX_NAMED: usize = 4;
 
-/// The scans of a folder, and a sentence on its other images.
 #[derive(Debug, Default)]
 pub(crate) struct ImageList {
     pub(crate) files: FileList,
     pub(crate) note: Option<String>,
 }
 
-/// The place of an image in its series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SeriesPosition {
-    /// ns since 1970.
     Time(i64),
     Number(i64),
-    /// Named by words.
     Name,
 }
 
@@ -59,7 +55,6 @@ pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
     })
 }
 
-/// Returns a sentence on files that are left out.
 pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {
     let named = left_out.iter().take(MAX_NAMED);
     let named = named.map(|name| format!("`{}`", name.to_string_lossy()));
@@ -190,7 +185,6 @@ fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
     Ok(is_file.then_some(name))
 }
 
-/// Returns the number that a file is named by.
 pub(crate) fn file_number(path: &Path) -> Option<i64> {
     path.file_stem()?.to_str()?.parse().ok()
 }

@@ -22,9 +22,7 @@ const SIZES: usize = 32;
 /// Images in order, of one width.
 pub(crate) struct Images {
     pub(crate) files: FileList,
-    /// The size of most images.
     pub(crate) size: ImageSize,
-    /// Rows of the tallest image of that width that is expected.
     pub(crate) max_rows: usize,
     reader: ImageReader,
     /// The origin of the pixels, if that is no file.
@@ -53,7 +51,6 @@ impl Images {
         })
     }
 
-    /// Returns the images of a source.
     pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
         let (files, size): (FileList, _) = (source.files().into_iter().collect(), source.size());
         if files.is_empty() {
@@ -77,7 +74,6 @@ impl Images {
         self.files.get(index).unwrap_or(Path::new(""))
     }
 
-    /// The number in the name of a file.
     pub(crate) fn number(&self, index: usize) -> Option<i64> {
         file_number(self.file(index))
     }
@@ -87,13 +83,11 @@ impl Images {
         self.number(index).and_then(stamp::to_ns)
     }
 
-    /// Returns the error of images that are no scans of a format.
     pub(crate) fn wrong(&self, format: Format, reason: &str) -> OpenError {
         let fault = format!("is {}, not a {format} image: {reason}", self.size);
         OpenError::at(self.file(0), fault)
     }
 
-    /// Decodes an image of the usual width with as many rows as are accepted, and returns its size.
     pub(crate) fn decode(
         &mut self,
         index: usize,
@@ -118,7 +112,6 @@ impl Images {
         }
     }
 
-    /// Returns the rows that a turn may have: azimuths may have been lost.
     pub(crate) fn accepted_rows(&self) -> RangeInclusive<usize> {
         2..=self.max_rows
     }

@@ -6,7 +6,6 @@ use super::navtech_png::ByteTen;
 use super::options::AzimuthSource;
 use super::profiles::Profile;
 
-/// Observations on the first image.
 pub(super) fn observations(image: &FirstImage, format: Format, profile: &Profile) -> Vec<String> {
     let mut notes: Vec<String> = note_bursts(image, profile).into_iter().collect();
     if image.chirps_alternate() {

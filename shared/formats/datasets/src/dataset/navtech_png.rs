@@ -16,14 +16,11 @@ const ALTERNATING_SHARE: f64 = 0.9;
 /// size.
 const MAX_GAP_SHARE: f64 = 0.25;
 
-/// The metadata of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowMetadata {
     /// Bytes 0 to 7, little-endian: time since 1970, us or ns.
     pub(crate) stamp: i64,
-    /// Bytes 8 and 9, little-endian: the encoder count.
     pub(crate) count: u16,
-    /// Byte 10: validity, direction of the chirp, or unused.
     pub(crate) byte_ten: u8,
 }
 

@@ -18,7 +18,7 @@ use super::row_order;
 use super::stamp;
 use super::{Dataset, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
 
 /// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
@@ -110,7 +110,6 @@ impl NavtechScans {
         }
     }
 
-    /// The turns of the first images.
     fn first_turns(&mut self) -> Vec<EncoderTurn> {
         let rows = self.images.accepted_rows();
         let mut pixels = vec![0; self.images.size.width * rows.end()];
@@ -273,16 +272,7 @@ impl Dataset for NavtechScans {
             navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
         }
         correct_eccentricity(azimuth_rad, profile.azimuth_eccentricity_rad);
-        Ok(SweepGeometry {
-            azimuths: size.height,
-            bins: size.width - METADATA_BYTES,
-            stride: size.width,
-            first_byte: METADATA_BYTES,
-            range_resolution_m: profile.range_resolution_m,
-            range_offset_m: profile.range_offset_m,
-            doppler_s: profile.doppler_s,
-            sense: Sense::Clockwise,
-            stamp_ns: scan_ns,
-        })
+        let bytes = [METADATA_BYTES, size.width - METADATA_BYTES];
+        Ok(profile.geometry(size.height, bytes, scan_ns))
     }
 }

@@ -15,7 +15,6 @@ const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
 /// Memory limit of the decoder beside the image: rows, tables, text chunks.
 const DECODER_BYTES: usize = 4 << 20;
 
-/// Reads the size of a PNG from its header.
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     let mut header = Vec::with_capacity(HEADER_BYTES);
     let file = gyre_storage::open(path).map_err(|e| ReadError::io(path, e))?;

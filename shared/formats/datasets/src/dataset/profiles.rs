@@ -20,8 +20,8 @@ use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp::SECOND_NS;
+use gyre_radar::scan::{Sense, SweepGeometry};
 
-/// The definition of the time of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScanTime {
     /// The mean of the first and last row's stamps.
@@ -31,7 +31,6 @@ pub(crate) enum ScanTime {
 }
 
 impl ScanTime {
-    /// The definition of the stamps where files are not named by them.
     pub(crate) fn of_rows(self) -> &'static str {
         match self {
             Self::Halfway => {
@@ -42,7 +41,6 @@ impl ScanTime {
     }
 }
 
-/// The parameters of a format with metadata columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Profile {
     pub(crate) range_resolution_m: f32,
@@ -63,7 +61,6 @@ pub(crate) struct Profile {
     pub(crate) chirps: bool,
 }
 
-/// A format: its folders relative to the root, and the parameters of its metadata columns.
 pub(crate) type Known = (Format, &'static [&'static str], Option<Profile>);
 
 /// The development kit of Oxford gives 0.0432 m for a bin: then paths are 1.4 % shorter than the
@@ -161,12 +158,40 @@ pub(crate) const KNOWN: [Known; 8] = [
 ];
 
 impl Profile {
+    /// The parameters of images without metadata columns.
+    pub(crate) fn without_rows(range_resolution_m: f32, options: &DatasetOptions) -> Self {
+        let profile = Self {
+            range_resolution_m,
+            ..OXFORD
+        };
+        profile.with(Format::Other, None, options)
+    }
+
+    /// The geometry of a sweep whose rows have these bytes: of metadata and of powers.
+    pub(crate) fn geometry(
+        &self,
+        azimuths: usize,
+        [first_byte, bins]: [usize; 2],
+        stamp_ns: i64,
+    ) -> SweepGeometry {
+        SweepGeometry {
+            azimuths,
+            bins,
+            stride: first_byte + bins,
+            first_byte,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
+            sense: Sense::Clockwise,
+            stamp_ns,
+        }
+    }
+
     /// Returns the parameters of a format; `None` if its images have no metadata columns.
     pub(crate) fn of(format: Format) -> Option<Self> {
         KNOWN.iter().find(|known| known.0 == format)?.2
     }
 
-    /// Applies the exception of Boreas by the date of the first image, and then the options.
     pub(crate) fn with(
         mut self,
         format: Format,

@@ -77,10 +77,8 @@ fn read_list(list: &Path) -> Result<String, OpenError> {
 /// A frame number and a time of receipt, ns.
 type Receipt = (i64, i64);
 
-/// Frames between two breaks in time, whose times of receipt come from one uniform clock.
 #[derive(Debug, PartialEq)]
 struct Segment {
-    /// Number of the first frame.
     first: i64,
     receipts: Vec<Receipt>,
 }
@@ -104,7 +102,6 @@ fn segments(received: &[Receipt]) -> Vec<Segment> {
     segments
 }
 
-/// Returns whether the time between two receipts is about that between their frames.
 fn agree(earlier: Receipt, later: Receipt) -> bool {
     let frames = later.0.saturating_sub(earlier.0) as f64;
     let apart_ns = later.1.saturating_sub(earlier.1) as f64;
@@ -180,7 +177,6 @@ fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Returns the receipts of all images.
 fn receipts(
     images: &Images,
     stamps: &BTreeMap<i64, i64>,
@@ -206,7 +202,6 @@ fn receipts(
     Err(OpenError::at(list, fault))
 }
 
-/// Returns times by frame number, and how many of them lack leading zeros.
 fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
     let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
     let lines = text.lines().enumerate();

@@ -15,7 +15,6 @@ const BY_TIME: &str = "The files are not named by times of their scans: they are
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \
                        since in the order of the times of their first rows scans would overlap: a clock was set.";
 
-/// The times of the first rows of images, and notes on them.
 pub(crate) struct RowOrder {
     /// ns since 1970, increasing unless a clock was set. The time of an unreadable image is
     /// estimated.

@@ -24,7 +24,6 @@ pub(crate) struct SensorClock {
     origin_ns: i64,
     /// From `origin_ns`, ns.
     start: f64,
-    /// ns.
     pub(crate) period: f64,
 }
 

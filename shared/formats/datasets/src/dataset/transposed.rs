@@ -10,14 +10,14 @@ use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
+use super::profiles::Profile;
 use super::stale::StaleRows;
 use super::{Dataset, check_capacity};
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
 
-/// The sweep of a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     pub(crate) start_ns: i64,
@@ -40,10 +40,7 @@ pub(crate) struct TransposedScans {
     pub(crate) notes: Vec<String>,
     format: Format,
     stamp_meaning: &'static str,
-    range_resolution_m: f32,
-    range_offset_m: f32,
-    doppler_s: f32,
-    azimuth_eccentricity_rad: f32,
+    profile: Profile,
     scratch: Vec<u8>,
     /// Without angles, only stale rows show that the host has lost azimuths; `None`: they are
     /// ignored.
@@ -74,18 +71,13 @@ impl TransposedScans {
             notes,
             format,
             stamp_meaning,
-            range_resolution_m: 0.0,
-            range_offset_m: options.range_offset_m.unwrap_or(0.0),
-            doppler_s: options.doppler_s.unwrap_or(0.0),
-            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
+            profile: Profile::without_rows(0.0, options),
             scratch: Vec::new(),
             stale: (options.lost_azimuths != Some(LostAzimuthOption::Ignore))
                 .then(StaleRows::default),
         };
         scans.check_shape()?;
-        scans.range_resolution_m = options
-            .range_resolution_m
-            .unwrap_or_else(|| metres_per_bin(scans.bins()));
+        scans.profile = Profile::without_rows(metres_per_bin(scans.bins()), options);
         if scans.is_transposed() {
             let size = scans.images.size;
             scans.scratch = vec![0; size.bytes()];
@@ -124,14 +116,12 @@ impl TransposedScans {
         Ok(())
     }
 
-    /// Keeps an image, or that it cannot be read.
     fn remember(&mut self, index: usize, image: Option<&[u8]>) {
         if let Some(stale) = &mut self.stale {
             stale.remember(index, image.unwrap_or_default());
         }
     }
 
-    /// The mean time of columns that are spread uniformly over a period.
     fn stamp_ns(&self, turn: &Turn) -> i64 {
         let n = self.azimuths() as i64;
         turn.start_ns + turn.period_ns * (n - 1) / (2 * n)
@@ -193,11 +183,13 @@ impl Dataset for TransposedScans {
         })?;
         let (azimuths, bins) = (self.azimuths(), self.bins());
         check_capacity(self.limits(), &slot)?;
+        let bytes = &mut slot.bytes[..azimuths * bins];
+        // No image is before the first one.
+        let before = index.checked_sub(1);
         // Before the image, since it is decoded into the same scratch memory.
-        if let Some(before) = index.checked_sub(1)
+        if let Some(before) = before
             && self.stale.as_ref().is_some_and(|stale| !stale.has(before))
         {
-            let bytes = &mut slot.bytes[..azimuths * bins];
             match self.decode(before, bytes) {
                 Ok(()) => self.remember(before, Some(bytes)),
                 // The file may come back, as with this one.
@@ -205,38 +197,23 @@ impl Dataset for TransposedScans {
                 Err(_) => self.remember(before, None),
             }
         }
-        let bytes = &mut slot.bytes[..azimuths * bins];
         self.decode(index, bytes)?;
-        // No image is before the first one.
-        let before = index.checked_sub(1);
         let has_before = |stale: &&StaleRows| before.is_some_and(|before| stale.has(before));
         let stale = self.stale.as_ref().filter(has_before);
         let lost = stale.map_or(0, |stale| stale.count(bytes, bins));
         self.remember(index, Some(bytes));
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
         fill_uniform(azimuth_rad, self.first_azimuth);
-        correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
-        let assumed = match self.stale {
-            Some(_) => flag::ASSUMED,
-            None => 0,
-        };
+        correct_eccentricity(azimuth_rad, self.profile.azimuth_eccentricity_rad);
+        let assumed = self.stale.as_ref().map_or(0, |_| flag::ASSUMED);
         let (measured, stale) = slot.flags[..azimuths].split_at_mut(azimuths - lost);
         measured.fill(flag::MEASURED | assumed);
         stale.fill(flag::STALE | assumed);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;
         }
-        Ok(SweepGeometry {
-            azimuths,
-            bins,
-            stride: bins,
-            first_byte: 0,
-            range_resolution_m: self.range_resolution_m,
-            range_offset_m: self.range_offset_m,
-            doppler_s: self.doppler_s,
-            sense: Sense::Clockwise,
-            stamp_ns: self.stamp_ns(&turn),
-        })
+        let scan_ns = self.stamp_ns(&turn);
+        Ok(self.profile.geometry(azimuths, [0, bins], scan_ns))
     }
 }
 

@@ -66,7 +66,6 @@ impl GnssFaults {
         all - used
     }
 
-    /// Returns the reason why none of so many entries is a usable fix.
     pub(super) fn without_usable(&self, all: usize) -> String {
         let named = match self.listed() {
             Some(listed) => format!(" ({listed})"),
@@ -102,10 +101,8 @@ impl GnssFaults {
     }
 }
 
-/// The fixes that can be used, the plane that they are in, and the faults.
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
-/// Removes and sorts faulty fixes, and counts them.
 pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable.count,
@@ -142,7 +139,6 @@ fn finite_or_zero(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// Removes such rows, and counts them.
 fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize {
     let before = rows.len();
     rows.retain(|row| !is_bad(row));
@@ -188,7 +184,6 @@ fn without_jumps(fixes: &[LoggedFix]) -> Vec<usize> {
     chain.into_iter().flatten().collect()
 }
 
-/// Returns whether a vehicle can have driven from one fix to a later one.
 fn is_reachable(from: &LoggedFix, to: &LoggedFix) -> bool {
     let seconds = (to.stamp_ns.saturating_sub(from.stamp_ns)) as f64 * 1e-9;
     let [east, north] = [0, 1].map(|axis| to.east_north_m[axis] - from.east_north_m[axis]);

@@ -16,7 +16,6 @@ use crate::{
 /// The fixes that a live receiver has sent so far: each row of their log is read once.
 pub struct ReceivedFixes {
     path: PathBuf,
-    /// The end of the part that was read.
     end: u64,
     rows: Option<Rows<FixColumns>>,
 }

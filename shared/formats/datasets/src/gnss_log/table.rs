@@ -45,7 +45,6 @@ const STATUS_UNKNOWN: &str = "-2";
 const TUM: &str = "a line has seconds, x and y, with spaces between";
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
 
-/// Where a table has what.
 #[derive(Clone)]
 pub(super) struct FixColumns {
     stamp: Stamp,
@@ -57,7 +56,6 @@ pub(super) struct FixColumns {
     status: Option<usize>,
 }
 
-/// Where a row has the uncertainty.
 #[derive(Clone)]
 enum Sigma {
     None,
@@ -74,7 +72,6 @@ pub(super) fn read(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
     Ok((rows.raw, rows.columns.is_plane))
 }
 
-/// Reads the times and places of a trajectory: seconds, x, y and more.
 fn parse_tum(text: &str) -> Raw<RawFix> {
     let mut raw = Raw::of(Vec::new());
     for (number, line) in text.lines().enumerate() {
@@ -141,7 +138,6 @@ impl Columns for FixColumns {
         })
     }
 
-    /// A row with a stamp and no place.
     fn is_unmeasured(&self, row: &StringRecord) -> bool {
         self.stamp.ns(row).is_some() && self.at.iter().all(|at| row.get(*at) == Some(""))
     }

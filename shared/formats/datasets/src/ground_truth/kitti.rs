@@ -54,7 +54,6 @@ fn projected(matrices: &[Matrix]) -> Result<Vec<Pose>, LineError> {
     Ok(matrices.iter().map(project).collect())
 }
 
-/// Returns the inverse of a rigid motion.
 fn inverse(m: &Matrix) -> Matrix {
     let back = Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
     let t = back * Vector3::new(-m[3], -m[7], -m[11]);

@@ -6,7 +6,6 @@ use gyre_geometry::{Pose, mirrored, pose};
 use super::{LineError, columns, lines, number, stamp_field};
 use gyre_radar::trajectory::Trajectory;
 
-/// One row.
 struct Motion {
     line: usize,
     from_ns: i64,

@@ -3,7 +3,6 @@
 /// A row-major 3 x 4 pose of the sensor in the world. Its rotation may have any scale.
 pub(super) type Matrix = [f64; 12];
 
-/// The vertical axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vertical {
     /// x forward, y left or right.
@@ -12,7 +11,6 @@ enum Vertical {
     Y,
 }
 
-/// The frames of poses, which give their plane of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Plane {
     world: Vertical,
@@ -108,7 +106,6 @@ impl Displacement {
     }
 }
 
-/// Returns the mean cosine between an axis of the world and the vertical axis of the sensor.
 fn upright(poses: &[Matrix], axis: usize, sensor: Vertical) -> f64 {
     let column = match sensor {
         Vertical::Z => 2,

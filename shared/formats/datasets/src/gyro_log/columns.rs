@@ -6,11 +6,10 @@ use csv::StringRecord;
 use gyre_samples::{Sample, SampleKind};
 
 use crate::{
-    header::{Header, Stamp},
+    header::{Header, Stamp, endings},
     table::Columns,
 };
 
-/// Where a table has what.
 pub(super) struct GyroColumns {
     stamp: Stamp,
     rates: [usize; 3],
@@ -25,28 +24,17 @@ pub(super) struct GyroColumns {
 const RATES: &str = "gyro_* gyr_* w* w_* omega_* angular_velocity_* angular_rate_* angvel_* \
     ang_vel_* rate_* angularvelocity* gyroscope_* gyro* g* g_* w_rs_s_*";
 /// Units at the end of a rate's name.
-const RATE_UNITS: [(&str, f64); 11] = [
-    ("_rad_s^-1", 1.0),
-    ("_°_s", PI / 180.0),
-    ("_radps", 1.0),
-    ("_rad_s", 1.0),
-    ("_rad_per_s", 1.0),
-    ("_rps", 1.0),
-    ("_degps", PI / 180.0),
-    ("_deg_s", PI / 180.0),
-    ("_deg_per_s", PI / 180.0),
-    ("_dps", PI / 180.0),
+const RATE_UNITS: [(&str, f64); 3] = [
+    ("_rad_s^-1 _radps _rad_s _rad_per_s _rps", 1.0),
+    ("_°_s _degps _deg_s _deg_per_s _dps", PI / 180.0),
     ("_mdps", PI / 180e3),
 ];
 
 const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
     lin_acc_* a_rs_s_*";
 /// Units at the end of an acceleration's name.
-const ACCELERATION_UNITS: [(&str, f64); 6] = [
-    ("_m_s^-2", 1.0),
-    ("_mps2", 1.0),
-    ("_m_s2", 1.0),
-    ("_m_per_s2", 1.0),
+const ACCELERATION_UNITS: [(&str, f64); 3] = [
+    ("_m_s^-2 _mps2 _m_s2 _m_per_s2", 1.0),
     ("_g", 9.80665),
     ("_mg", 9.80665e-3),
 ];
@@ -156,10 +144,11 @@ pub(super) fn sample(stamp_ns: i64, [rates, accelerations]: [[f64; 3]; 2]) -> Sa
 /// The columns of a vector, and its unit if the names have one.
 type Vector = ([usize; 3], Option<f64>);
 
-/// Finds a vector whose three names follow one pattern and end with one unit.
-fn vector(header: &Header, patterns: &str, units: &[(&str, f64)]) -> Option<Vector> {
-    let units = units.iter().map(|(name, factor)| (*name, Some(*factor)));
-    let units = units.chain([("", None)]);
+fn vector(header: &Header, patterns: &str, units: &[(&'static str, f64)]) -> Option<Vector> {
+    let units = endings(units).into_iter();
+    let units = units
+        .map(|(name, factor)| (name, Some(factor)))
+        .chain([("", None)]);
     let patterns = patterns.split(' ');
     let mut forms = patterns.flat_map(|pattern| units.clone().map(move |unit| (pattern, unit)));
     forms.find_map(|(pattern, (unit, factor))| {

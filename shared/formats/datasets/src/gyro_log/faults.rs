@@ -154,7 +154,6 @@ impl LogFaults {
     }
 }
 
-/// The values that a sensor can measure on a vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plausible {
     /// The sensor.
@@ -175,7 +174,6 @@ pub(super) const RATES: Plausible = Plausible {
     beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
 };
 
-/// Removes and sorts faulty samples, and counts them.
 pub(crate) fn examine(
     raw: Raw<Sample>,
     unit_is_assumed: bool,

@@ -20,7 +20,6 @@ const UNUSUAL: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Jumps {
-    /// Samples between a jump and the one back: left out.
     left_out: usize,
     /// Jumps without one back: their samples stay.
     alone: usize,

@@ -18,7 +18,6 @@ const MARGIN_NS: i64 = 20_000_000;
 /// A trajectory with a shorter path stands, m.
 const STANDING_M: f64 = 0.1;
 
-/// Examines the ground truth at the usual path and all TUM files in the root, by name.
 pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Option<&Trajectory>) {
     let entries = std::fs::read_dir(&report.root).into_iter().flatten();
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
@@ -46,7 +45,6 @@ pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Op
     report.figure("ground_truths", figures);
 }
 
-/// Adds the lines and the findings of a file, and returns its figures.
 fn examine_file(
     report: &mut Report,
     file: &Path,

@@ -15,7 +15,6 @@ const QUIET_S: f64 = 5.0;
 /// Share of the samples that such a time has at least.
 const QUIET_SHARE: f64 = 0.9;
 
-/// Examines the logs beside the scans, and in a bag the fixes of GNSS.
 pub(super) fn examine(
     report: &mut Report,
     dataset: &mut dyn Dataset,
@@ -168,7 +167,6 @@ fn gnss(
     report.figure("gnss", times.figures(&file, more));
 }
 
-/// Adds a log that cannot be used, of a section and of its sensor in words.
 fn unusable(report: &mut Report, [section, of]: [&str; 2], file: &Path, error: &str) {
     let name = report.name_of(file);
     report.line(section, format!("{name}: cannot be used"));
@@ -177,7 +175,6 @@ fn unusable(report: &mut Report, [section, of]: [&str; 2], file: &Path, error: &
     report.figure(section, json!({"file": file, "error": error}));
 }
 
-/// The stamps of a log.
 struct Times {
     samples: usize,
     /// Median time between samples, s.
@@ -226,7 +223,6 @@ impl Times {
         }
     }
 
-    /// Adds the lines about the content, the rate and the span of a log.
     fn lines(&self, report: &mut Report, section: &str, what: &str, samples: &str) {
         let (count, rate_hz, missing) = (self.samples, self.rate_hz(), self.missing * 100.0);
         let content = format!("{what}{count} {samples} of {rate_hz:.1} Hz, {missing:.1} % missing");
@@ -254,7 +250,6 @@ impl Times {
         }
     }
 
-    /// Returns the figures of a log.
     fn figures(&self, file: &Path, mut more: Value) -> Value {
         for (name, value) in [
             ("file", json!(file)),

@@ -17,21 +17,16 @@ const RINGING_VARIATION: f64 = 0.3;
 /// Number of consecutive bins without ringing that end it.
 const QUIET_BINS: usize = 3;
 
-/// Summary of the rows of the scans read.
 #[derive(Default)]
 pub(super) struct Survey {
     scans: usize,
-    /// Scans with known directions of the chirps.
     with_chirps: usize,
     rows: u64,
-    /// Minimum and maximum number of rows in a scan.
     in_scan: Option<(usize, usize)>,
-    /// Rows that were interpolated from their neighbours.
     not_measured: u64,
     /// Rows at the end of a scan that still hold the scan before: see [`gyre_radar::lost`].
     stale: u64,
     stale_scans: usize,
-    /// Missing rows, where the azimuth makes more than one step.
     lost: u64,
     /// The median step between azimuths of each scan.
     steps_rad: Vec<f64>,
@@ -86,12 +81,10 @@ impl Survey {
         }
     }
 
-    /// Returns the rows of the scan with most of them.
     pub(super) fn most_rows(&self) -> usize {
         self.in_scan.unwrap_or_default().1
     }
 
-    /// Adds the figures and the printed lines.
     pub(super) fn lines(&self, report: &mut Report, encoder_counts: Option<u16>) {
         let source = encoder_counts.map_or("uniform".to_owned(), |counts| {
             format!("encoder of {counts} counts per turn")
@@ -130,7 +123,6 @@ impl Survey {
         report.figure("rows", figures);
     }
 
-    /// Adds the findings.
     pub(super) fn findings(
         &self,
         report: &mut Report,

@@ -15,7 +15,6 @@ const CATCH_UP_PERIODS: f64 = 0.97;
 /// Number of scans after a long interval that distinguish a gap from a stall.
 const AFTERWARDS: usize = 5;
 
-/// Times of the scans. Indices are from 0.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Timing {
     /// Time of the first scan, ns since 1970.
@@ -29,15 +28,12 @@ pub(super) struct Timing {
     /// Maximum and minimum logged interval, s.
     logged_interval_s: (f64, f64),
     missing_scans: usize,
-    /// Missing scans.
     gaps: Vec<Gap>,
-    /// Stalls of the host: stamps were logged late, but no scan is missing.
     stalls: Vec<Stall>,
     /// Scans whose logged stamp is before the stamp of the previous scan.
     backwards: Vec<usize>,
 }
 
-/// Missing scans.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Gap {
     /// The first scan after the gap.
@@ -47,17 +43,14 @@ pub(super) struct Gap {
     seconds: f64,
 }
 
-/// A stall of the host.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Stall {
-    /// The first late scan.
     scan: usize,
     /// Delay of its stamp, s.
     delay_s: f64,
 }
 
 impl Timing {
-    /// Adds the printed lines and the findings.
     pub(super) fn add_to(&self, report: &mut Report) {
         let start = self.first_ns as f64 * 1e-9;
         let seconds = (self.last_ns - self.first_ns) as f64 * 1e-9;
@@ -150,7 +143,6 @@ fn intervals_s(stamps: &[i64]) -> Vec<f64> {
     steps.map(|w| (w[1] - w[0]) as f64 * 1e-9).collect()
 }
 
-/// Delay of each logged stamp relative to the most prompt one.
 fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
     let late: Vec<i64> = logged.iter().zip(used).map(|(l, u)| l - u).collect();
     let prompt = late.iter().copied().min().unwrap_or(0);

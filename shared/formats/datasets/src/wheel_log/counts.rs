@@ -35,10 +35,8 @@ const COUNTS: Plausible = Plausible {
     beyond: "",
 };
 
-/// The columns of counts. A sample contains the counts of both wheels, or of one wheel twice.
 pub(super) struct CountColumns {
     stamp: Stamp,
-    /// One, or one of each wheel.
     counts: Vec<usize>,
     is_in_ticks: bool,
 }
