@@ -10,9 +10,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{
-    Ended, Run, gyre, odometry, python, real_data, recording, recording::with_constants,
-};
+use crate::common::{Ended, Run, gyre, odometry, python, recording, recording::with_constants};
 
 fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
@@ -84,22 +82,6 @@ fn a_run_exported_in_any_form_is_taken_back_to_the_same_motions() {
 }
 
 #[test]
-fn real_scans_are_taken_back_to_the_same_motions() {
-    let Some(data) = real_data("radiate-tiny_foggy") else {
-        return;
-    };
-    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration).data(&data);
-    let motions = run.complete();
-    let path = bag(&run, "bag.mcap");
-    export(run.out(), &path, &[]).succeeded();
-    let again = Run::of_file(&configuration).data(&path);
-    assert_eq!(again.complete(), motions);
-    let inspected = inspect(&path, &[]).succeeded().stdout.clone();
-    assert!(inspected.contains("ros2-bag"), "{inspected}");
-}
-
-#[test]
 fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
     let whole = completed();
     let run = Run::small().data(whole.path()).set("slam.kind=graph");
@@ -149,24 +131,6 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
             return;
         };
         assert!(figures["objects"].as_u64() > Some(20), "{figures}");
-    }
-}
-
-#[test]
-#[ignore = ".ci/nightly: a bag of a recording of a run"]
-fn a_recorded_run_becomes_the_same_bag() {
-    let whole = completed();
-    let run = Run::small().data(whole.path());
-    let recorded = bag(&run, "drive.mcap");
-    let run = run
-        .argument("--record", recorded.to_str().unwrap())
-        .set("run.window=32");
-    let motions = run.complete();
-    let path = bag(&run, "bag");
-    export(&recorded, &path, &[]).succeeded();
-    assert_eq!(replay(&run, &path), motions);
-    if let Some(figures) = checked(&path, run.out(), None) {
-        assert_eq!(figures["b_scans"], recording::SCANS);
     }
 }
 

@@ -80,20 +80,6 @@ fn a_source_that_waits_for_its_input_has_not_stalled() {
 }
 
 #[test]
-fn a_file_that_is_missing_for_a_moment_loses_nothing() {
-    let (recording, run) = whole(MODERATE);
-    let image = &recording::images(recording.path())[MIDDLE + 2];
-    let mut running = run.start();
-    running.await_poses(2);
-    let aside = recording.path().join("aside");
-    fs::rename(image, &aside).unwrap();
-    thread::sleep(Duration::from_millis(1200));
-    fs::rename(&aside, image).unwrap();
-    running.finish().succeeded();
-    assert_whole(&run);
-}
-
-#[test]
 fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
     let (recording, run) = whole(MODERATE);
     let run = run.set("source.retry_s=0.3");

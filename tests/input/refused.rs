@@ -39,10 +39,6 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
         ),
         (run_of(&file), &["scan.txt is a file", "folder"]),
         (
-            run_of(folder.path()),
-            &["not a known dataset", "no PNG images"],
-        ),
-        (
             run_of(one.path()),
             &["has 1 scan:", "a motion is between two"],
         ),
@@ -55,14 +51,9 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
             set(&["masking.treshold=3"]),
             &["[masking]", "did you mean `threshold`?"],
         ),
-        (set(&["masking"]), &["--set", "section.key=value"]),
         (
             Run::of_file(Path::new("no/such.toml")),
             &["no/such.toml", "No such file"],
-        ),
-        (
-            Run::configured("[raster]\nn = = 3"),
-            &["test.toml", "line 2"],
         ),
         (
             Run::of_recording().into(&file.join("out")),
@@ -79,17 +70,6 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
         (
             set(&["gyro.kind=auto"]),
             &["no log of a gyro lies beside the scans", "gyro.kind"],
-        ),
-        (
-            set(&["wheels.kind=auto"]),
-            &["no log of the wheels lies beside the scans", "wheels.kind"],
-        ),
-        (
-            configurations::with_gyro().set("gyro.delay_s=600"),
-            &[
-                "has no sample while the scans were measured",
-                "gyro.delay_s",
-            ],
         ),
         (
             configurations::gyro_and_wheels()

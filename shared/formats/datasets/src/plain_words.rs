@@ -51,47 +51,52 @@ mod tests {
 
     #[test]
     fn a_value_of_another_kind_is_named_with_what_it_must_be() {
-        for (message, expected) in [
-            (
-                "invalid type: string \"abc\", expected u8",
-                "threshold is \"abc\", but must be a whole number from 0 to 255",
-            ),
+        for (message, found, expected) in [
             (
                 "invalid value: integer `300`, expected u8",
-                "threshold is `300`, but must be a whole number from 0 to 255",
+                "`300`",
+                "a whole number from 0 to 255",
             ),
             (
                 "invalid type: floating point `1.5`, expected usize",
-                "threshold is `1.5`, but must be a whole number, 0 or more",
+                "`1.5`",
+                "a whole number, 0 or more",
             ),
             (
                 "invalid type: string \"./x\", expected a sequence",
-                "threshold is \"./x\", but must be a list, as in [\"./x\"]",
+                "\"./x\"",
+                "a list, as in [\"./x\"]",
             ),
             (
                 "invalid type: string \"a, expected b\", expected f32",
-                "threshold is \"a, expected b\", but must be a number",
+                "\"a, expected b\"",
+                "a number",
             ),
             (
                 "invalid type: sequence, expected a boolean",
-                "threshold is a list, but must be true or false",
+                "a list",
+                "true or false",
             ),
             (
                 "invalid type: unit variant, expected string only",
-                "threshold is of another kind, but must be a text",
+                "of another kind",
+                "a text",
             ),
             (
-                "unknown variant `graf`, expected one of `none`, `filter`, `graph`",
-                "threshold is `graf`, but must be one of `none`, `filter`, `graph`",
+                "unknown variant `graf`, expected one of `none`, `graph`",
+                "`graf`",
+                "one of `none`, `graph`",
             ),
             (
                 "invalid type: map, expected an array of length 3",
-                "threshold is a section, but must be a list of the length 3",
+                "a section",
+                "a list of the length 3",
             ),
         ] {
+            let said = in_plain_words("threshold", message).unwrap_or_default();
             assert_eq!(
-                in_plain_words("threshold", message).as_deref(),
-                Some(expected)
+                said,
+                format!("threshold is {found}, but must be {expected}")
             );
         }
         for other in ["missing field `sha256`", "rate is `abc`, but must be `max`"] {

@@ -123,23 +123,6 @@ fn lost_azimuths_of_images_without_metadata_are_counted() {
 }
 
 #[test]
-fn no_radiate_scan_is_received_before_its_sweep_starts() {
-    for folder in ["radiate-2019-02-12", "radiate-tiny_foggy"] {
-        let Some(mut radiate) = opened(folder) else {
-            return;
-        };
-        let mut touching = 0;
-        for index in 0..radiate.len() {
-            let start = read(radiate.as_mut(), index).unwrap().stamp_ns[0];
-            let late = radiate.logged_stamp_ns(index).unwrap() - start;
-            assert!(late >= -10, "{folder}, scan {index}: {late} ns");
-            touching += usize::from(late < 10);
-        }
-        assert_eq!(touching, 2, "{folder}");
-    }
-}
-
-#[test]
 fn boreas_rt_is_detected_by_its_chirps_and_fomo_by_its_name() {
     for (folder, format, bin_m, offset_m) in [
         (

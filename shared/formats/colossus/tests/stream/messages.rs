@@ -1,12 +1,12 @@
 //! Messages as bytes.
 
 use gyre_colossus::{
-    Azimuth, Configuration, Event, HealthStatus, Message, Parser, Powers, Reading, Request, decode,
-    write_azimuth, write_configuration, write_keep_alive, write_other, write_request,
+    Azimuth, Configuration, HealthStatus, Message, Powers, Reading, Request, decode, write_azimuth,
+    write_configuration, write_keep_alive, write_other, write_request,
 };
 use proptest::prelude::*;
 
-use crate::support::{configuration, feed};
+use crate::support::configuration;
 
 /// A message that owns its bytes.
 #[derive(Clone, Debug)]
@@ -196,19 +196,6 @@ fn a_configuration_is_checked_in_one_sentence_and_prefers_the_resolution_of_its_
         let error = configuration.check().unwrap_err().to_string();
         assert!(error.ends_with(sentence), "{error}");
     }
-}
-
-#[test]
-fn a_server_parses_requests() {
-    let (mut bytes, mut requests) = (Vec::new(), Vec::new());
-    for request in Request::ALL {
-        write_request(&mut bytes, request);
-    }
-    feed(&mut Parser::new(), &bytes, 5, |event| match event {
-        Event::Message(Message::Request(request)) => requests.push(request),
-        other => panic!("{other:?}"),
-    });
-    assert_eq!(requests, Request::ALL);
 }
 
 #[test]

@@ -49,11 +49,8 @@ mod tests {
         let images = folder.path().join("radar");
         fs::create_dir(&images).unwrap();
         assert_eq!(options(&images).unwrap(), DatasetOptions::default());
-        fs::write(
-            folder.path().join(FILE),
-            "range_offset_m = -0.25\nencoder_counts = 3600\n",
-        )
-        .unwrap();
+        let text = "range_offset_m = -0.25\nencoder_counts = 3600\n";
+        fs::write(folder.path().join(FILE), text).unwrap();
         let stored = DatasetOptions {
             range_offset_m: Some(-0.25),
             encoder_counts: Some(3600),
@@ -65,27 +62,23 @@ mod tests {
             range_offset_m: Some(0.5),
             ..Default::default()
         };
-        assert_eq!(
-            explicit.or(&stored),
-            DatasetOptions {
-                range_offset_m: Some(0.5),
-                ..stored
-            }
-        );
+        let both = explicit.or(&stored);
+        assert_eq!(both.range_offset_m, Some(0.5));
+        assert_eq!(both.encoder_counts, Some(3600));
     }
 
     #[test]
     fn unknown_keys_are_rejected_by_name() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(FILE), "range_ofset_m = 1.0").unwrap();
-        let error = options(folder.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("dataset.toml") && error.contains("range_ofset_m"),
-            "{error}"
-        );
-        fs::write(folder.path().join(FILE), "# mine\nencoder_counts = 'many'").unwrap();
-        let error = options(folder.path()).unwrap_err().to_string();
-        let expected = "encoder_counts is \"many\", but must be a whole number from 0 to 65535";
-        assert!(error.contains(expected), "{error}");
+        let many = "encoder_counts is \"many\", but must be a whole number from 0 to 65535";
+        for (text, expected) in [
+            ("range_ofset_m = 1.0", "range_ofset_m"),
+            ("# mine\nencoder_counts = 'many'", many),
+        ] {
+            fs::write(folder.path().join(FILE), text).unwrap();
+            let error = options(folder.path()).unwrap_err().to_string();
+            assert!(error.contains("dataset.toml"), "{error}");
+            assert!(error.contains(expected), "{error}");
+        }
     }
 }

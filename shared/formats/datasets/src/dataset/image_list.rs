@@ -195,10 +195,8 @@ mod tests {
 
     fn divided(names: &[&str]) -> (Vec<String>, Vec<String>) {
         let text = |names: Vec<OsString>| -> Vec<String> {
-            let names = names.iter().map(|name| name.to_string_lossy());
-            names
-                .map(|name| name.trim_end_matches(".png").to_owned())
-                .collect()
+            let stem = |name: &OsString| name.to_string_lossy().trim_end_matches(".png").to_owned();
+            names.iter().map(stem).collect()
         };
         let names = names.iter().map(|name| format!("{name}.png").into());
         let (kept, others) = series(names.collect());
@@ -223,33 +221,18 @@ mod tests {
     #[test]
     fn copies_hidden_files_and_strangers_are_no_scans_of_a_series() {
         let (a, b) = ("1547131046100000", "1547131046350000");
-        let hidden = format!("._{a}");
-        let copies = [
-            format!("{a} (1)"),
-            format!("{b} - Kopie"),
-            format!("{b}_copy"),
-        ];
-        let names = [
-            a, &hidden, &copies[0], &copies[1], &copies[2], b, "7", "map",
-        ];
-        let (kept, mut others) = divided(&names);
+        let (hidden, copy) = (format!("._{a}"), format!("{a} (1)"));
+        let (other, third) = (format!("{b} - Kopie"), format!("{b}_copy"));
+        let mut strangers = [hidden.as_str(), &copy, &other, &third, "7", "map"];
+        let (kept, mut others) = divided(&[&strangers[..], &[b, a]].concat());
         assert_eq!(kept, [a, b]);
         others.sort_unstable();
-        let mut expected = vec![
-            hidden.as_str(),
-            &copies[0],
-            &copies[1],
-            &copies[2],
-            "7",
-            "map",
-        ];
-        expected.sort_unstable();
-        assert_eq!(others, expected);
+        strangers.sort_unstable();
+        assert_eq!(others, strangers);
         // Two files of one frame.
-        assert_eq!(
-            divided(&["000001", "1", "2"]),
-            (vec!["000001".into(), "2".into()], vec!["1".into()])
-        );
+        let (kept, others) = divided(&["000001", "1", "2"]);
+        assert_eq!(kept, ["000001", "2"]);
+        assert_eq!(others, ["1"]);
         assert_eq!(divided(&["001", "002", "overview"]).1, ["overview"]);
     }
 }

@@ -240,14 +240,10 @@ mod tests {
 
     #[test]
     fn nanoseconds_without_leading_zeros_are_integers() {
-        assert_eq!(
-            parse_line("Frame: 000243 Time: 1549986608.1533537"),
-            Some((243, 1_549_986_608_001_533_537, 7))
-        );
-        assert_eq!(
-            parse_line("Frame: 1 Time: 1549986608.0"),
-            Some((1, 1_549_986_608_000_000_000, 1))
-        );
+        let line = parse_line("Frame: 000243 Time: 1549986608.1533537");
+        assert_eq!(line, Some((243, 1_549_986_608_001_533_537, 7)));
+        let line = parse_line("Frame: 1 Time: 1549986608.0");
+        assert_eq!(line, Some((1, 1_549_986_608_000_000_000, 1)));
         for bad in [
             "Frame: 1 Time: 1549986608",
             "Frame: 1 Time: 1549986608.1234567890",
@@ -260,13 +256,8 @@ mod tests {
     }
 
     fn received(frames: std::ops::Range<i64>, offset_ns: i64) -> Vec<Receipt> {
-        let at = |frame| {
-            (
-                frame,
-                1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns,
-            )
-        };
-        frames.map(at).collect()
+        let ns = |frame| 1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns;
+        frames.map(|frame| (frame, ns(frame))).collect()
     }
 
     #[test]

@@ -81,13 +81,9 @@ mod tests {
 
     #[test]
     fn the_unit_follows_from_the_size() {
-        for raw in [
-            1_547_131_046,
-            1_547_131_046_000,
-            1_547_131_046_000_000,
-            1_547_131_046_000_000_000,
-        ] {
-            assert_eq!(to_ns(raw), Some(1_547_131_046_000_000_000), "{raw}");
+        for unit in [1, 1_000, 1_000_000, SECOND_NS] {
+            let found = to_ns(1_547_131_046 * unit);
+            assert_eq!(found, Some(1_547_131_046 * SECOND_NS), "{unit}");
         }
         for raw in [0, -1, 586, 1_000_000_000, i64::MAX, i64::MIN] {
             assert_eq!(to_ns(raw), None, "{raw}");
@@ -108,34 +104,23 @@ mod tests {
         assert_eq!(turn_of(&[gap, turn, gap]), Some(turn));
         assert_eq!(turn_of(&[turn, turn - 9, turn + 9, gap]), Some(turn));
         // One time in thirty that is far too short is no turn.
-        assert_eq!(
-            turn_of(&[&[turn / 4][..], &[turn; 29]].concat()),
-            Some(turn)
-        );
+        let times = [&[turn / 4][..], &[turn; 29]].concat();
+        assert_eq!(turn_of(&times), Some(turn));
         assert_eq!(turn_of(&[]), None);
     }
 
     #[test]
     fn decimal_seconds_keep_every_nanosecond() {
-        assert_eq!(
-            parse_seconds("1549986606.800100001"),
-            Some(1_549_986_606_800_100_001)
-        );
-        assert_eq!(parse_seconds("0"), Some(0));
-        assert_eq!(parse_seconds("-1.5"), Some(-1_500_000_000));
-        assert_eq!(parse_seconds("1.5e3"), Some(1_500_000_000_000));
-        assert_eq!(parse_seconds("1.1234567899"), Some(1_123_456_789));
-        for bad in [
-            "",
-            "nan",
-            "inf",
-            "1.2.3",
-            "x",
-            "1e300",
-            "9999999999",
-            "-9999999999",
-            "1e10",
+        for (text, ns) in [
+            ("1549986606.800100001", 1_549_986_606_800_100_001),
+            ("0", 0),
+            ("-1.5", -1_500_000_000),
+            ("1.5e3", 1_500_000_000_000),
+            ("1.1234567899", 1_123_456_789),
         ] {
+            assert_eq!(parse_seconds(text), Some(ns), "{text}");
+        }
+        for bad in " nan inf 1.2.3 x 1e300 9999999999 -9999999999 1e10".split(' ') {
             assert_eq!(parse_seconds(bad), None, "{bad}");
         }
     }

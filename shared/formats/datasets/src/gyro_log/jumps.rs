@@ -143,13 +143,7 @@ mod tests {
         assert_eq!(samples, track(0));
         samples[300..].iter_mut().for_each(|it| it.values[2] += 1.0);
         let jumps = leave_out(&mut samples, SampleKind::Gyro);
-        assert_eq!(
-            jumps,
-            Jumps {
-                left_out: 0,
-                alone: 1
-            }
-        );
+        assert_eq!((jumps.left_out, jumps.alone), (0, 1));
         assert_eq!(samples.len(), 500);
         let sentence = "The values change 1 times faster than a vehicle can.";
         assert_eq!(jumps.sentence().as_deref(), Some(sentence));
@@ -160,20 +154,13 @@ mod tests {
     fn wheels_that_brake_have_none_and_stamps_that_jitter_make_none() {
         let speed = |k: i64| (20.0 - 0.2 * k as f64).max(0.0);
         let stamp_ns = |k: i64| 2 * k * PERIOD_NS - if k % 7 == 3 { 19_000_000 } else { 0 };
-        let samples: Vec<Sample> = (0..200)
-            .map(|k| Sample::speed(stamp_ns(k), speed(k)))
-            .collect();
+        let samples = (0..200).map(|k| Sample::speed(stamp_ns(k), speed(k)));
+        let samples: Vec<Sample> = samples.collect();
         let mut kept = samples.clone();
         assert_eq!(leave_out(&mut kept, SampleKind::Wheels), Jumps::default());
         assert_eq!(kept, samples);
         kept[50].values[0] = 0.0;
         let jumps = leave_out(&mut kept, SampleKind::Wheels);
-        assert_eq!(
-            jumps,
-            Jumps {
-                left_out: 1,
-                alone: 0
-            }
-        );
+        assert_eq!((jumps.left_out, jumps.alone), (1, 0));
     }
 }

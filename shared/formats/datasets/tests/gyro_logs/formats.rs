@@ -1,6 +1,6 @@
 //! Formats.
 
-use std::{env, path::PathBuf};
+use std::path::PathBuf;
 
 use gyre_datasets::{Format, GyroLog};
 use gyre_samples::{SampleKind, UpAxis};
@@ -268,31 +268,4 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
     let missing = missing.unwrap_err().to_string();
     let expected = "cannot read the log of the gyro /no/imu.csv";
     assert!(missing.contains(expected), "{missing}");
-}
-
-/// The counts were found by other means: rows, stamps and steps of the files.
-#[test]
-fn the_real_logs_are_read_with_their_faults() {
-    let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
-        println!("skipped: GYRE_DATA is not set");
-        return;
-    };
-    for (name, samples, gaps, longest_s) in [
-        ("radiate-2019-02-12", 2293, 13, 0.799702),
-        ("radiate-2019-02-12-b", 1386, 19, 5.749749),
-        ("radiate-2019-02-12-standing", 632, 0, 0.0),
-    ] {
-        let path = GyroLog::beside(&data.join(name)).unwrap();
-        let log = GyroLog::read(&path).unwrap();
-        assert_eq!(log.samples.len(), samples, "{name}");
-        assert_eq!(log.faults.left_out(), 0, "{name}");
-        assert_eq!(log.faults.gaps.len(), gaps, "{name}");
-        let off_s = log.faults.longest_gap_s() - longest_s;
-        assert!(off_s.abs() < 1e-6, "{name}");
-    }
-    // Ten of its stamps in a row are 0.36 s early.
-    let fog = GyroLog::read(&data.join("radiate-tiny_foggy/imu_as_logged.csv")).unwrap();
-    assert_eq!(fog.samples.len() + fog.faults.measured_twice, 124);
-    let faults = &fog.faults;
-    assert_eq!((faults.out_of_order, faults.measured_twice), (7, 14));
 }

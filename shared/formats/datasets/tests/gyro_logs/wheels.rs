@@ -1,7 +1,6 @@
 //! Logs of the wheels' speed.
 
 use gyre_datasets::{LogError, WheelLog};
-use proptest::prelude::*;
 use tempfile::TempDir;
 
 use super::START_NS;
@@ -193,40 +192,4 @@ fn the_log_lies_beside_the_scans() {
     let path = written(&folder, "wheels.csv", "");
     assert_eq!(WheelLog::find(&folder.path().join("radar")).unwrap(), path);
     assert_eq!(WheelLog::find(folder.path()).unwrap(), path);
-}
-
-proptest! {
-    /// Rows that are no numbers, repeated stamps and absurd speeds are left out and counted, and
-    /// the others stay, in the order of their stamps.
-    #[test]
-    fn faults_are_counted_and_leave_the_other_samples_alone(
-        faults in prop::collection::vec(0usize..40, 200..400),
-    ) {
-        let mut text = "stamp_ns,speed_m_s\n".to_owned();
-        let (mut kept, mut left_out) = (Vec::new(), 0);
-        for (k, fault) in (0..).zip(&faults) {
-            let (stamp, speed) = (START_NS + 50 * MS * k, k as f64 * 0.01);
-            let row = match fault {
-                0 => format!("{stamp},nan"),
-                1 => format!("{stamp}"),
-                2 => format!("{stamp},inf"),
-                3 => format!("{stamp},speed"),
-                _ => {
-                    kept.push(speed);
-                    format!("{stamp},{speed}")
-                }
-            };
-            left_out += usize::from(*fault < 4);
-            text += &row;
-            text += "\n";
-            if *fault == 4 {
-                left_out += 1;
-                text += &row;
-                text += "\n";
-            }
-        }
-        let log = read(&text).unwrap();
-        prop_assert_eq!(speeds(&log), kept);
-        prop_assert_eq!(log.faults.left_out(), left_out);
-    }
 }
