@@ -37,7 +37,8 @@ impl Gyro {
         if let Some(file) = named {
             return Ok(Some(of(GyroLog::read(file)?)));
         }
-        let beside = GyroLog::beside(&configuration.source.data).map(|file| GyroLog::read(&file));
+        let beside = GyroLog::find(&configuration.source.data).ok();
+        let beside = beside.map(|file| GyroLog::read(&file));
         match beside.transpose() {
             Ok(log) => Ok(log.map(of)),
             Err(error) => {

@@ -250,11 +250,10 @@ impl RadarClock {
             let from_host_ns = format.ns(later).abs_diff(arrived_ns);
             fits.then_some((apart, !format.is_unix(later), from_host_ns, format))
         });
-        candidates
-            .min_by(|a, b| {
-                let nearest = a.0.total_cmp(&b.0);
-                nearest.then((a.1, a.2).cmp(&(b.1, b.2)))
-            })
-            .map(|(.., format)| format)
+        let nearest = candidates.min_by(|a, b| {
+            let nearest = a.0.total_cmp(&b.0);
+            nearest.then((a.1, a.2).cmp(&(b.1, b.2)))
+        });
+        nearest.map(|(.., format)| format)
     }
 }

@@ -181,7 +181,6 @@ impl SweepAssembler {
         } else {
             self.last = Some(here);
             self.state = State::Waiting;
-            self.counters.discarded_azimuths += 1;
         }
     }
 
@@ -194,7 +193,7 @@ impl SweepAssembler {
     ) -> Option<Sweep> {
         self.last = Some(here);
         match self.state {
-            State::Waiting => self.counters.discarded_azimuths += 1,
+            State::Waiting => {}
             State::Complete => self.counters.surplus_azimuths += 1,
             State::Open if self.grid.is_break(last, here) => {
                 self.counters.broken_sweeps += 1;

@@ -33,6 +33,7 @@ use std::{ops::Range, path::Path};
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
+pub use dataset_toml::stored_options;
 pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -176,12 +177,6 @@ pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), Rea
 /// `dataset.toml` in the folder, if there is one.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     open_resolved(root, &options.or(&stored_options(root)?))
-}
-
-/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
-/// file.
-pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
-    dataset_toml::options(root)
 }
 
 /// Opens the dataset at `root` with these options only: the current `dataset.toml` is ignored.

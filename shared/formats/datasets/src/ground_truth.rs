@@ -15,6 +15,8 @@ pub use tum::{write_tum, write_tum_pose};
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 
+use crate::logs::roots;
+
 /// Files of ground truth relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 9] = [
     "ground_truth.tum",
@@ -92,13 +94,7 @@ pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, Trajector
 /// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be
 /// the folder of images.
 pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
-    let name = root.file_name().and_then(|name| name.to_str());
-    let is_of_images = ["radar", "Navtech_Polar", "navtech", "polar"]
-        .map(Some)
-        .contains(&name);
-    let above = root.parent().filter(|_| is_of_images);
-    let roots = [Some(root), above].into_iter().flatten();
-    let mut places = roots.flat_map(|root| PLACES.map(|place| root.join(place)));
+    let mut places = roots(root).flat_map(|root| PLACES.map(|place| root.join(place)));
     places.find(|path| path.is_file())
 }
 

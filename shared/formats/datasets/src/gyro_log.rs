@@ -76,11 +76,6 @@ impl GyroLog {
         })
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder.
-    pub fn beside(folder: &Path) -> Option<PathBuf> {
-        Self::find(folder).ok()
-    }
-
     /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
     /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {

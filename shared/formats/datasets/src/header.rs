@@ -5,13 +5,13 @@ use std::collections::HashSet;
 use csv::StringRecord;
 use gyre_storage::quoted;
 
-use crate::{parse_seconds, stamp_to_ns};
+use crate::{
+    dataset::stamp::{MAX_NS, SECOND_NS},
+    parse_seconds, stamp_to_ns,
+};
 
 /// Tables of sensors have tens of columns.
 const MAX_COLUMNS: usize = 1000;
-/// Times are at most 146 years from 1970, so that no difference overflows.
-const MAX_NS: i64 = i64::MAX / 2;
-const SECOND_NS: i64 = 1_000_000_000;
 
 /// Names of the column of stamps that have no unit.
 const STAMPS: &str = "timestamp stamp time t gpstime header_stamp utime unix_time tv";
@@ -110,10 +110,8 @@ impl Header {
 
     /// Returns the columns that state that a row has no measurement, and the number for that.
     pub fn unmeasured(&self) -> Vec<(usize, f64)> {
-        let columns = UNMEASURED.iter();
-        columns
-            .filter_map(|(name, number)| Some((self.find(name)?, *number)))
-            .collect()
+        let column = |(name, number): &(&str, f64)| Some((self.find(name)?, *number));
+        UNMEASURED.iter().filter_map(column).collect()
     }
 
     /// Returns where the stamps are; `None` without such a column.
@@ -229,9 +227,7 @@ pub(crate) fn unit_of<T: Copy>(
 fn plain(name: &str) -> String {
     let name = name.trim().trim_start_matches(['%', '#']);
     let name = name.strip_prefix("field.").unwrap_or(name).trim();
-    let name = name
-        .to_lowercase()
-        .replace([' ', '.', '/', '[', '('], "_")
-        .replace([']', ')'], "");
+    let name = name.to_lowercase().replace([']', ')'], "");
+    let name = name.replace([' ', '.', '/', '[', '('], "_");
     name.replace("__", "_").replace("^2", "2")
 }

@@ -141,9 +141,8 @@ struct ScansRead {
 
 impl ScansRead {
     fn of(dataset: &mut dyn Dataset) -> Self {
-        let step = (dataset.len() * dataset.limits().bytes)
-            .div_ceil(PIXEL_BUDGET)
-            .max(1);
+        let bytes = dataset.len() * dataset.limits().bytes;
+        let step = bytes.div_ceil(PIXEL_BUDGET).max(1);
         let mut read = Self {
             scans_read: 0,
             rows: rows::Survey::default(),

@@ -79,7 +79,7 @@ impl ScanSamples {
             up: Some(log.up(config.up, dataset.format())?),
             ..config.clone()
         };
-        let track = SampleTrack::new(log, &config);
+        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
         Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 
@@ -89,7 +89,7 @@ impl ScanSamples {
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let track = log.track(config);
+        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
         Self::of_track(track, (SampleKind::Wheels, &log.path), &log.faults, dataset)
     }
 

@@ -105,9 +105,8 @@ impl<C: Columns> Rows<C> {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
                 let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
                 let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
-                self.raw
-                    .unreadable
-                    .add(times, line, || why(row, self.count));
+                let why = || why(row, self.count);
+                self.raw.unreadable.add(times, line, why);
             }
         }
     }

@@ -7,12 +7,12 @@ mod counts;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use gyre_samples::{Sample, SampleKind, WheelsConfig};
+use gyre_samples::{Sample, SampleKind};
 
 use counts::CountColumns;
 
 use crate::{
-    LogError, LogFaults, SampleTrack,
+    LogError, LogFaults,
     gyro_log::faults::{Plausible, examine},
     header::{Header, Sign, Stamp, unit_of},
     logs,
@@ -65,11 +65,6 @@ impl WheelLog {
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), false, path)
-    }
-
-    /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
-    pub fn track(&self, config: &WheelsConfig) -> SampleTrack {
-        SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
     }
 
     fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {

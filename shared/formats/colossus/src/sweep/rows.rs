@@ -72,7 +72,6 @@ impl RowWriter {
             return;
         };
         let bins = powers.bins();
-        counters.padded_rows += u64::from(bins < row.len());
         counters.cut_rows += u64::from(bins > row.len());
         let measured = bins.min(row.len());
         self.order.write(powers, &mut row[..measured]);

@@ -9,7 +9,7 @@ use crate::in_plain_words;
 /// File name, beside the folder of images or in it.
 const FILE: &str = "dataset.toml";
 
-pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
+pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     let places = [Some(root), root.parent()].into_iter().flatten();
     for path in places.map(|folder| folder.join(FILE)) {
         let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
@@ -48,7 +48,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let images = folder.path().join("radar");
         fs::create_dir(&images).unwrap();
-        assert_eq!(options(&images).unwrap(), DatasetOptions::default());
+        assert_eq!(stored_options(&images).unwrap(), DatasetOptions::default());
         let text = "range_offset_m = -0.25\nencoder_counts = 3600\n";
         fs::write(folder.path().join(FILE), text).unwrap();
         let stored = DatasetOptions {
@@ -56,8 +56,8 @@ mod tests {
             encoder_counts: Some(3600),
             ..Default::default()
         };
-        assert_eq!(options(folder.path()).unwrap(), stored);
-        assert_eq!(options(&images).unwrap(), stored);
+        assert_eq!(stored_options(folder.path()).unwrap(), stored);
+        assert_eq!(stored_options(&images).unwrap(), stored);
         let explicit = DatasetOptions {
             range_offset_m: Some(0.5),
             ..Default::default()
@@ -76,7 +76,7 @@ mod tests {
             ("# mine\nencoder_counts = 'many'", many),
         ] {
             fs::write(folder.path().join(FILE), text).unwrap();
-            let error = options(folder.path()).unwrap_err().to_string();
+            let error = stored_options(folder.path()).unwrap_err().to_string();
             assert!(error.contains("dataset.toml"), "{error}");
             assert!(error.contains(expected), "{error}");
         }

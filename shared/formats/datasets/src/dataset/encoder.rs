@@ -73,10 +73,8 @@ pub(crate) struct EncoderStep {
 impl EncoderStep {
     /// Returns the step of a turn, which may begin anywhere; `None` for counts that are of no turn.
     pub(crate) fn of(counts: &[u16]) -> Option<Self> {
-        let zero = counts
-            .windows(2)
-            .position(|w| w[1] < w[0])
-            .map_or(0, |row| row + 1);
+        let zero = counts.windows(2).position(|w| w[1] < w[0]);
+        let zero = zero.map_or(0, |row| row + 1);
         let (before, after) = counts.split_at(zero);
         let turn = || after.iter().chain(before);
         let steps = turn().zip(turn().skip(1));

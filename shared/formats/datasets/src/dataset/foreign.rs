@@ -38,10 +38,9 @@ pub fn foreign(path: &Path) -> Option<OpenError> {
         let bytes = head.get(*at..);
         bytes.is_some_and(|bytes| bytes.starts_with(signature))
     };
-    let packed = UNPACKED
-        .iter()
-        .find(has)
-        .map(|(.., kind)| format!("is {kind}: unpack it, and name the folder that it held"));
+    let packed = UNPACKED.iter().find(has);
+    let packed =
+        packed.map(|(.., kind)| format!("is {kind}: unpack it, and name the folder that it held"));
     let other = || Some(format!("is {}", CONVERTED.iter().find(has)?.2));
     Some(OpenError::at(path, packed.or_else(other)?))
 }

@@ -128,10 +128,8 @@ fn copied_number(name: &OsString) -> Option<i64> {
 /// Compares names, and numbers in them as numbers: `scan2` is before `scan10`.
 fn natural(one: &OsString, other: &OsString) -> Ordering {
     let stem = |name| {
-        Path::new(name)
-            .file_stem()
-            .unwrap_or_default()
-            .as_encoded_bytes()
+        let stem = Path::new(name).file_stem();
+        stem.unwrap_or_default().as_encoded_bytes()
     };
     let (mut a, mut b) = (stem(one), stem(other));
     while let (Some(first), Some(second)) = (a.first(), b.first()) {
@@ -154,10 +152,8 @@ fn natural(one: &OsString, other: &OsString) -> Ordering {
 
 /// Splits the digits off the start of a text, without leading zeros.
 fn number_in(text: &[u8]) -> Option<(&[u8], &[u8])> {
-    let end = text
-        .iter()
-        .position(|b| !b.is_ascii_digit())
-        .unwrap_or(text.len());
+    let end = text.iter().position(|b| !b.is_ascii_digit());
+    let end = end.unwrap_or(text.len());
     let (digits, rest) = text.split_at(end);
     let zeros = digits.iter().take_while(|b| **b == b'0').count();
     (end > 0).then(|| (&digits[zeros..], rest))
@@ -166,9 +162,8 @@ fn number_in(text: &[u8]) -> Option<(&[u8], &[u8])> {
 /// Returns whether a folder exists and holds a PNG that is not hidden.
 pub(crate) fn has_png(folder: &Path) -> bool {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| png_name(&entry))
-        .any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
+    let mut names = entries.map(|entry| png_name(&entry));
+    names.any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
 }
 
 /// Returns the name of an entry if it is a PNG file, or a link to one.

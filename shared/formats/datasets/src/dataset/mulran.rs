@@ -18,16 +18,14 @@ const STAMPS: &str = "Files are named by the time of the last column; columns ar
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
     let mut scans = TransposedScans::open(found, options, STAMPS, |_| MULRAN_RESOLUTION_M)?;
     scans.first_azimuth = 0.5;
-    let ends_ns = (0..scans.images.len())
-        .map(|index| end_ns(&scans.images, index))
-        .collect::<Result<Vec<_>, _>>()?;
+    let ends_ns = (0..scans.images.len()).map(|index| end_ns(&scans.images, index));
+    let ends_ns = ends_ns.collect::<Result<Vec<_>, _>>()?;
     let turn_ns = stamp::turn_ns(ends_ns.iter().copied()).unwrap_or(stamp::DEFAULT_TURN_NS);
     let azimuths = scans.azimuths() as i64;
     let turn = |(index, &end_ns): (usize, &i64)| {
         let interval_ns = index.checked_sub(1).map(|before| end_ns - ends_ns[before]);
-        let period_ns = interval_ns
-            .filter(|ns| (ns - turn_ns).abs() < turn_ns / 5)
-            .unwrap_or(turn_ns);
+        let period_ns = interval_ns.filter(|ns| (ns - turn_ns).abs() < turn_ns / 5);
+        let period_ns = period_ns.unwrap_or(turn_ns);
         Turn {
             start_ns: end_ns - period_ns * (azimuths - 1) / azimuths,
             period_ns,

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use super::error::ReadError;
 use super::image_size::ImageSize;
-use super::options::AzimuthSource;
 use super::stamp;
 use gyre_radar::scan::{check_sweep, flag};
 
@@ -88,14 +87,9 @@ pub(crate) fn fill_azimuths(
     path: &Path,
     pixels: &[u8],
     size: ImageSize,
-    source: AzimuthSource,
     counts: u16,
     azimuth_rad: &mut [f32],
 ) -> Result<(), ReadError> {
-    if source == AzimuthSource::Uniform {
-        fill_uniform(&mut azimuth_rad[..size.height], 0.0);
-        return Ok(());
-    }
     check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
     check_turn(path, rows(pixels, size).map(|row| row.count), counts)?;
     let step = std::f64::consts::TAU / f64::from(counts);
@@ -156,9 +150,8 @@ fn check_turn(
         return Ok(());
     };
     let next = row_counts.clone().skip(1).chain([first]);
-    let step = |(count, next): (u16, u16)| {
-        (i32::from(next) - i32::from(count)).rem_euclid(i32::from(counts))
-    };
+    let step =
+        |(count, next): (u16, u16)| (i32::from(next) - i32::from(count)).rem_euclid(counts.into());
     let widest = row_counts.zip(next).map(step).max().unwrap_or(0);
     let gap = f64::from(widest) / f64::from(counts);
     if gap <= MAX_GAP_SHARE {

@@ -167,9 +167,8 @@ impl NavtechScans {
         let stamp_ns = |index| self.logged_stamp_ns(index);
         let next_ns = index.checked_add(1).and_then(stamp_ns);
         let interval_ns = next_ns.zip(stamp_ns(index)).map(|(b, a)| b - a);
-        interval_ns
-            .filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
-            .unwrap_or(self.period_ns)
+        let is_turn = |ns: &i64| (ns - self.period_ns).abs() < self.period_ns / 5;
+        interval_ns.filter(is_turn).unwrap_or(self.period_ns)
     }
 }
 
@@ -248,22 +247,18 @@ impl Dataset for NavtechScans {
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         check_capacity(self.limits(), &slot)?;
-        let size = self
-            .images
-            .decode(index, self.accepted_rows(), slot.bytes)?;
+        let rows = self.accepted_rows();
+        let size = self.images.decode(index, rows, slot.bytes)?;
         let (path, profile) = (self.images.file(index), &self.profile);
-        let (azimuth_rad, stamp_ns) = (
-            &mut slot.azimuth_rad[..size.height],
-            &mut slot.stamp_ns[..size.height],
-        );
-        navtech_png::fill_azimuths(
-            path,
-            slot.bytes,
-            size,
-            profile.azimuth_source,
-            profile.encoder_counts,
-            azimuth_rad,
-        )?;
+        let azimuth_rad = &mut slot.azimuth_rad[..size.height];
+        let stamp_ns = &mut slot.stamp_ns[..size.height];
+        match self.has_encoder() {
+            true => {
+                let counts = profile.encoder_counts;
+                navtech_png::fill_azimuths(path, slot.bytes, size, counts, azimuth_rad)?;
+            }
+            false => navtech_png::fill_uniform(azimuth_rad, 0.0),
+        }
         navtech_png::fill_stamps(path, slot.bytes, size, self.max_sweep_ns, stamp_ns)?;
         navtech_png::fill_flags(slot.bytes, size, profile.byte_ten, slot.flags);
         let scan_ns = self.scan_time_ns(stamp_ns);

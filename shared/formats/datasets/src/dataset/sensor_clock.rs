@@ -40,23 +40,17 @@ impl SensorClock {
         period: std::ops::RangeInclusive<f64>,
     ) -> Option<Self> {
         let &(first_number, origin_ns) = received.first()?;
-        let points: Vec<(f64, f64)> = received
-            .iter()
-            .map(|(number, ns)| {
-                (
-                    *number as f64 - first_number as f64,
-                    (ns - origin_ns) as f64,
-                )
-            })
-            .collect();
+        let point = |(number, ns): &Receipt| {
+            let number = *number as f64 - first_number as f64;
+            (number, (ns - origin_ns) as f64)
+        };
+        let points: Vec<(f64, f64)> = received.iter().map(point).collect();
         let mean = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
         let slope =
             slope_over(&lower_hull(&points), mean).unwrap_or((period.start() + period.end()) / 2.0);
         let slope = slope.clamp(*period.start(), *period.end());
-        let start = points
-            .iter()
-            .map(|(number, ns)| ns - slope * number)
-            .fold(f64::INFINITY, f64::min);
+        let starts = points.iter().map(|(number, ns)| ns - slope * number);
+        let start = starts.fold(f64::INFINITY, f64::min);
         Some(Self {
             origin_ns,
             start: start - slope * first_number as f64,
@@ -83,14 +77,10 @@ impl SensorClock {
             }
             (clock, rest) = (next, others);
         }
-        let (early, times): (Vec<_>, Vec<_>) = received
-            .iter()
-            .copied()
-            .partition(|time| clock.is_early(*time));
-        let prompt = times
-            .iter()
-            .filter(|time| clock.after_ns(**time) <= EARLY_NS)
-            .count();
+        let is_early = |time: &Receipt| clock.is_early(*time);
+        let (early, times): (Vec<_>, Vec<_>) = received.iter().copied().partition(is_early);
+        let is_prompt = |time: &&Receipt| clock.after_ns(**time) <= EARLY_NS;
+        let prompt = times.iter().filter(is_prompt).count();
         match prompt as f64 >= PROMPT_SHARE * times.len() as f64 && early.len() <= most {
             true => Some((Self::below(&times, period)?, early)),
             false => Some((all, Vec::new())),
@@ -110,10 +100,8 @@ impl SensorClock {
         }
         let of = |near: bool| {
             let times = times.iter().zip(&is_near);
-            times
-                .filter(|(_, is_near)| **is_near == near)
-                .map(|(time, _)| *time)
-                .collect()
+            let times = times.filter(|(_, is_near)| **is_near == near);
+            times.map(|(time, _)| *time).collect()
         };
         (of(true), of(false))
     }

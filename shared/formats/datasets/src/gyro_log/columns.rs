@@ -87,6 +87,8 @@ impl Columns for GyroColumns {
 
     fn by_names(header: &Header) -> Result<Self, String> {
         let names = header.names();
+        let missing =
+            |what, hint| format!("its columns {} have no {what}: {hint}", header.listed());
         if names == FOMO {
             return Ok(Self::known(Stamp::first(true), [1, 2, 3], [4, 5, 6]));
         }
@@ -95,15 +97,10 @@ impl Columns for GyroColumns {
                 Some(_) => "the INS logs of Oxford and OORD have positions and attitudes alone",
                 None => REMEDY,
             };
-            return Err(format!(
-                "its columns {} have no angular rates about three axes: {hint}",
-                header.listed()
-            ));
+            return Err(missing("angular rates about three axes", hint));
         };
         Ok(Self {
-            stamp: header
-                .stamp()
-                .ok_or_else(|| format!("it has no column of stamps: {REMEDY}"))?,
+            stamp: header.stamp().ok_or_else(|| missing("stamps", REMEDY))?,
             rates,
             rate_unit: unit.unwrap_or(1.0),
             unit_is_assumed: unit.is_none() && !KNOWN.iter().any(|known| names == *known),
@@ -146,9 +143,8 @@ type Vector = ([usize; 3], Option<f64>);
 
 fn vector(header: &Header, patterns: &str, units: &[(&'static str, f64)]) -> Option<Vector> {
     let units = endings(units).into_iter();
-    let units = units
-        .map(|(name, factor)| (name, Some(factor)))
-        .chain([("", None)]);
+    let units = units.map(|(name, factor)| (name, Some(factor)));
+    let units = units.chain([("", None)]);
     let patterns = patterns.split(' ');
     let mut forms = patterns.flat_map(|pattern| units.clone().map(move |unit| (pattern, unit)));
     forms.find_map(|(pattern, (unit, factor))| {

@@ -1,8 +1,8 @@
 //! Samples of a log on the radar's clock.
 
-use gyre_samples::{GyroConfig, Sample, SampleKind};
+use gyre_samples::{Sample, SampleKind};
 
-use super::{GyroLog, jumps};
+use super::jumps;
 
 /// Samples in the vehicle's axes on the radar's clock, in the order of their transport
 /// ([`Sample::order`]).
@@ -10,13 +10,6 @@ use super::{GyroLog, jumps};
 pub struct SampleTrack(Vec<Sample>);
 
 impl SampleTrack {
-    /// Takes the samples of a log over to the vehicle's axes and the radar's clock:
-    /// [`GyroConfig::on_radar`].
-    pub fn new(log: &GyroLog, config: &GyroConfig) -> Self {
-        let taken = log.samples.iter().map(|sample| config.on_radar(sample));
-        Self(taken.collect())
-    }
-
     /// Takes samples that are on the radar's clock, in their order.
     pub(crate) fn of(samples: impl Iterator<Item = Sample>) -> Self {
         Self(samples.collect())
@@ -64,10 +57,11 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::path::Path;
 
-    use gyre_samples::UpAxis;
+    use gyre_samples::{GyroConfig, UpAxis};
     use proptest::prelude::*;
 
     use super::*;
+    use crate::GyroLog;
 
     use UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
     const AXES: [UpAxis; 6] = [X, MinusX, Y, MinusY, Z, MinusZ];
@@ -141,7 +135,7 @@ mod tests {
             bias_radps: 0.5,
             ..GyroConfig::default()
         };
-        let track = SampleTrack::new(&log, &config);
+        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
         assert_eq!(track.span_ns(), Some([3_420_000_000; 2]));
         let [sample] = track.between(0, 3_420_000_000) else {
             panic!("one sample");

@@ -155,7 +155,7 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         ("", "it is empty"),
         ("1,2,3\n", "3 columns have no names"),
         ("stamp_ns,x,y\n", "have no positions"),
-        ("latitude,longitude\n", "no column of stamps"),
+        ("latitude,longitude\n", "have no stamps"),
         (
             "stamp_ns,latitude,longitude\n",
             "none of its 0 entries is a usable fix",
