@@ -165,35 +165,26 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
 }
 
 #[test]
-fn a_damaged_scan_is_skipped_and_counted() {
+fn a_bag_without_its_end_gives_results_but_no_success() {
     let run = Run::of_recording();
     run.complete();
     let path = bag(&run, "bag.mcap");
     let exported = export(run.out(), &path, &[]);
-    exported.succeeded();
     // A few rows of the recording are not measured, as in real ones.
-    let says = exported.stderr.contains("interpolated rows: ");
+    let says = exported.succeeded().stderr.contains("interpolated rows: ");
     assert!(says, "{}", exported.stderr);
     let bytes = fs::read(&path).unwrap();
-    // Zstandard's signature begins the content of each chunk; the fifth one has scans.
+    // Zstandard's signature begins the content of each chunk.
     let magic = [0x28, 0xb5, 0x2f, 0xfd];
     let chunks = (0..bytes.len() - 4).filter(|at| bytes[*at..*at + 4] == magic);
     let chunks: Vec<usize> = chunks.collect();
-    let mut damaged = bytes.clone();
-    damaged[chunks[chunks.len() / 2] + 1000] ^= 0xff;
-    fs::write(&path, damaged).unwrap();
-    let again = |path: &Path, words: &[&str]| {
-        let again = Run::of_file(&run.out().join("config.toml")).data(path);
-        again.finish().failed_with(words);
-        odometry::rows(&again.odometry()).len()
-    };
-    let fewer = again(&path, &["is damaged at byte"]);
-    assert!(fewer > 0 && fewer < recording::SCANS - 1, "{fewer}");
     // Cut within a chunk: the messages before the cut are read.
-    let cut = bag(&run, "cut.mcap");
-    fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
-    again(&cut, &["has no end behind byte"]);
-    let inspected = inspect(&cut, &[]).succeeded().stdout.clone();
+    fs::write(&path, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
+    let again = Run::of_file(&run.out().join("config.toml")).data(&path);
+    again.finish().failed_with(&["has no end behind byte"]);
+    let motions = odometry::rows(&again.odometry()).len();
+    assert!((1..recording::SCANS - 1).contains(&motions), "{motions}");
+    let inspected = inspect(&path, &[]).succeeded().stdout.clone();
     assert!(inspected.contains("has no end"), "{inspected}");
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::real;
+use crate::common::{assert_refused, real};
 use gyre_datasets::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
 use gyre_radar::Trajectory;
 use nalgebra::{Isometry2, Vector2};
@@ -38,8 +38,7 @@ fn oxford_motions_are_converted_to_rep_103_and_composed_from_identity() {
     assert!((last - Vector2::new(1.5, -1.0)).norm() < 1e-12, "{last}");
     let (first, second) = (row(0, 250, 2.0, 0.0, 0.0), row(500, 750, 1.0, 0.5, 0.0));
     let refused = from_text("radar_odometry.csv", &[HEADER, &first, &second].concat());
-    let error = refused.unwrap_err().to_string();
-    assert!(error.contains("line 3") && error.contains("gap"), "{error}");
+    assert_refused(refused, "line 3: this motion starts 0.250000 s after");
 }
 
 #[test]
@@ -117,8 +116,7 @@ fn invalid_files_are_rejected_with_their_line() {
         ),
     ];
     for (text, words) in cases {
-        let error = from_text("a.txt", text).unwrap_err().to_string();
-        assert!(error.contains(words), "{text:?}: {error}");
+        assert_refused(from_text("a.txt", text), words);
     }
     for (path, words) in [
         (
@@ -127,8 +125,7 @@ fn invalid_files_are_rejected_with_their_line() {
         ),
         ("/proc/self/fdinfo", "without a ground truth"),
     ] {
-        let error = read_trajectory(path.as_ref()).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_refused(read_trajectory(path.as_ref()), words);
     }
 }
 
@@ -164,40 +161,17 @@ fn what_spreadsheets_write_is_refused_with_what_to_do() {
         (";", "GPSTime", 3, "parted by semicolons, and need commas"),
     ] {
         let text = vec![number; count].join(separator);
-        let error = from_text("a.txt", &text).unwrap_err().to_string();
-        assert!(error.contains(words), "{text:?}: {error}");
+        assert_refused(from_text("a.txt", &text), words);
     }
+    // The poses of the lidar of Boreas, and columns with a space behind their comma.
+    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
+    let lidar = from_text("a", &boreas.replace("GPSTime", "ROSTime"));
+    assert_eq!(lidar.unwrap(), from_text("a", boreas).unwrap());
     let row = "1561000444390857630,0,-1,0,353062.125,1,0,0,4026023,0,0,1,20\n";
     assert_eq!(
         from_text("global_pose.csv", &row.replace(',', ", ")).unwrap(),
         from_text("global_pose.csv", row).unwrap()
     );
-}
-
-#[test]
-fn a_byte_order_mark_is_no_part_of_a_trajectory() {
-    let tum = "1.5 1 2 0 0 0 0 1\n";
-    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
-    let lidar = from_text("a", &boreas.replace("GPSTime", "ROSTime"));
-    assert_eq!(lidar.unwrap(), from_text("a", boreas).unwrap());
-    let oxford = [HEADER, &row(0, 250, 2.0, 0.0, 0.1)].concat();
-    for text in [tum, boreas, &oxford] {
-        let marked = from_text("a.txt", &format!("\u{feff}{text}")).unwrap();
-        assert_eq!(marked, from_text("a.txt", text).unwrap());
-    }
-}
-
-#[test]
-fn a_word_of_a_damaged_file_is_quoted_in_part() {
-    let long = "9".repeat(5000);
-    for text in [
-        format!("1 0 0 {long}x 0 1 0 0 0 0 1 0\n"),
-        format!("{long}x 0 0 0 0 0 0 1\n"),
-        format!("GPSTime,easting,northing,roll,pitch,heading\n{long},0,0,0,0,0\n"),
-    ] {
-        let error = from_text("truth.txt", &text).unwrap_err().to_string();
-        assert!(error.len() < 300 && error.contains("999\"..."), "{error}");
-    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Small generated datasets, and paths of real ones.
 #![allow(dead_code, clippy::unwrap_used)]
 
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +12,16 @@ use tempfile::TempDir;
 /// 2019-01-10 14:37:26 UTC, us.
 pub const START_US: i64 = 1_547_131_046_000_000;
 pub const PERIOD_US: i64 = 250_000;
+
+/// Asserts that something is refused in a sentence with these words.
+#[track_caller]
+pub fn assert_refused<T>(result: Result<T, impl Display>, words: &str) {
+    let error = result
+        .err()
+        .map(|error| error.to_string())
+        .unwrap_or_default();
+    assert!(error.contains(words), "{words:?} is not in {error:?}");
+}
 
 /// Writes a text into a file of this name.
 pub fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {

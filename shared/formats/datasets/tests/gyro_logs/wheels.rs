@@ -4,7 +4,7 @@ use gyre_datasets::{LogError, WheelLog};
 use tempfile::TempDir;
 
 use super::START_NS;
-use crate::common::written;
+use crate::common::{assert_refused, written};
 
 const MS: i64 = 1_000_000;
 
@@ -178,8 +178,7 @@ fn ticks_need_their_length() {
         (&short, Some(0.05), "it is shorter than 0.09 s"),
         (&text, Some(1.0), "is wheels.m_per_tick in metres"),
     ] {
-        let refused = read_ticks(text, m_per_tick).unwrap_err().to_string();
-        assert!(refused.contains(words), "{refused}");
+        assert_refused(read_ticks(text, m_per_tick), words);
     }
 }
 

@@ -6,7 +6,7 @@ use gyre_datasets::{AzimuthSource, Format, open};
 use gyre_radar::scan::flag;
 
 use super::{first_scan, first_scan_with, folder, options};
-use crate::common::{START_US, Sweep, read, write_oxford};
+use crate::common::{START_US, Sweep, assert_refused, read, write_oxford};
 
 #[test]
 fn rows_that_are_not_one_sweep_are_rejected() {
@@ -24,8 +24,7 @@ fn rows_that_are_not_one_sweep_are_rejected() {
         let root = folder();
         let files = write_oxford(root.path(), 1);
         sweep.write(&files[0]);
-        let error = first_scan(root.path()).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_refused(first_scan(root.path()), words);
     }
 }
 
@@ -54,8 +53,7 @@ fn an_encoder_of_another_size_than_configured_is_reported() {
             "130 degrees of the turn, for an encoder of 25000 counts",
         ),
     ] {
-        let error = configured(counts).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_refused(configured(counts), words);
     }
     let scan = configured(16_400).unwrap();
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
