@@ -176,7 +176,7 @@ enum BagEdit {
 #[test]
 fn bags() {
     // The largest scan that a radar may claim, twice.
-    let target = Target::new("bags", 320);
+    let target = Target::new(320);
     check!()
         .with_type::<(Form, bool, Vec<BagEdit>)>()
         .for_each(|(form, chunks, edits)| {

@@ -82,7 +82,7 @@ fn use_journal(file: &Path) -> Result<(), Failure> {
 
 #[test]
 fn journals() {
-    let (target, folder) = (Target::new("journals", 16), folder());
+    let (target, folder) = (Target::new(16), folder());
     let file = journal::path(folder.path());
     let mut journal = Journal::open(&file).unwrap();
     (0..4).for_each(|seq| journal.append(&pose(seq)).unwrap());
@@ -138,7 +138,7 @@ fn use_map(file: &Path) -> Result<(), Failure> {
 
 #[test]
 fn refinement_maps() {
-    let (target, folder) = (Target::new("refinement_maps", 96), folder());
+    let (target, folder) = (Target::new(96), folder());
     let file = checkpoint::path(folder.path());
     let mut drive = Refiner::new(&config(), POINTS).unwrap();
     let cells = drive.keyframe_cells();

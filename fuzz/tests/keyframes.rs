@@ -65,7 +65,7 @@ fn change(record: &mut [u8], at: usize, number: u64) {
 
 #[test]
 fn keyframe_logs() {
-    let (target, folder) = (Target::new("keyframe logs", 16), folder());
+    let (target, folder) = (Target::new(16), folder());
     let path = records_path::<Keyframe>(folder.path());
     let mut log = RecordLog::open(folder.path()).unwrap();
     (0..KEYFRAMES).for_each(|seq| log.append(&keyframe(seq)).unwrap());

@@ -82,7 +82,7 @@ impl ScanMessage {
 
 #[test]
 fn scans() {
-    let target = Target::new("scans", 64);
+    let target = Target::new(64);
     let masker = |undo_doppler| {
         let config = MaskingConfig {
             kind: MaskKind::Threshold,
@@ -180,7 +180,7 @@ fn assert_finite(angle: &RotationEstimate, motion: &MotionMatch) {
 
 #[test]
 fn masked_rasters() {
-    let target = Target::new("masked_rasters", 64);
+    let target = Target::new(64);
     let mut rotations = SequentialRotation::new(N, &RotationConfig::default()).unwrap();
     let translations = TranslationConfig {
         reach_m: 8.0,
@@ -238,7 +238,7 @@ fn motion(numbers: &[Number], interval_ns: i64) -> MotionHeader {
 
 #[test]
 fn motions_and_points() {
-    let target = Target::new("motions_and_points", 96);
+    let target = Target::new(96);
     let config = RefinementConfig {
         keyframes: 3,
         ..RefinementConfig::default()

@@ -106,7 +106,7 @@ impl Chosen {
 
 #[test]
 fn pixels() {
-    let target = Target::new("pixels", 64);
+    let target = Target::new(64);
     check!()
         .with_type::<(Chosen, u8, Vec<RowEdit>)>()
         .for_each(|(chosen, image, edits)| {
@@ -170,7 +170,7 @@ fn mend_checksums(file: &mut [u8]) {
 
 #[test]
 fn image_files() {
-    let target = Target::new("image_files", 96);
+    let target = Target::new(96);
     check!()
         .with_type::<(Chosen, bool, Vec<FileEdit>)>()
         .for_each(|(chosen, all, edits)| {
@@ -204,7 +204,7 @@ enum FolderEdit {
 
 #[test]
 fn lists_and_names() {
-    let target = Target::new("lists_and_names", 64);
+    let target = Target::new(64);
     check!()
         .with_type::<(Chosen, Vec<FolderEdit>)>()
         .for_each(|(chosen, edits)| {

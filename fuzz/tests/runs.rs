@@ -102,7 +102,7 @@ enum RunEdit {
 
 #[test]
 fn runs() {
-    let target = Target::new("runs", 320);
+    let target = Target::new(320);
     let recording = recording();
     check!().with_type::<Vec<RunEdit>>().for_each(|edits| {
         let folder = folder();

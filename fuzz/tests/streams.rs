@@ -209,7 +209,7 @@ fn receive(bytes: &[u8], piece: usize) -> Result<usize, Failure> {
 
 #[test]
 fn streams() {
-    let target = Target::new("streams", 32);
+    let target = Target::new(32);
     check!()
         .with_type::<(Vec<Edit>, Vec<ByteEdit>, u16)>()
         .for_each(|(radar, edits, piece)| {
@@ -259,7 +259,7 @@ fn receive_datagrams<'a>(sent: impl IntoIterator<Item = &'a Vec<u8>>) -> Result<
 
 #[test]
 fn edited_datagrams() {
-    let target = Target::new("datagrams", 32);
+    let target = Target::new(32);
     // Which of them is edited, and how; and which ones are exchanged.
     check!()
         .with_type::<(Vec<(u8, Vec<ByteEdit>)>, Vec<(u8, u8)>)>()

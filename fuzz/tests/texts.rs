@@ -55,7 +55,7 @@ fn use_trajectory(text: &str) -> Result<(), Failure> {
 
 #[test]
 fn trajectories() {
-    let target = Target::new("trajectories", 16);
+    let target = Target::new(16);
     check!()
         .with_type::<(u8, Vec<TextEdit>)>()
         .for_each(|(index, edits)| {
@@ -81,7 +81,7 @@ const LARGEST_N: usize = 127;
 
 #[test]
 fn run_configurations() {
-    let (target, texts) = (Target::new("run_configurations", 96), configurations());
+    let (target, texts) = (Target::new(96), configurations());
     let folder = folder();
     let file = folder.path().join("run.toml");
     check!()
@@ -106,7 +106,7 @@ fn run_configurations() {
 
 #[test]
 fn model_cards() {
-    let target = Target::new("model_cards", 16);
+    let target = Target::new(16);
     let folder = folder();
     let models =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/method/masking/tests/models");
@@ -135,7 +135,7 @@ fn model_cards() {
 
 #[test]
 fn odometry_files() {
-    let target = Target::new("odometry_files", 16);
+    let target = Target::new(16);
     let (folder, row) = (folder(), |seq: i64| {
         let numbers = vec!["0.5"; 19].join(",");
         format!(

@@ -1,6 +1,4 @@
-//! The time of each azimuth. The time format of a radar depends on its software and on its network:
-//! the byte order of the seconds, the unit of their fraction, and whether the radar has the time at
-//! all.
+//! The time of each azimuth, in a format that depends on the radar's software and network.
 
 use std::{fmt, iter};
 

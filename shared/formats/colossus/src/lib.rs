@@ -1,16 +1,6 @@
 //! Navtech's network protocol Colossus (TCP), without I/O: bytes in, messages out; azimuths in,
 //! scans out.
 //!
-//! Reading order:
-//! - [`message`]: the messages of a radar and its clients;
-//! - [`configuration`]: the radar's description of itself, its first message;
-//! - [`health`]: the radar's message beside azimuths;
-//! - [`write`](mod@write): messages as bytes, for clients and servers;
-//! - [`parser`]: messages from any pieces of a stream of bytes, damaged ones included;
-//! - [`asterix`]: the same messages from the datagrams of a radar that sends by UDP;
-//! - [`clock`]: the time of each azimuth;
-//! - [`sweep`]: azimuths to scans.
-//!
 //! A client connects to [`PORT`]. The radar sends its configuration, the client sends
 //! [`Request::StartFft`], and the radar sends azimuths until [`Request::StopFft`]. A radar has at
 //! most three clients.

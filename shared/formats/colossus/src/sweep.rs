@@ -1,7 +1,5 @@
-//! Azimuths to scans.
-//!
-//! Angles, times and scales equal a recording of the same azimuths, to the bit: see
-//! [`gyre_datasets::open`].
+//! Azimuths to scans, whose angles, times and scales equal a recording of the same azimuths, to the
+//! bit.
 
 mod counters;
 mod powers;

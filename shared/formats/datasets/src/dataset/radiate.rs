@@ -1,9 +1,8 @@
 //! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and
 //! `Navtech_Polar.txt` with times.
 //!
-//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the
-//! times of receipt at the host: after a stall they are late by up to 1.4 s while the antenna turns
-//! uniformly. The sensor clock is reconstructed.
+//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, of receipt at the
+//! host: after a stall they are late by up to 1.4 s. The sensor clock is reconstructed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;

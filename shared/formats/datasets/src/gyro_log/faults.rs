@@ -78,11 +78,6 @@ impl LogFaults {
             + self.by_clock_steps
     }
 
-    /// Returns the longest time without samples, s; 0 if there are no gaps.
-    pub fn longest_gap_s(&self) -> f64 {
-        self.gaps.iter().map(|gap| gap.seconds).fold(0.0, f64::max)
-    }
-
     /// Returns how the clock steps, and where first: without a full stop.
     pub fn clock_steps(&self) -> String {
         let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
