@@ -220,8 +220,9 @@ fn lists_and_names() {
 fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
     let images = recording.images.len().max(1);
     let mut of_image = |index: &u8, change: &dyn Fn(&mut Image)| {
-        let image = recording.images.get_mut(usize::from(*index) % images);
-        image.map(change).unwrap_or_default();
+        if let Some(image) = recording.images.get_mut(usize::from(*index) % images) {
+            change(image);
+        }
     };
     let mut rename = |index: &u8, name: &dyn Fn(&str) -> String| {
         of_image(index, &|image| {

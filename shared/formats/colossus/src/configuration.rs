@@ -77,19 +77,12 @@ impl Configuration {
         let (azimuths, any) = (f64::from(self.azimuth_samples), f64::from(u16::MAX));
         let (bins, counts) = (self.range_in_bins.into(), self.encoder_size.into());
         let (mhz, bin_m) = (self.rotation_mhz.into(), self.range_resolution_m().into());
+        let (most, least) = (MAX_AZIMUTHS as f64, azimuths.max(16.0));
         let checks: [(_, f64, _); 5] = [
-            (
-                "the number of azimuths",
-                azimuths,
-                2.0..=MAX_AZIMUTHS as f64,
-            ),
+            ("the number of azimuths", azimuths, 2.0..=most),
             ("the number of range bins", bins, 1.0..=any),
             // Fewer counts than azimuths: two azimuths would have the same count.
-            (
-                "the encoder counts per turn",
-                counts,
-                azimuths.max(16.0)..=any,
-            ),
+            ("the encoder counts per turn", counts, least..=any),
             // A slower sweep lasts longer than motions are searched.
             ("the rotation in mHz", mhz, 100.0..=any),
             ("the depth of a range bin in m", bin_m, 1e-3..=10.0),

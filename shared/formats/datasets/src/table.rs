@@ -121,6 +121,13 @@ fn reader(text: &str, mark: u8) -> csv::Reader<&[u8]> {
         .from_reader(text.as_bytes())
 }
 
+/// Leaves out bad entries, and returns their number.
+pub(crate) fn leave_out<T>(entries: &mut Vec<T>, is_bad: impl Fn(&T) -> bool) -> usize {
+    let before = entries.len();
+    entries.retain(|entry| !is_bad(entry));
+    before - entries.len()
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Raw<T> {
     pub entries: Vec<T>,

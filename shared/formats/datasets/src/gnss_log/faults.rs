@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::LoggedFix;
 use crate::{
     stretches::{between, longest_chain},
-    table::Raw,
+    table::{Raw, leave_out},
 };
 
 /// No vehicle that carries a spinning radar is faster, m/s.
@@ -137,12 +137,6 @@ pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
 
 fn finite_or_zero(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
-}
-
-fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize {
-    let before = rows.len();
-    rows.retain(|row| !is_bad(row));
-    before - rows.len()
 }
 
 /// Sorts fixes by their stamps. Of fixes with the same stamp only the first in the log is used.

@@ -9,7 +9,10 @@ use std::path::Path;
 use gyre_radar::median;
 use serde::Serialize;
 
-use crate::{LogError, table::Raw};
+use crate::{
+    LogError,
+    table::{Raw, leave_out},
+};
 use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
@@ -186,15 +189,15 @@ pub(crate) fn examine(
         return Err(unusable(reason));
     }
     let mut samples = raw.entries;
-    let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
-        let before = samples.len();
-        let values = |sample: &Sample| sample.values.into_iter().take(plausible.values);
-        samples.retain(|sample| !values(sample).any(is_bad));
-        (before, before - samples.len())
-    };
-    (_, faults.not_a_number) = leave_out(&|value| !value.is_finite());
-    faults.not_a_number += raw.unmeasured;
-    let (finite, absurd) = leave_out(&|value| value.abs() > plausible.most);
+    let values = |sample: &Sample| sample.values.into_iter().take(plausible.values);
+    let left_out = leave_out(&mut samples, |it| {
+        values(it).any(|value| !value.is_finite())
+    });
+    faults.not_a_number = left_out + raw.unmeasured;
+    let (finite, most) = (samples.len(), plausible.most);
+    let absurd = leave_out(&mut samples, |it| {
+        values(it).any(|value| value.abs() > most)
+    });
     faults.absurd = absurd;
     if absurd as f64 > ABSURD_SHARE * finite as f64 {
         let beyond = plausible.beyond;

@@ -4,6 +4,7 @@ use gyre_samples::SampleKind;
 use proptest::prelude::*;
 
 use super::{START_NS, read};
+use crate::common::assert_refused;
 
 const MS: i64 = 1_000_000;
 const HEADER: &str = "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps";
@@ -194,9 +195,8 @@ fn times_that_are_measured_twice_are_used_by_nobody() {
 fn a_log_in_degrees_is_refused_or_its_unit_said_to_be_assumed() {
     let mut turning = rows(300);
     turning.iter_mut().for_each(|row| row.1 *= 1e3);
-    let refused = read("imu.csv", &text(&turning)).unwrap_err().to_string();
     let remedy = "if they are in deg/s, name the columns so, as gyro_z_degps";
-    assert!(refused.contains(remedy), "{refused}");
+    assert_refused(read("imu.csv", &text(&turning)), remedy);
     let named = text(&turning).replace("_radps", "_degps");
     let log = read("imu.csv", &named).unwrap();
     assert!((log.samples[299].values[2] - 29.9f64.to_radians()).abs() < 1e-12);

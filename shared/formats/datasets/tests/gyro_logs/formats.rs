@@ -1,13 +1,11 @@
 //! Formats.
 
-use std::path::PathBuf;
-
 use gyre_datasets::{Format, GyroLog};
 use gyre_samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
 use super::{START_NS, read};
-use crate::common::written;
+use crate::common::{assert_refused, written};
 
 /// The rates and accelerations of the only sample.
 fn values(log: &GyroLog) -> [f64; 6] {
@@ -210,9 +208,8 @@ fn logs_lie_at_the_places_of_the_datasets() {
 fn the_log_of_the_truth_is_used_only_if_it_is_named() {
     let folder = TempDir::new().unwrap();
     written(&folder, "applanix/imu.csv", "");
-    let refused = GyroLog::find(folder.path()).unwrap_err().to_string();
     let reason = "of which the ground truth was computed";
-    assert!(refused.contains(reason), "{refused}");
+    assert_refused(GyroLog::find(folder.path()), reason);
 }
 
 #[test]
@@ -255,16 +252,12 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
             "its first row has 200001 columns, and at most 1000",
         ),
     ] {
-        let refused = read("imu.csv", text).unwrap_err().to_string();
-        assert!(refused.contains(reason), "{refused}");
-        assert!(refused.contains("imu.csv"), "{refused}");
+        assert_refused(read("imu.csv", text), reason);
     }
     let stated =
         "stamp_ns,gyro_x,gyro_y,gyro_z,angular_velocity_covariance_0\n1,0,0,0,-1\n3,0,0,0,0\n";
     let log = read("imu.csv", stated).unwrap();
     assert_eq!((log.samples.len(), log.faults.not_a_number), (1, 1));
-    let missing = GyroLog::read(&PathBuf::from("/no/imu.csv"));
-    let missing = missing.unwrap_err().to_string();
-    let expected = "cannot read the log of the gyro /no/imu.csv";
-    assert!(missing.contains(expected), "{missing}");
+    let missing = GyroLog::read("/no/imu.csv".as_ref());
+    assert_refused(missing, "cannot read the log of the gyro /no/imu.csv");
 }
