@@ -26,72 +26,39 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
     for image in recording::images(empty.path()) {
         recording::truncate(&image, 0);
     }
-    let set = |settings: &[&str]| {
-        let settings = settings.iter();
-        settings.fold(Run::of_recording(), |run, it| run.set(it))
-    };
-    let slam = "slam.kind=graph";
-    for (run, words) in [
-        (Run::configured(""), &["--data", "source.data"][..]),
-        (
-            run_of(Path::new("/nowhere/at/all")),
-            &["/nowhere/at/all", "no such folder"],
-        ),
-        (run_of(&file), &["scan.txt is a file", "folder"]),
-        (
-            run_of(one.path()),
-            &["has 1 scan:", "a motion is between two"],
-        ),
-        (run_of(empty.path()), &["first image", ".png"]),
-        (
-            set(&["source.first=24"]),
-            &["source.first is 24", "24 scans, from 0 to 23"],
-        ),
-        (
-            set(&["masking.treshold=3"]),
-            &["[masking]", "did you mean `threshold`?"],
-        ),
-        (
-            Run::of_file(Path::new("no/such.toml")),
-            &["no/such.toml", "No such file"],
-        ),
-        (
-            Run::of_recording().into(&file.join("out")),
-            &["cannot write to", "scan.txt/out"],
-        ),
-        (
-            set(&["masking.kind=learned"]),
-            &["masking.model does not name a model"],
-        ),
-        (
-            set(&["doppler.kind=auto"]),
-            &["which azimuths", "doppler.kind"],
-        ),
-        (
-            set(&["gyro.kind=auto"]),
-            &["no log of a gyro lies beside the scans", "gyro.kind"],
-        ),
-        (
-            configurations::gyro_and_wheels()
-                .run()
-                .set("wheels.delay_s=600"),
-            &["the log of the wheels", "wheels.delay_s is wrong"],
-        ),
-        (
-            set(&[slam, "gnss.kind=auto"]),
-            &["no log of a GNSS receiver lies beside"],
-        ),
-        (
-            set(&[slam, "gnss.kind=log", "gnss.file=nowhere.csv"]),
-            &["nowhere.csv"],
-        ),
-        (
-            set(&[slam, "slam.map='nowhere'"]),
-            &["nowhere is not a map"],
-        ),
-    ] {
+    let refused = |run: Run, words: &[&str]| {
         run.finish().refused_with(words);
         assert!(!run.out().join("journal").exists(), "{words:?}");
+    };
+    refused(Run::configured(""), &["--data", "source.data"]);
+    let nowhere = Path::new("/nowhere/at/all");
+    refused(run_of(nowhere), &["/nowhere/at/all", "no such folder"]);
+    refused(run_of(&file), &["scan.txt is a file", "folder"]);
+    let few = ["has 1 scan:", "a motion is between two"];
+    refused(run_of(one.path()), &few);
+    refused(run_of(empty.path()), &["first image", ".png"]);
+    let away = Run::of_file(Path::new("no/such.toml"));
+    refused(away, &["no/such.toml", "No such file"]);
+    let unwritable = Run::of_recording().into(&file.join("out"));
+    refused(unwritable, &["cannot write to", "scan.txt/out"]);
+    let late = configurations::gyro_and_wheels().run();
+    let late = late.set("wheels.delay_s=600");
+    refused(late, &["the log of the wheels", "wheels.delay_s is wrong"]);
+    // Settings, and what is said.
+    for case in [
+        "source.first=24|source.first is 24|24 scans, from 0 to 23",
+        "masking.treshold=3|[masking]|did you mean `threshold`?",
+        "masking.kind=learned|masking.model does not name a model",
+        "doppler.kind=auto|which azimuths|doppler.kind",
+        "gyro.kind=auto|no log of a gyro lies beside the scans|gyro.kind",
+        "slam.kind=graph gnss.kind=auto|no log of a GNSS receiver lies beside",
+        "slam.kind=graph gnss.kind=log gnss.file=nowhere.csv|nowhere.csv",
+        "slam.kind=graph slam.map='nowhere'|nowhere is not a map",
+    ] {
+        let (settings, words) = case.split_once('|').unwrap();
+        let settings = settings.split(' ');
+        let run = settings.fold(Run::of_recording(), Run::set);
+        refused(run, &words.split('|').collect::<Vec<_>>());
     }
 }
 

@@ -119,10 +119,7 @@ fn invalid_files_are_rejected_with_their_line() {
         assert_refused(from_text("a.txt", text), words);
     }
     for (path, words) in [
-        (
-            "/nonexistent/a.tum",
-            "cannot read the trajectory /nonexistent/a.tum: No such file",
-        ),
+        ("/nowhere/a.tum", "trajectory /nowhere/a.tum: No such"),
         ("/proc/self/fdinfo", "without a ground truth"),
     ] {
         assert_refused(read_trajectory(path.as_ref()), words);
@@ -134,30 +131,10 @@ fn what_spreadsheets_write_is_refused_with_what_to_do() {
     for (separator, number, count, words) in [
         (" ", "1,5", 8, "8 columns (TUM) have decimal commas"),
         ("\t", "1,5", 12, "columns (KITTI) have decimal commas"),
-        (
-            ";",
-            "1,5",
-            8,
-            "8 columns (TUM) are parted by semicolons, and need spaces",
-        ),
-        (
-            ";",
-            "1.5",
-            12,
-            "columns (KITTI) are parted by semicolons, and need spaces",
-        ),
-        (
-            ", ",
-            "1.5",
-            8,
-            "8 columns (TUM) are parted by commas, and need spaces",
-        ),
-        (
-            ", ",
-            "1",
-            8,
-            "8 columns (TUM) are parted by commas, and need spaces",
-        ),
+        (";", "1,5", 8, "parted by semicolons, and need spaces"),
+        (";", "1.5", 12, "parted by semicolons, and need spaces"),
+        (", ", "1.5", 8, "parted by commas, and need spaces"),
+        (", ", "1", 8, "parted by commas, and need spaces"),
         (";", "GPSTime", 3, "parted by semicolons, and need commas"),
     ] {
         let text = vec![number; count].join(separator);

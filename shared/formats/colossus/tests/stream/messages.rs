@@ -130,11 +130,7 @@ fn powers_begin_where_the_message_says() {
         }
     }
     for (offset, id, words) in [
-        (
-            0,
-            30,
-            "begin at byte 0 of a payload of 19 bytes, expected 14 or more",
-        ),
+        (0, 30, "at byte 0 of a payload of 19 bytes, expected 14"),
         (13, 30, "begin at byte 13"),
         (20, 30, "begin at byte 20"),
         (255, 30, "begin at byte 255"),
@@ -160,22 +156,10 @@ fn a_configuration_is_checked_in_one_sentence_and_prefers_the_resolution_of_its_
     }
     type Edit = fn(&mut Configuration);
     let bad: [(Edit, &str); 8] = [
-        (
-            |c| c.azimuth_samples = 0,
-            "azimuths as 0, expected 2 to 1024",
-        ),
-        (
-            |c| c.azimuth_samples = 1025,
-            "azimuths as 1025, expected 2 to 1024",
-        ),
-        (
-            |c| c.range_in_bins = 0,
-            "range bins as 0, expected 1 to 65535",
-        ),
-        (
-            |c| c.encoder_size = 399,
-            "per turn as 399, expected 400 to 65535",
-        ),
+        (|c| c.azimuth_samples = 0, "as 0, expected 2 to 1024"),
+        (|c| c.azimuth_samples = 1025, "1025, expected 2 to 1024"),
+        (|c| c.range_in_bins = 0, "bins as 0, expected 1 to 65535"),
+        (|c| c.encoder_size = 399, "399, expected 400 to 65535"),
         (|c| c.rotation_mhz = 0, "in mHz as 0, expected 100 to 65535"),
         (
             |c| c.range_resolution_m = Some(f32::NAN),

@@ -60,8 +60,6 @@ fn what_is_no_log_of_wheels_is_refused_with_the_remedy() {
         (rows("stamp_ns,gyro_z_radps", &["0.1"]), "have no speed"),
         (rows("number,speed_m_s", &["1"]), "have no stamps"),
         (rows("1,2", &["1"]), "columns have no names"),
-        (String::new(), "it is empty"),
-        (rows("stamp_ns,speed,speed", &["1,1"]), "two of its columns"),
         (
             rows("stamp_ns,speed", &["120", "121"]),
             "if they are in km/h",
