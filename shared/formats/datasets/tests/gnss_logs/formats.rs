@@ -37,66 +37,23 @@ fn assert_two(log: &GnssLog, sigma_m: Option<f64>, what: &str) {
 
 #[test]
 fn tables_are_read_by_their_headers_or_by_their_number_of_columns() {
-    let us = START_NS / 1000;
-    let ns = START_NS;
-    let (next_us, next_ns) = (us + 1_000_000, ns + 1_000_000_000);
-    let cases = [
-        (
-            "gnss.csv",
-            format!(
-                "stamp_ns,latitude_deg,longitude_deg\n{ns},55.9,-3.2\n{next_ns},55.9001,-3.2\n"
-            ),
-            None,
-        ),
-        (
-            "gnss.csv",
-            format!("lon;lat;timestamp;sigma_m\n-3.2;55.9;{us};0.3\n-3.2;55.9001;{next_us};0.3\n"),
-            Some(0.3),
-        ),
-        (
-            "gps/gps.csv",
-            format!(
-                "timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone\n\
-                 {us},8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n{next_us},8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n"
-            ),
-            Some(12.5f64.sqrt()),
-        ),
+    // The file, the deviation, the text.
+    for case in [
+        "gnss.csv||stamp_ns,latitude_deg,longitude_deg\n1760456485551626000,55.9,-3.2\n1760456486551626000,55.9001,-3.2\n",
+        "gnss.csv|0.3|lon;lat;timestamp;sigma_m\n-3.2;55.9;1760456485551626;0.3\n-3.2;55.9001;1760456486551626;0.3\n",
+        "gps/gps.csv|3.5355339059|timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone\n\
+         1760456485551626,8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n1760456486551626,8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n",
         // Hemispheres, a stamp in two parts; an altitude and an accuracy that are not known.
-        (
-            "gnss.csv",
-            format!(
-                "header.stamp.sec,header.stamp.nanosec,lat,N/S,lon,E/W,alt,sigma_m\n\
-                 {0},551626000,55.9,N,3.2,W,,\n{1},551626000,55.9001,n,3.2,West,20.0,-1\n",
-                ns / 1_000_000_000,
-                next_ns / 1_000_000_000
-            ),
-            None,
-        ),
+        "gnss.csv||header.stamp.sec,header.stamp.nanosec,lat,N/S,lon,E/W,alt,sigma_m\n\
+         1760456485,551626000,55.9,N,3.2,W,,\n1760456486,551626000,55.9001,n,3.2,West,20.0,-1\n",
         // As stated by a simulation, and as of no receiver.
-        (
-            "gnss.csv",
-            format!(
-                "stamp_ns,latitude_deg,longitude_deg,sigma_m,status.status\n{ns},55.9,-3.2,0.0000127,-2\n{next_ns},55.9001,-3.2,0.01,2\n1,0,0,0,-1\n"
-            ),
-            Some(0.01),
-        ),
-        (
-            "sensor_data/gps.csv",
-            format!(
-                "{ns},55.9,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n{next_ns},55.9001,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n"
-            ),
-            Some(10f64.sqrt()),
-        ),
-        (
-            "sensor_data/gps.csv",
-            format!(
-                "{ns},55.9,-3.2,60.0,0,0,0,0,0,0,0,0,0\n{next_ns},55.9001,-3.2,60.0,0,0,0,0,0,0,0,0,0\n"
-            ),
-            None,
-        ),
-    ];
-    for (name, text, sigma_m) in cases {
-        assert_two(&read(name, &text).unwrap(), sigma_m, &text);
+        "gnss.csv|0.01|stamp_ns,latitude_deg,longitude_deg,sigma_m,status.status\n1760456485551626000,55.9,-3.2,0.0000127,-2\n1760456486551626000,55.9001,-3.2,0.01,2\n1,0,0,0,-1\n",
+        "sensor_data/gps.csv|3.1622776602|1760456485551626000,55.9,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n1760456486551626000,55.9001,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n",
+        "sensor_data/gps.csv||1760456485551626000,55.9,-3.2,60.0,0,0,0,0,0,0,0,0,0\n1760456486551626000,55.9001,-3.2,60.0,0,0,0,0,0,0,0,0,0\n",
+    ] {
+        let parts: Vec<&str> = case.split('|').collect();
+        let log = read(parts[0], parts[2]).unwrap();
+        assert_two(&log, parts[1].parse().ok(), case);
     }
 }
 

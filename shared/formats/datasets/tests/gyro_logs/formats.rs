@@ -27,38 +27,17 @@ const ALL: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 
 #[test]
 fn tables_of_datasets_are_read_by_their_headers() {
-    let ns = START_NS;
-    let us = START_NS / 1000;
-    let own = "gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
-    let applanix = "GPSTime,angvel_z,angvel_y,angvel_x,accelz,accely,accelx";
-    for (name, text) in [
-        (
-            "imu_as_logged.csv",
-            format!("stamp_ns,{own}\n{ns},1,2,3,4,5,6\n"),
-        ),
-        (
-            "dmu_imu.csv",
-            format!("time,wx,wy,wz,ax,ay,az\n{ns},1,2,3,4,5,6\n"),
-        ),
-        (
-            "aeva_imu.csv",
-            format!("time,wx,wy,wz,ax,ay,az\n{us},1,2,3,4,5,6\n"),
-        ),
-        (
-            "applanix/imu.csv",
-            format!("{applanix}\n{us},3,2,1,6,5,4\n"),
-        ),
+    for case in [
+        "imu_as_logged.csv|stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n1760456485551626000,1,2,3,4,5,6\n",
+        "dmu_imu.csv|time,wx,wy,wz,ax,ay,az\n1760456485551626000,1,2,3,4,5,6\n",
+        "aeva_imu.csv|time,wx,wy,wz,ax,ay,az\n1760456485551626,1,2,3,4,5,6\n",
+        "applanix/imu.csv|GPSTime,angvel_z,angvel_y,angvel_x,accelz,accely,accelx\n1760456485551626,3,2,1,6,5,4\n",
         // In FoMo's files `a` are the angular rates.
-        (
-            "vectornav.csv",
-            format!("t,ax,ay,az,lx,ly,lz\n{us},1,2,3,4,5,6\n"),
-        ),
-        (
-            "xsens_imu.csv",
-            format!("{ns},0,0,0,1,7,7,7,1,2,3,4,5,6,8,8,8\n"),
-        ),
+        "vectornav.csv|t,ax,ay,az,lx,ly,lz\n1760456485551626,1,2,3,4,5,6\n",
+        "xsens_imu.csv|1760456485551626000,0,0,0,1,7,7,7,1,2,3,4,5,6,8,8,8\n",
     ] {
-        let log = read(name, &text).unwrap();
+        let (name, text) = case.split_once('|').unwrap();
+        let log = read(name, text).unwrap();
         assert_close(values(&log), ALL, name);
         assert_eq!(log.faults.sentences(SampleKind::Gyro), [""; 0], "{name}");
     }
@@ -66,75 +45,31 @@ fn tables_of_datasets_are_read_by_their_headers() {
 
 #[test]
 fn tables_of_ones_own_are_read_by_names_and_units() {
-    let rates = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0];
-    let degrees = [1f64, 2.0, 3.0].map(|rate| rate.to_degrees().to_string());
-    let rows = [
-        (
-            "timestamp_ms;wx_dps;wy_dps;wz_dps;acc_x_g;acc_y_g;acc_z_g",
-            format!("1760456485551;{};1;0;0", degrees.join(";")),
-            [1.0, 2.0, 3.0, 9.80665, 0.0, 0.0],
-            1_760_456_485_551_000_000,
-        ),
-        (
-            "stamp_s,Angular Velocity.x [rad/s],Angular Velocity.y [rad/s],Angular Velocity.z [rad/s]",
-            "12.5,1,2,3".to_owned(),
-            rates,
-            12_500_000_000,
-        ),
+    // The stamp, rates and accelerations, the text.
+    for case in [
+        "1760456485551000000|1,2,3,9.80665,0,0|timestamp_ms;wx_dps;wy_dps;wz_dps;acc_x_g;acc_y_g;acc_z_g\n1760456485551;57.29577951308232;114.59155902616465;171.88733853924697;1;0;0",
+        "12500000000|1,2,3,0,0,0|stamp_s,Angular Velocity.x [rad/s],Angular Velocity.y [rad/s],Angular Velocity.z [rad/s]\n12.5,1,2,3",
         // As rostopic writes it.
-        (
-            "%time,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z",
-            "1760456485551626000,1,2,3,4,5,6".to_owned(),
-            ALL,
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,4,5,6|%time,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z\n1760456485551626000,1,2,3,4,5,6",
         // As ROS 2 and ROS 1 write the two parts of a stamp.
-        (
-            "header.stamp.sec,header.stamp.nanosec,gx,gy,gz",
-            "1760456485,551626000,1,2,3".to_owned(),
-            rates,
-            START_NS,
-        ),
-        (
-            "gx (deg/s),gy (deg/s),gz (deg/s),nsecs,secs",
-            format!("{},551626000.0,1760456485.0", degrees.join(",")),
-            rates,
-            START_NS,
-        ),
-        (
-            "timestamp,usec,gyro_x,gyro_y,gyro_z",
-            "1760456485,551626,1,2,3".to_owned(),
-            rates,
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,0,0,0|header.stamp.sec,header.stamp.nanosec,gx,gy,gz\n1760456485,551626000,1,2,3",
+        "1760456485551626000|1,2,3,0,0,0|gx (deg/s),gy (deg/s),gz (deg/s),nsecs,secs\n57.29577951308232,114.59155902616465,171.88733853924697,551626000.0,1760456485.0",
+        "1760456485551626000|1,2,3,0,0,0|timestamp,usec,gyro_x,gyro_y,gyro_z\n1760456485,551626,1,2,3",
         // Two whole stamps.
-        (
-            "stamp_s,stamp_ns,gyro_x,gyro_y,gyro_z",
-            "1760456485,1760456485551626000,1,2,3".to_owned(),
-            rates,
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,0,0,0|stamp_s,stamp_ns,gyro_x,gyro_y,gyro_z\n1760456485,1760456485551626000,1,2,3",
         // EuRoC.
-        (
-            "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
-            "1760456485551626000,1,2,3,4,5,6".to_owned(),
-            ALL,
-            START_NS,
-        ),
-        (
-            "x,stamp_us,omega_z,omega_x,omega_y",
-            "0,1000,3,1,2".to_owned(),
-            rates,
-            1_000_000,
-        ),
-    ];
-    for (header, row, expected, stamp_ns) in rows {
-        let log = read("own.csv", &format!("{header}\n{row}\n")).unwrap();
-        assert_close(log.samples[0].values, expected, header);
-        assert_eq!(log.samples[0].stamp_ns, stamp_ns, "{header}");
+        "1760456485551626000|1,2,3,4,5,6|#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n1760456485551626000,1,2,3,4,5,6",
+        "1000000|1,2,3,0,0,0|x,stamp_us,omega_z,omega_x,omega_y\n0,1000,3,1,2",
+    ] {
+        let parts: Vec<&str> = case.split('|').collect();
+        let expected = parts[1].split(',').map(|it| it.parse::<f64>().unwrap());
+        let expected: Vec<f64> = expected.collect();
+        let log = read("own.csv", parts[2]).unwrap();
+        assert_close(log.samples[0].values, expected.try_into().unwrap(), case);
+        assert_eq!(log.samples[0].stamp_ns.to_string(), parts[0], "{case}");
         let units = ["dps", "rad/s", "deg/s", "rad s"];
-        let names_unit = units.iter().any(|it| header.contains(it));
-        assert_eq!(log.faults.unit_is_assumed, !names_unit, "{header}");
+        let names_unit = units.iter().any(|it| case.contains(it));
+        assert_eq!(log.faults.unit_is_assumed, !names_unit, "{case}");
     }
 }
 
