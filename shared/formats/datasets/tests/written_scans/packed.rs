@@ -4,8 +4,8 @@ use std::fs;
 
 use gyre_datasets::{Format, open};
 
-use super::{folder, options, rejected};
-use crate::common::{write_oxford, write_radiate};
+use super::{assert_rejected, folder, options};
+use crate::common::{assert_refused, write_oxford, write_radiate};
 
 #[test]
 fn archives_and_bags_of_other_kinds_are_named_with_what_to_do() {
@@ -34,8 +34,7 @@ fn archives_and_bags_of_other_kinds_are_named_with_what_to_do() {
         let file = root.path().join(name);
         fs::write(&file, bytes).unwrap();
         for path in [root.path(), &file] {
-            let error = rejected(path).to_string();
-            assert!(error.contains(&format!("{name} {words}")), "{error}");
+            assert_rejected(path, &format!("{name} {words}"));
         }
     }
 }
@@ -54,11 +53,9 @@ fn a_dataset_of_another_format_than_is_configured_is_called_by_its_own() {
     ];
     for (path, configured, found) in cases {
         let options = options(|o| o.format = Some(configured));
-        let refused = open(&root.path().join(path), &options).err();
-        let error = refused.unwrap().to_string();
         let expected =
             format!("looks like {found}, but the configuration says `format = \"{configured}\"`");
-        assert!(error.contains(&expected), "{error}");
+        assert_refused(open(&root.path().join(path), &options), &expected);
     }
 }
 
@@ -70,8 +67,7 @@ fn a_folder_with_the_files_and_names_of_another_dataset_is_that() {
     let path = root.path().join("a");
     let opened = |format| open(&path, &options(|o| o.format = Some(format)));
     for format in [Format::Boreas, Format::BoreasRt] {
-        let error = opened(format).err().unwrap().to_string();
-        assert!(error.contains("looks like oxford"), "{error}");
+        assert_refused(opened(format), "looks like oxford");
     }
     // Its files without its names, or its names without its files, may belong to a recording of the
     // user's own.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
 
-use super::{folder, opened, options, rejected};
+use super::{assert_rejected, folder, opened, options};
 use crate::common::{
     PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate,
 };
@@ -133,8 +133,7 @@ fn copies_and_hidden_files_are_no_scans_and_are_named() {
     }
     let root = folder();
     fs::write(root.path().join("._1547131046353776.png"), "Mac OS X").unwrap();
-    let refused = rejected(root.path()).to_string();
-    assert!(refused.contains("is not a known dataset"), "{refused}");
+    assert_rejected(root.path(), "is not a known dataset");
 }
 
 #[test]
