@@ -239,33 +239,6 @@ mod tests {
             bytes.splice(at..at, SIGNATURE);
             prop_assert_eq!(find(&bytes), naive(&bytes));
         }
-
-        #[test]
-        fn any_bytes_in_any_pieces_neither_panic_nor_take_more_memory(
-            pieces in prop::collection::vec((prop::collection::vec(prop_oneof![
-                8 => prop::collection::vec(any::<u8>(), 1..40),
-                4 => Just(SIGNATURE.to_vec()),
-                2 => any::<(u8, u8, u32)>().prop_map(|(_, id, size)| {
-                    [&SIGNATURE[..], &[VERSION, id], &(size >> 11).to_be_bytes()].concat()
-                }),
-            ], 0..20), 1_usize..100_000, 1_usize..5), 0..40),
-        ) {
-            let mut parser = Parser::new();
-            for (piece, at_least, times) in pieces {
-                let bytes = piece.concat().repeat(times * 20);
-                let mut rest = &bytes[..];
-                while !rest.is_empty() {
-                    let space = parser.space(at_least);
-                    prop_assert!(space.len() >= at_least.min(MAX_SPACE_BYTES));
-                    let n = space.len().min(rest.len());
-                    space[..n].copy_from_slice(&rest[..n]);
-                    parser.filled(n);
-                    rest = &rest[n..];
-                    while parser.next().is_some() {}
-                    prop_assert!(parser.buffer.capacity() <= MAX_BUFFER_BYTES);
-                }
-            }
-        }
     }
 
     #[test]
