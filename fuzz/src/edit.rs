@@ -5,7 +5,6 @@ use bolero::TypeGenerator;
 /// An edit of bytes at a place, which is taken modulo the length.
 #[derive(Clone, Debug, TypeGenerator)]
 pub enum ByteEdit {
-    /// Replaces a byte.
     Set(u32, u8),
     /// Flips a bit.
     Flip(u32, u8),
@@ -13,9 +12,7 @@ pub enum ByteEdit {
     Word(u32, Number),
     /// Inserts a byte some times.
     Insert(u32, u8, u8),
-    /// Removes some bytes.
     Remove(u32, u8),
-    /// Repeats some bytes.
     Repeat(u32, u8),
     /// Cuts all that follows.
     Truncate(u32),
@@ -30,25 +27,13 @@ pub enum Number {
     Small(i8),
     /// A power of two, more or less.
     NearPower(u8, i8),
-    /// One of [`FLOATS`].
+    /// One of `FLOATS`.
     Float(u8),
 }
 
-/// Floating-point numbers that often reveal faults of programs.
-pub const FLOATS: [f64; 12] = [
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    f64::NAN,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
-    f64::MAX,
-    f64::MIN,
-    f64::MIN_POSITIVE,
-    1e20,
-    -1e154,
-];
+/// Floating-point numbers that often reveal faults of programs, with spaces between.
+const FLOATS: &str = "0 -0 1 -1 nan inf -inf 1.7976931348623157e308 -1.7976931348623157e308 \
+    2.2250738585072014e-308 1e20 -1e154";
 
 impl Number {
     pub fn bits(self) -> u64 {
@@ -58,7 +43,10 @@ impl Number {
             Self::NearPower(power, by) => {
                 (1_u64 << (power % 64)).wrapping_add_signed(i64::from(by))
             }
-            Self::Float(index) => FLOATS[usize::from(index) % FLOATS.len()].to_bits(),
+            Self::Float(index) => {
+                let number: f64 = word(FLOATS, index).parse().unwrap_or_default();
+                number.to_bits()
+            }
         }
     }
 
@@ -72,27 +60,23 @@ impl Number {
     }
 }
 
+fn change(bytes: &mut [u8], at: usize, to: impl Fn(u8) -> u8) {
+    if let Some(byte) = bytes.get_mut(at) {
+        *byte = to(*byte);
+    }
+}
+
 pub fn edit_bytes(bytes: &mut Vec<u8>, edits: &[ByteEdit]) {
     for edit in edits {
         let len = bytes.len();
         let place = |at: u32| at as usize % (len + 1);
         match *edit {
-            ByteEdit::Set(at, byte) => bytes[place(at)..]
-                .iter_mut()
-                .take(1)
-                .for_each(|b| *b = byte),
-            ByteEdit::Flip(at, bit) => {
-                bytes[place(at)..]
-                    .iter_mut()
-                    .take(1)
-                    .for_each(|b| *b ^= 1 << (bit % 8));
-            }
+            ByteEdit::Set(at, byte) => change(bytes, place(at), |_| byte),
+            ByteEdit::Flip(at, bit) => change(bytes, place(at), |it| it ^ (1 << (bit % 8))),
             ByteEdit::Word(at, number) => {
                 let word = number.bits().to_le_bytes();
-                bytes[place(at)..]
-                    .iter_mut()
-                    .zip(word)
-                    .for_each(|(b, w)| *b = w);
+                let there = bytes[place(at)..].iter_mut();
+                there.zip(word).for_each(|(it, byte)| *it = byte);
             }
             ByteEdit::Insert(at, byte, times) => {
                 let place = place(at);
@@ -144,49 +128,19 @@ const WAYS: [(&str, &str); 7] = [
 /// A byte order mark, before a text.
 const MARK: char = '\u{feff}';
 
-/// Words that often reveal faults of parsers.
-const WORDS: [&str; 40] = [
-    "",
-    "0",
-    "-0",
-    "-1",
-    "1",
-    "nan",
-    "NaN",
-    "inf",
-    "-inf",
-    "1e308",
-    "-1e308",
-    "1e-320",
-    "1e400",
-    "9223372036854775807",
-    "-9223372036854775808",
-    "18446744073709551616",
-    "4294967296",
-    "1547131046000000",
-    "1547131046.5",
-    "1547131046000000000",
-    ".",
-    "-",
-    "\"",
-    "'",
-    "[",
-    "]",
-    "{}",
-    "[[a]]",
-    "=",
-    "#",
-    ",",
-    ",,,,,,,,,,,,",
-    "\t",
-    "true",
-    "false",
-    "null",
-    "[1, 2]",
-    "ä€\u{1f980}",
-    "\u{0}",
-    "\u{202e}",
-];
+/// Words that often reveal faults of parsers, with spaces between; the first is empty.
+const WORDS: &str = " 0 -0 -1 1 nan NaN inf -inf 1e308 -1e308 1e-320 1e400 9223372036854775807 \
+    -9223372036854775808 18446744073709551616 4294967296 1547131046000000 1547131046.5 \
+    1547131046000000000 . - \" ' [ ] {} [[a]] = # , ,,,,,,,,,,,, \t true false null [1,2] \
+    ä€\u{1f980} \u{0} \u{202e}";
+
+fn word(words: &str, index: u8) -> &str {
+    let count = words.split(' ').count();
+    words
+        .split(' ')
+        .nth(usize::from(index) % count)
+        .unwrap_or_default()
+}
 
 pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -194,33 +148,25 @@ pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
         let count = lines.len().max(1);
         let place = |at: u16| usize::from(at) % count;
         match edit {
-            TextEdit::Word(line, word, by) => {
-                let by = WORDS[usize::from(*by) % WORDS.len()];
-                replace(&mut lines, place(*line), *word, by);
+            TextEdit::Word(line, at, by) => {
+                replace(&mut lines, place(*line), *at, word(WORDS, *by))
             }
-            TextEdit::Number(line, word, by) => {
+            TextEdit::Number(line, at, by) => {
                 let number = match by {
                     Number::Float(_) => format!("{:e}", by.f64()),
                     _ => (by.bits() as i64).to_string(),
                 };
-                replace(&mut lines, place(*line), *word, &number);
+                replace(&mut lines, place(*line), *at, &number);
             }
-            TextEdit::Line(at, word) => {
-                lines.insert(
-                    place(*at),
-                    WORDS[usize::from(*word) % WORDS.len()].to_owned(),
-                );
-            }
-            TextEdit::RemoveLine(at) if !lines.is_empty() => {
-                lines.remove(place(*at));
-            }
-            TextEdit::RepeatLine(at) if !lines.is_empty() => {
+            TextEdit::Line(at, by) => lines.insert(place(*at), word(WORDS, *by).to_owned()),
+            TextEdit::RemoveLine(_) | TextEdit::RepeatLine(_) | TextEdit::SwapLines(..)
+                if lines.is_empty() => {}
+            TextEdit::RemoveLine(at) => drop(lines.remove(place(*at))),
+            TextEdit::RepeatLine(at) => {
                 let at = place(*at);
                 lines.insert(at, lines[at].clone());
             }
-            TextEdit::SwapLines(one, two) if !lines.is_empty() => {
-                lines.swap(place(*one), place(*two))
-            }
+            TextEdit::SwapLines(one, two) => lines.swap(place(*one), place(*two)),
             TextEdit::Way(way) => match WAYS.get(usize::from(*way) % (WAYS.len() + 1)) {
                 Some((from, to)) => {
                     let text = (lines.join("\n") + "\n").replace(from, to);
@@ -231,12 +177,9 @@ pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
             TextEdit::Bytes(edit) => {
                 let mut bytes = lines.join("\n").into_bytes();
                 edit_bytes(&mut bytes, std::slice::from_ref(edit));
-                lines = String::from_utf8_lossy(&bytes)
-                    .lines()
-                    .map(str::to_owned)
-                    .collect();
+                let text = String::from_utf8_lossy(&bytes);
+                lines = text.lines().map(str::to_owned).collect();
             }
-            TextEdit::RemoveLine(_) | TextEdit::RepeatLine(_) | TextEdit::SwapLines(..) => {}
         }
     }
     lines.join("\n") + "\n"
@@ -248,10 +191,8 @@ fn replace(lines: &mut [String], line: usize, word: u8, by: &str) {
         return;
     };
     let is_separator = |c: char| c.is_whitespace() || ",=[]{}\"".contains(c);
-    let words: Vec<&str> = line
-        .split(is_separator)
-        .filter(|word| !word.is_empty())
-        .collect();
+    let words = line.split(is_separator).filter(|word| !word.is_empty());
+    let words: Vec<&str> = words.collect();
     if let Some(chosen) = words.get(usize::from(word) % words.len().max(1)) {
         // The words are slices of the line.
         let start = chosen.as_ptr() as usize - line.as_ptr() as usize;

@@ -13,10 +13,6 @@
 //!
 //! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate
 //! that was at fault.
-//!
-//! - [`edit`]: edits of bytes and texts;
-//! - [`recording`]: small recordings of all formats;
-//! - [`Target`]: executes inputs.
 
 pub mod edit;
 pub mod recording;
@@ -24,7 +20,6 @@ pub mod recording;
 use std::{
     error::Error,
     fmt::Display,
-    io::Write,
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
@@ -41,27 +36,15 @@ const LONGEST_SENTENCE: usize = 1000;
 
 /// A target that is being fuzzed.
 pub struct Target {
-    name: &'static str,
     limit_bytes: usize,
-    counts: Mutex<Counts>,
     _alone: MutexGuard<'static, ()>,
-}
-
-/// The outcomes of the inputs.
-#[derive(Default)]
-struct Counts {
-    executed: u64,
-    refused: u64,
-    peak_bytes: usize,
 }
 
 impl Target {
     /// Starts a target whose inputs may each take this much memory, MB.
-    pub fn new(name: &'static str, limit_mb: usize) -> Self {
+    pub fn new(limit_mb: usize) -> Self {
         Self {
-            name,
             limit_bytes: limit_mb << 20,
-            counts: Mutex::default(),
             _alone: ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner),
         }
     }
@@ -71,35 +54,12 @@ impl Target {
         let before = MEMORY.current_usage();
         MEMORY.reset_peak_usage();
         let result = execute();
-        let peak_bytes = MEMORY.peak_usage().saturating_sub(before);
-        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
-        counts.executed += 1;
-        counts.peak_bytes = counts.peak_bytes.max(peak_bytes);
-        assert!(
-            peak_bytes <= self.limit_bytes,
-            "{peak_bytes} bytes of memory, more than {}",
-            self.limit_bytes
-        );
+        let bytes = MEMORY.peak_usage().saturating_sub(before);
+        let most = self.limit_bytes;
+        assert!(bytes <= most, "{bytes} bytes of memory, more than {most}");
         if let Err(error) = result {
-            counts.refused += 1;
             assert_sentence(&error);
         }
-    }
-}
-
-impl Drop for Target {
-    fn drop(&mut self) {
-        let Counts {
-            executed,
-            refused,
-            peak_bytes,
-        } = *self.counts.lock().unwrap_or_else(PoisonError::into_inner);
-        let _ = writeln!(
-            std::io::stderr(),
-            "{}: {executed} inputs, {refused} refused, {:.1} MB of memory at most",
-            self.name,
-            peak_bytes as f64 / 1e6
-        );
     }
 }
 
@@ -111,11 +71,8 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 pub fn assert_sentence(error: &impl Display) {
     let text = error.to_string();
     assert!(!text.trim().is_empty(), "an empty error");
-    assert!(
-        text.len() <= LONGEST_SENTENCE,
-        "{} bytes: {text:.200}",
-        text.len()
-    );
+    let bytes = text.len();
+    assert!(bytes <= LONGEST_SENTENCE, "{bytes} bytes: {text:.200}");
     // Other control characters of names and words are replaced where the sentence is printed.
     assert!(!text.contains(['\n', '\r']), "{text:?}");
     // Quoted text is part of the input.

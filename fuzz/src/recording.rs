@@ -4,10 +4,9 @@ use std::{fs, path::Path};
 
 use gyre_datasets::Format;
 
-/// Azimuths of an image.
-pub const AZIMUTHS: usize = 16;
-/// Range bins of an image.
-pub const BINS: usize = 40;
+/// Azimuths and range bins of an image.
+const AZIMUTHS: usize = 16;
+const BINS: usize = 40;
 /// Columns of metadata.
 const METADATA: usize = 11;
 /// 2019-01-10 14:37:26 UTC, us.
@@ -15,7 +14,6 @@ const START_US: i64 = 1_547_131_046_000_000;
 const PERIOD_US: i64 = 250_000;
 
 /// A grey image.
-#[derive(Clone, Debug)]
 pub struct Image {
     /// The name of the file, relative to the recording.
     pub name: String,
@@ -26,7 +24,6 @@ pub struct Image {
 }
 
 /// A recording of a few scans.
-#[derive(Clone, Debug)]
 pub struct Recording {
     pub format: Format,
     pub images: Vec<Image>,
@@ -37,14 +34,15 @@ pub struct Recording {
 impl Recording {
     /// A valid recording of three scans.
     pub fn of(format: Format) -> Self {
+        let (middle, last) = (AZIMUTHS as i64 / 2 - 1, AZIMUTHS as i64 - 1);
         let (folder, named_row, unit) = match format {
             Format::Oxford => ("radar", 0, 1),
             Format::Oord => ("Navtech_CTS350-X_Radar", 0, 1),
-            Format::Boreas | Format::BoreasRt => ("radar", AZIMUTHS as i64 / 2 - 1, 1),
-            Format::Mulran => ("sensor_data/radar/polar", AZIMUTHS as i64 - 1, 1000),
-            Format::MulranOxfordForm => ("polar_oxford_form", AZIMUTHS as i64 - 1, 1000),
+            Format::Boreas | Format::BoreasRt => ("radar", middle, 1),
+            Format::Mulran => ("sensor_data/radar/polar", last, 1000),
+            Format::MulranOxfordForm => ("polar_oxford_form", last, 1000),
             Format::Radiate => ("Navtech_Polar", 0, 1),
-            Format::Fomo | Format::Mcap | Format::Other | Format::Ros2Bag => ("navtech", 0, 1),
+            _ => ("navtech", 0, 1),
         };
         let transposed = matches!(format, Format::Mulran | Format::Radiate);
         let row_us = PERIOD_US / AZIMUTHS as i64;
@@ -54,6 +52,11 @@ impl Recording {
                 Format::Radiate => format!("{:06}", k + 7),
                 _ => ((start_us + named_row * row_us) * unit).to_string(),
             };
+            let row = |row: i64| navtech_row((start_us + row * row_us) * unit, row);
+            let pixels: Vec<u8> = match transposed {
+                true => (0..AZIMUTHS * BINS).map(|i| (i * 7) as u8).collect(),
+                false => (0..AZIMUTHS as i64).flat_map(row).collect(),
+            };
             Image {
                 name: format!("{folder}/{number}.png"),
                 width: if transposed {
@@ -61,12 +64,7 @@ impl Recording {
                 } else {
                     METADATA + BINS
                 },
-                pixels: match transposed {
-                    true => (0..AZIMUTHS * BINS).map(|i| (i * 7) as u8).collect(),
-                    false => (0..AZIMUTHS as i64)
-                        .flat_map(|row| navtech_row((start_us + row * row_us) * unit, row))
-                        .collect(),
-                },
+                pixels,
             }
         };
         Self {
@@ -138,12 +136,8 @@ fn texts(format: Format) -> Vec<(String, String)> {
         }
         Format::Radiate => {
             let line = |k: i64| {
-                format!(
-                    "Frame: {:06} Time: {}.{}\n",
-                    k + 7,
-                    1_549_986_607,
-                    250_000_000 * k + 3_000_000
-                )
+                let (frame, ns) = (k + 7, 250_000_000 * k + 3_000_000);
+                format!("Frame: {frame:06} Time: 1549986607.{ns}\n")
             };
             texts.push(("Navtech_Polar.txt".to_owned(), lines(&line)));
         }

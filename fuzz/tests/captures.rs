@@ -93,7 +93,7 @@ fn use_capture(path: &Path) -> Result<usize, Failure> {
 
 #[test]
 fn captures() {
-    let target = Target::new("captures", 32);
+    let target = Target::new(32);
     check!()
         .with_type::<(bool, Vec<CaptureEdit>, Vec<ByteEdit>)>()
         .for_each(|(is_udp, records, bytes)| {

@@ -2,29 +2,21 @@
 
 use std::{fs, path::Path};
 
-use bolero::{TypeGenerator, check};
-use gyre_fuzz::{
-    Failure, Target,
-    edit::{ByteEdit, Number, edit_bytes},
-};
+use bolero::check;
+use gyre_fuzz::{Failure, Target};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion};
 use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
-use crate::recordings::folder;
+use crate::{
+    files::{Edit, edited},
+    recordings::folder,
+};
 
 const KEYFRAMES: usize = 4;
 const MAGIC: usize = 16;
 /// The header of a record: its number, its length, and the checksums of its bytes and of the
 /// header.
 const HEADER: usize = 20;
-
-/// An edit of a log.
-#[derive(Clone, Debug, TypeGenerator)]
-enum Edit {
-    Bytes(ByteEdit),
-    /// A word of a record or of its header, whose checksums are mended.
-    Word(u8, u16, Number),
-}
 
 fn keyframe(seq: usize) -> Keyframe {
     Keyframe {
@@ -55,15 +47,15 @@ fn use_log(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Changes a word of a record, and mends its checksums.
-fn change(record: &mut [u8], at: u16, number: Number) {
+/// Changes a word of a record or of its header, and mends their checksums.
+fn change(record: &mut [u8], at: usize, number: u64) {
     let (header, content) = record.split_at_mut(HEADER);
     let places = MAGIC + content.len() - 8;
-    match usize::from(at) % places {
-        at if at < 8 => header[at..at + 8].copy_from_slice(&number.bits().to_le_bytes()),
+    match at % places {
+        at if at < 8 => header[at..at + 8].copy_from_slice(&number.to_le_bytes()),
         at => {
             let at = (at - 8).min(content.len() - 8);
-            content[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
+            content[at..at + 8].copy_from_slice(&number.to_le_bytes());
             header[12..16].copy_from_slice(&crc32fast::hash(content).to_le_bytes());
         }
     }
@@ -73,7 +65,7 @@ fn change(record: &mut [u8], at: u16, number: Number) {
 
 #[test]
 fn keyframe_logs() {
-    let (target, folder) = (Target::new("keyframe logs", 16), folder());
+    let (target, folder) = (Target::new(16), folder());
     let path = records_path::<Keyframe>(folder.path());
     let mut log = RecordLog::open(folder.path()).unwrap();
     (0..KEYFRAMES).for_each(|seq| log.append(&keyframe(seq)).unwrap());
@@ -82,21 +74,15 @@ fn keyframe_logs() {
     let valid = fs::read(&path).unwrap();
     let record = (valid.len() - MAGIC - HEADER) / KEYFRAMES;
     use_log(folder.path()).unwrap();
+    let word = |bytes: &mut [u8], index: usize, at: usize, number: u64| {
+        let records = bytes.get_mut(MAGIC..).unwrap_or_default();
+        let record = records.chunks_exact_mut(record).nth(index % KEYFRAMES);
+        record
+            .map(|record| change(record, at, number))
+            .unwrap_or_default();
+    };
     check!().with_type::<Vec<Edit>>().for_each(|edits| {
-        let mut bytes = valid.clone();
-        for edit in edits {
-            match edit {
-                Edit::Bytes(edit) => edit_bytes(&mut bytes, std::slice::from_ref(edit)),
-                Edit::Word(index, at, number) => {
-                    let records = bytes.get_mut(MAGIC..).unwrap_or_default();
-                    let index = usize::from(*index) % KEYFRAMES;
-                    if let Some(record) = records.chunks_exact_mut(record).nth(index) {
-                        change(record, *at, *number);
-                    }
-                }
-            }
-        }
-        fs::write(&path, bytes).unwrap();
+        fs::write(&path, edited(&valid, edits, word)).unwrap();
         target.run(|| use_log(folder.path()));
     });
 }

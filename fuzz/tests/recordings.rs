@@ -7,7 +7,7 @@ use gyre_datasets::{DatasetOptions, Format, inspect, open};
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
-    recording::{Recording, write},
+    recording::{Image, Recording, write},
 };
 use gyre_radar::OwnedScan;
 
@@ -51,9 +51,8 @@ fn edit_rows(pixels: &mut [u8], width: usize, edits: &[RowEdit]) {
             RowEdit::Flags(index, flags) => pixels[row(index) + 10] = flags,
             RowEdit::Copy(index) => {
                 let metadata = pixels[row(index)..][..11].to_vec();
-                pixels
-                    .chunks_exact_mut(width)
-                    .for_each(|row| row[..11].copy_from_slice(&metadata));
+                let rows = pixels.chunks_exact_mut(width);
+                rows.for_each(|row| row[..11].copy_from_slice(&metadata));
             }
             RowEdit::Pixel(at, value) => {
                 let at = usize::from(at) % pixels.len();
@@ -72,10 +71,8 @@ fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
         match dataset.read(index, scan.slot()) {
             Ok(geometry) => {
                 scan.geometry = geometry;
-                let view = scan.view();
-                view.check()
-                    .unwrap_or_else(|error| panic!("accepted, but {error}"));
-                assert!(view.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
+                scan.view().check().unwrap();
+                assert!(scan.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
             }
             Err(error) => refused = Some(error),
         }
@@ -84,10 +81,7 @@ fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
     }
     let report = inspect(root, options, None)?;
     assert!(!report.to_string().is_empty());
-    match refused {
-        Some(error) => Err(error.into()),
-        None => Ok(()),
-    }
+    refused.map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// A format, by its index, and whether it is named.
@@ -112,7 +106,7 @@ impl Chosen {
 
 #[test]
 fn pixels() {
-    let target = Target::new("pixels", 64);
+    let target = Target::new(64);
     check!()
         .with_type::<(Chosen, u8, Vec<RowEdit>)>()
         .for_each(|(chosen, image, edits)| {
@@ -147,12 +141,8 @@ fn edit_file(file: &mut Vec<u8>, edit: &FileEdit) {
         FileEdit::Height(height) => set(file, 20, &height.to_be_bytes()),
         FileEdit::Header(at, value) => set(file, 24 + usize::from(at % 5), &[*value]),
         FileEdit::Chunk(name, length, content) if file.len() > 33 => {
-            let chunk = [
-                &length.to_be_bytes()[..],
-                name,
-                &vec![7; usize::from(*content) + 4],
-            ]
-            .concat();
+            let content = vec![7; usize::from(*content) + 4];
+            let chunk = [&length.to_be_bytes()[..], name, &content].concat();
             file.splice(33..33, chunk);
         }
         FileEdit::Chunk(..) => {}
@@ -161,10 +151,8 @@ fn edit_file(file: &mut Vec<u8>, edit: &FileEdit) {
 }
 
 fn set(file: &mut [u8], at: usize, bytes: &[u8]) {
-    file.iter_mut()
-        .skip(at)
-        .zip(bytes)
-        .for_each(|(to, from)| *to = *from);
+    let there = file.iter_mut().skip(at);
+    there.zip(bytes).for_each(|(to, from)| *to = *from);
 }
 
 fn mend_checksums(file: &mut [u8]) {
@@ -182,7 +170,7 @@ fn mend_checksums(file: &mut [u8]) {
 
 #[test]
 fn image_files() {
-    let target = Target::new("image_files", 96);
+    let target = Target::new(96);
     check!()
         .with_type::<(Chosen, bool, Vec<FileEdit>)>()
         .for_each(|(chosen, all, edits)| {
@@ -216,7 +204,7 @@ enum FolderEdit {
 
 #[test]
 fn lists_and_names() {
-    let target = Target::new("lists_and_names", 64);
+    let target = Target::new(64);
     check!()
         .with_type::<(Chosen, Vec<FolderEdit>)>()
         .for_each(|(chosen, edits)| {
@@ -230,47 +218,44 @@ fn lists_and_names() {
 }
 
 fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
-    let images = recording.images.len();
-    let mut rename = |index: u8, number: &dyn Fn(i64) -> i64| {
-        if images > 0 {
-            let name = &mut recording.images[usize::from(index) % images].name;
-            let (folder, file) = name.rsplit_once('/').unwrap();
-            let there = file.trim_end_matches(".png").parse().unwrap_or(0);
-            *name = format!("{folder}/{}.png", number(there));
+    let images = recording.images.len().max(1);
+    let mut of_image = |index: &u8, change: &dyn Fn(&mut Image)| {
+        if let Some(image) = recording.images.get_mut(usize::from(*index) % images) {
+            change(image);
         }
     };
+    let mut rename = |index: &u8, name: &dyn Fn(&str) -> String| {
+        of_image(index, &|image| {
+            let (folder, file) = image.name.rsplit_once('/').unwrap();
+            image.name = format!("{folder}/{}.png", name(file.trim_end_matches(".png")));
+        });
+    };
     match edit {
-        FolderEdit::Name(index, number) => rename(*index, &|_| number.bits() as i64),
-        FolderEdit::Shift(index, by) => {
-            rename(*index, &|there| there.wrapping_add(i64::from(*by) * 1000))
+        FolderEdit::Name(index, number) => {
+            rename(index, &|_| (number.bits() as i64).to_string());
         }
-        FolderEdit::Words(index, kind) if images > 0 => {
-            let name = &mut recording.images[usize::from(*index) % images].name;
-            let (folder, file) = name.rsplit_once('/').unwrap();
-            let file = match kind % 3 {
-                0 => format!("scan{kind}.png"),
-                1 => file.replace(".png", " (1).png"),
-                _ => format!("._{file}"),
-            };
-            *name = format!("{folder}/{file}");
-        }
-        FolderEdit::Short(index, rows) if images > 0 => {
-            let image = &mut recording.images[usize::from(*index) % images];
-            let left = image
-                .pixels
-                .len()
-                .saturating_sub(usize::from(*rows) * image.width);
+        FolderEdit::Shift(index, by) => rename(index, &|name| {
+            let there: i64 = name.parse().unwrap_or(0);
+            there.wrapping_add(i64::from(*by) * 1000).to_string()
+        }),
+        FolderEdit::Words(index, kind) => rename(index, &|name| match kind % 3 {
+            0 => format!("scan{kind}"),
+            1 => format!("{name} (1)"),
+            _ => format!("._{name}"),
+        }),
+        FolderEdit::Short(index, rows) => of_image(index, &|image| {
+            let lost = usize::from(*rows) * image.width;
+            let left = image.pixels.len().saturating_sub(lost);
             image.pixels.truncate(left.max(image.width));
-        }
+        }),
         FolderEdit::Encoder(size) => {
             let images = recording.images.iter_mut();
             images.for_each(|image| set_encoder(&mut image.pixels, image.width, *size));
         }
-        FolderEdit::Words(..) | FolderEdit::Short(..) => {}
-        FolderEdit::Remove(index) if images > 0 => {
+        FolderEdit::Remove(_) if recording.images.is_empty() => {}
+        FolderEdit::Remove(index) => {
             recording.images.remove(usize::from(*index) % images);
         }
-        FolderEdit::Remove(_) => {}
         FolderEdit::Text(index, edits) => {
             let texts = recording.texts.len();
             let (_, text) = &mut recording.texts[usize::from(*index) % texts];
@@ -292,15 +277,12 @@ fn set_encoder(pixels: &mut [u8], width: usize, size: u16) {
 /// A folder in memory, where there is one.
 pub fn folder() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
-    let parent = if memory.is_dir() {
-        memory.to_owned()
-    } else {
-        std::env::temp_dir()
+    let parent = match memory.is_dir() {
+        true => memory.to_owned(),
+        false => std::env::temp_dir(),
     };
-    tempfile::Builder::new()
-        .prefix("fuzz-")
-        .tempdir_in(parent)
-        .unwrap()
+    let mut folder = tempfile::Builder::new();
+    folder.prefix("fuzz-").tempdir_in(parent).unwrap()
 }
 
 #[test]

@@ -87,14 +87,10 @@ fn use_run(path: &Path) -> Result<(), Failure> {
     for index in (dataset.first()..dataset.len()).take(100) {
         if let Ok(geometry) = dataset.read(index, scan.slot()) {
             scan.geometry = geometry;
-            let checked = scan.view().check();
-            checked.unwrap_or_else(|error| panic!("accepted, but {error}"));
+            scan.view().check().unwrap();
         }
     }
-    match refused {
-        Some(error) => Err(error.into()),
-        None => Ok(()),
-    }
+    refused.map_or(Ok(()), |error| Err(error.into()))
 }
 
 #[derive(Clone, Debug, TypeGenerator)]
@@ -106,7 +102,7 @@ enum RunEdit {
 
 #[test]
 fn runs() {
-    let target = Target::new("runs", 320);
+    let target = Target::new(320);
     let recording = recording();
     check!().with_type::<Vec<RunEdit>>().for_each(|edits| {
         let folder = folder();

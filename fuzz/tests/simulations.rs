@@ -26,7 +26,7 @@ fn use_simulation(text: &str) -> Result<(), Failure> {
 
 #[test]
 fn simulations() {
-    let target = Target::new("simulations", 512);
+    let target = Target::new(512);
     let config = SimulationConfig {
         scans: Some(1),
         ..SimulationConfig::default()

@@ -1,6 +1,9 @@
 //! Texts: trajectories, configurations, model cards, the results of a run.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use bolero::check;
 use gyre_configuration::Configuration;
@@ -41,24 +44,18 @@ fn use_trajectory(text: &str) -> Result<(), Failure> {
     let finite = |pose: &gyre_geometry::Pose| {
         pose.translation.vector.iter().all(|x| x.is_finite()) && pose.rotation.angle().is_finite()
     };
-    assert!(
-        trajectory.poses.iter().all(finite),
-        "a pose that is not finite"
-    );
+    assert!(trajectory.poses.iter().all(finite), "{trajectory:?}");
     if trajectory.stamp_ns.is_some() {
         write_tum(&trajectory, &mut Vec::new())?;
     }
-    judge(
-        &trajectory,
-        &trajectory,
-        gyre_evaluation::Options::default(),
-    )?;
+    let options = gyre_evaluation::Options::default();
+    judge(&trajectory, &trajectory, options)?;
     Ok(())
 }
 
 #[test]
 fn trajectories() {
-    let target = Target::new("trajectories", 16);
+    let target = Target::new(16);
     check!()
         .with_type::<(u8, Vec<TextEdit>)>()
         .for_each(|(index, edits)| {
@@ -70,17 +67,13 @@ fn trajectories() {
 /// The configurations that ship.
 fn configurations() -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
-    let files = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = files
-        .filter(|file| file.extension().is_some_and(|e| e == "toml"))
-        .collect();
+    let files = fs::read_dir(folder).unwrap();
+    let files = files.map(|entry| entry.unwrap().path());
+    let files = files.filter(|file| file.extension().is_some_and(|e| e == "toml"));
+    let mut files: Vec<_> = files.collect();
     files.sort();
-    files
-        .into_iter()
-        .map(|file| fs::read_to_string(file).unwrap())
-        .collect()
+    let read = |file: &PathBuf| fs::read_to_string(file).unwrap();
+    files.iter().map(read).collect()
 }
 
 /// Rasters up to this size are tried with the whole method.
@@ -88,7 +81,7 @@ const LARGEST_N: usize = 127;
 
 #[test]
 fn run_configurations() {
-    let (target, texts) = (Target::new("run_configurations", 96), configurations());
+    let (target, texts) = (Target::new(96), configurations());
     let folder = folder();
     let file = folder.path().join("run.toml");
     check!()
@@ -113,19 +106,13 @@ fn run_configurations() {
 
 #[test]
 fn model_cards() {
-    let target = Target::new("model_cards", 16);
+    let target = Target::new(16);
+    let folder = folder();
     let models =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/method/masking/tests/models");
-    let (folder, card) = (
-        folder(),
-        fs::read_to_string(models.join("single-127.toml")).unwrap(),
-    );
-    fs::copy(
-        models.join("single-127.onnx"),
-        folder.path().join("single-127.onnx"),
-    )
-    .unwrap();
-    let file = folder.path().join("card.toml");
+    let card = fs::read_to_string(models.join("single-127.toml")).unwrap();
+    let (onnx, file) = ("single-127.onnx", folder.path().join("card.toml"));
+    fs::copy(models.join(onnx), folder.path().join(onnx)).unwrap();
     let config = MaskingConfig {
         kind: MaskKind::Learned,
         model: Some(file.clone()),
@@ -148,7 +135,7 @@ fn model_cards() {
 
 #[test]
 fn odometry_files() {
-    let target = Target::new("odometry_files", 16);
+    let target = Target::new(16);
     let (folder, row) = (folder(), |seq: i64| {
         let numbers = vec!["0.5"; 19].join(",");
         format!(
@@ -169,8 +156,8 @@ fn odometry_files() {
 
 #[test]
 fn texts_without_edits_are_accepted() {
-    TRAJECTORIES
-        .iter()
-        .for_each(|text| use_trajectory(text).unwrap());
+    for text in TRAJECTORIES {
+        use_trajectory(text).unwrap();
+    }
     assert!(configurations().len() > 5);
 }

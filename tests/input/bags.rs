@@ -10,9 +10,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{
-    Ended, Run, gyre, odometry, python, real_data, recording, recording::with_constants,
-};
+use crate::common::{Ended, Run, gyre, odometry, python, recording, recording::with_constants};
 
 fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
@@ -39,12 +37,11 @@ fn bag(run: &Run, name: &str) -> PathBuf {
 /// Returns the independent reader's report about the bag of a run, and about a bag with a radar
 /// that looks to the left; `None` where it is not installed.
 fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
-    let can = Command::new(python())
-        .args(["-c", "import rosbags, numpy"])
-        .output();
-    if !can.is_ok_and(|output| output.status.success()) {
+    let mut can = Command::new(python());
+    can.args(["-c", "import rosbags, numpy"]);
+    if !can.output().is_ok_and(|output| output.status.success()) {
         println!(
-            "skipped: {} has no package rosbags, or GYRE_PYTHON names another",
+            "skipped: {} has no rosbags, or GYRE_PYTHON names another",
             python()
         );
         return None;
@@ -82,27 +79,6 @@ fn a_run_exported_in_any_form_is_taken_back_to_the_same_motions() {
         export(run.out(), &bag, &["--scans", form]).succeeded();
         assert_eq!(replay(&run, &bag), motions, "{form}");
     }
-}
-
-#[test]
-fn real_scans_are_taken_back_to_the_same_motions() {
-    let Some(data) = real_data("radiate-tiny_foggy") else {
-        return;
-    };
-    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration).data(&data);
-    let motions = run.complete();
-    let path = bag(&run, "bag.mcap");
-    export(run.out(), &path, &[]).succeeded();
-    let again = Run::of_file(&configuration).data(&path);
-    assert_eq!(again.complete(), motions);
-    let inspected = inspect(&path, &[]);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("ros2-bag"),
-        "{}",
-        inspected.stdout
-    );
 }
 
 #[test]
@@ -159,24 +135,6 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
 }
 
 #[test]
-#[ignore = ".ci/nightly: a bag of a recording of a run"]
-fn a_recorded_run_becomes_the_same_bag() {
-    let whole = completed();
-    let run = Run::small().data(whole.path());
-    let recorded = bag(&run, "drive.mcap");
-    let run = run
-        .argument("--record", recorded.to_str().unwrap())
-        .set("run.window=32");
-    let motions = run.complete();
-    let path = bag(&run, "bag");
-    export(&recorded, &path, &[]).succeeded();
-    assert_eq!(replay(&run, &path), motions);
-    if let Some(figures) = checked(&path, run.out(), None) {
-        assert_eq!(figures["b_scans"], recording::SCANS);
-    }
-}
-
-#[test]
 fn a_dataset_becomes_a_bag_of_its_scans() {
     let whole = completed();
     let run = Run::small().data(whole.path());
@@ -192,15 +150,13 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
         assert_ne!(says, is_zero, "{key}: {}", exported.stderr);
     }
     assert!(!exported.stderr.contains("interpolated"));
-    assert!(
-        exported.stdout.contains("/radar_data/fft_data 9600"),
-        "{}",
-        exported.stdout
-    );
-    Run::small().data(&path).finish().refused_with(&[
+    let said = &exported.stdout;
+    assert!(said.contains("/radar_data/fft_data 9600"), "{said}");
+    let words = [
         "scans on several topics",
         "--set dataset.topic=/radar_data/",
-    ]);
+    ];
+    Run::small().data(&path).finish().refused_with(&words);
     let motions = run.complete();
     let again = replayed(&run, &path).set("dataset.topic='/radar_data/fft_data'");
     assert_eq!(again.complete(), motions);
@@ -209,55 +165,35 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
 }
 
 #[test]
-fn a_damaged_scan_is_skipped_and_counted() {
+fn a_bag_without_its_end_gives_results_but_no_success() {
     let run = Run::of_recording();
     run.complete();
     let path = bag(&run, "bag.mcap");
     let exported = export(run.out(), &path, &[]);
-    exported.succeeded();
     // A few rows of the recording are not measured, as in real ones.
-    let says = exported.stderr.contains("interpolated rows: ");
+    let says = exported.succeeded().stderr.contains("interpolated rows: ");
     assert!(says, "{}", exported.stderr);
     let bytes = fs::read(&path).unwrap();
-    // Zstandard's signature begins the content of each chunk; the fifth one has scans.
+    // Zstandard's signature begins the content of each chunk.
     let magic = [0x28, 0xb5, 0x2f, 0xfd];
-    let chunks: Vec<usize> = (0..bytes.len() - 4)
-        .filter(|at| bytes[*at..*at + 4] == magic)
-        .collect();
-    let mut damaged = bytes.clone();
-    damaged[chunks[chunks.len() / 2] + 1000] ^= 0xff;
-    fs::write(&path, damaged).unwrap();
-    let again = |path: &Path, words: &[&str]| {
-        let again = Run::of_file(&run.out().join("config.toml")).data(path);
-        again.finish().failed_with(words);
-        odometry::rows(&again.odometry()).len()
-    };
-    let fewer = again(&path, &["is damaged at byte"]);
-    assert!(fewer > 0 && fewer < recording::SCANS - 1, "{fewer}");
+    let chunks = (0..bytes.len() - 4).filter(|at| bytes[*at..*at + 4] == magic);
+    let chunks: Vec<usize> = chunks.collect();
     // Cut within a chunk: the messages before the cut are read.
-    let cut = bag(&run, "cut.mcap");
-    fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
-    again(&cut, &["has no end behind byte"]);
-    let inspected = inspect(&cut, &[]);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("has no end"),
-        "{}",
-        inspected.stdout
-    );
+    fs::write(&path, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
+    let again = Run::of_file(&run.out().join("config.toml")).data(&path);
+    again.finish().failed_with(&["has no end behind byte"]);
+    let motions = odometry::rows(&again.odometry()).len();
+    assert!((1..recording::SCANS - 1).contains(&motions), "{motions}");
+    let inspected = inspect(&path, &[]).succeeded().stdout.clone();
+    assert!(inspected.contains("has no end"), "{inspected}");
 }
 
 #[test]
-fn bags_that_cannot_be_read_are_refused_with_a_sentence() {
+fn an_export_that_cannot_be_written_or_has_no_source_is_refused() {
     let run = Run::of_recording();
     run.complete();
     let odometry = bag(&run, "odometry");
     export(run.out(), &odometry, &["--scans", "none"]).succeeded();
-    let of = |path: &Path| Run::small().data(path).finish();
-    of(&odometry).refused_with(&["has no scans of a radar", "/odom"]);
-    let database = bag(&run, "rosbag2_0.db3");
-    fs::write(&database, "SQLite format 3").unwrap();
-    of(&database).refused_with(&["SQLite", "ros2 bag convert"]);
     let again = export(run.out(), &odometry, &[]);
     again.failed_with(&["it exists"]);
     let nothing = tempfile::tempdir().unwrap();

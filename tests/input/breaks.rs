@@ -37,10 +37,8 @@ fn a_scan_with_a_row_that_is_a_year_ahead_is_skipped() {
         assert_eq!(summary[key], count, "{key}");
     }
     odometry::assert_unbroken(&odometry::rows(&run.odometry()));
-    assert!(
-        run.result("log.jsonl")
-            .contains("row 200: stamp is 31536000")
-    );
+    let log = run.result("log.jsonl");
+    assert!(log.contains("row 200: stamp is 31536000"), "{log}");
 }
 
 /// A recording with a gap of a year before scan [`BREAK`].
@@ -99,15 +97,11 @@ fn a_live_run_over_a_gap_or_a_clock_that_was_set_does_not_take_the_rest_for_miss
         let run = run_of(&recording).rate("2").set("run.mode=live");
         run.complete();
         let summary = run.summary();
-        assert_eq!(
-            (&summary["published"], &summary["breaks"]),
-            (&recording::SCANS.into(), &1.into())
-        );
-        let processed = summary["processed"].as_u64().unwrap();
-        assert!(
-            processed > (recording::SCANS - BREAK / 2) as u64,
-            "{summary}"
-        );
+        assert_eq!(summary["published"], recording::SCANS);
+        assert_eq!(summary["breaks"], 1);
+        let processed = summary["processed"].as_u64();
+        let least = (recording::SCANS - BREAK / 2) as u64;
+        assert!(processed > Some(least), "{summary}");
     }
 }
 

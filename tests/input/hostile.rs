@@ -32,12 +32,9 @@ fn path(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// A file of this length that takes no room on the disk.
-fn sparse(file: &Path, gigabytes: u64) {
-    File::create(file)
-        .unwrap()
-        .set_len(gigabytes << 30)
-        .unwrap();
+/// A file of 100 GB that takes no room on the disk.
+fn sparse(file: &Path) {
+    File::create(file).unwrap().set_len(100 << 30).unwrap();
 }
 
 /// Files are opened by one reader, which has tests of its own; here, each command reads by it.
@@ -46,21 +43,16 @@ fn files_without_end_are_refused_whatever_reads_them() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name);
     let huge = |name: &str| {
-        sparse(&file(name), 100);
+        sparse(&file(name));
         file(name)
     };
     let (run, truth, motions) = (huge("run.toml"), huge("truth.tum"), huge("odometry.csv"));
     let estimate = file("trajectory.tum");
     fs::write(&estimate, "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").unwrap();
-    let (endless, options) = (recording::copy(2), recording::copy(2));
-    for (copy, is_endless) in [(&endless, true), (&options, false)] {
-        let settings = copy.path().join("dataset.toml");
-        let _ = fs::remove_file(&settings);
-        match is_endless {
-            true => symlink("/dev/zero", &settings).unwrap(),
-            false => sparse(&settings, 100),
-        }
-    }
+    let endless = recording::copy(2);
+    let settings = endless.path().join("dataset.toml");
+    let _ = fs::remove_file(&settings);
+    symlink("/dev/zero", &settings).unwrap();
     let simulated = tempfile::tempdir().unwrap();
     symlink("/dev/zero", simulated.path().join("simulation.toml")).unwrap();
     let images = recording::copy(2);
@@ -76,61 +68,38 @@ fn files_without_end_are_refused_whatever_reads_them() {
     huge("single-127.onnx");
     let (out, small) = (file("out"), path(recording::small()));
     let learned = |card: &Path| {
-        let model = format!("masking.model='{}'", card.display());
-        let settings = [
-            "raster.n=127",
-            "raster.cell_m=0.8",
-            "masking.kind=learned",
-            &model,
-        ];
-        let words = settings
-            .iter()
-            .flat_map(|it| ["--set".to_owned(), (*it).to_owned()]);
-        let run = ["run", small, "--out", path(&out)].map(str::to_owned);
-        run.into_iter().chain(words).collect::<Vec<_>>()
+        let run = ["run", small, "--out", path(&out)].join("\n");
+        let model = format!(
+            "masking.kind=learned\n--set\nmasking.model='{}'",
+            card.display()
+        );
+        format!("{run}\n--set\nraster.n=127\n--set\nraster.cell_m=0.8\n--set\n{model}")
     };
-    let words = |words: &[&str]| words.iter().map(|it| (*it).to_owned()).collect::<Vec<_>>();
-    let evaluate = ["evaluate", "--estimate", path(&estimate), "--ground-truth"];
+    let evaluate = format!("evaluate\n--estimate\n{}\n--ground-truth", path(&estimate));
+    let motions = format!("{}\n--odometry\n{}", path(&estimate), path(&motions));
+    let simulated = path(simulated.path());
+    // The arguments by lines.
     for (arguments, expected) in [
+        ("run\n/dev/zero".to_owned(), ["/dev/zero", "it is a device"]),
+        (format!("run\n{}", path(&run)), ["run.toml", "16 MB"]),
         (
-            words(&["run", "/dev/zero"]),
-            ["/dev/zero", "it is a device"],
-        ),
-        (words(&["run", path(&run)]), ["run.toml", "16 MB"]),
-        (
-            words(&["inspect", path(endless.path())]),
+            format!("inspect\n{}", path(endless.path())),
             ["dataset.toml", "a device"],
         ),
         (
-            words(&["inspect", path(options.path())]),
-            ["dataset.toml", "16 MB"],
-        ),
-        (
-            words(&["inspect", path(images.path())]),
+            format!("inspect\n{}", path(images.path())),
             ["png", "too large"],
         ),
         (
-            words(&["simulate", "--scans", "2", "--out", path(simulated.path())]),
+            format!("simulate\n--out\n{simulated}"),
             ["simulation.toml", "a device"],
         ),
-        (
-            words(&[&evaluate[..], &[path(&truth)]].concat()),
-            ["truth.tum", ""],
-        ),
-        (
-            words(
-                &[
-                    &evaluate[..],
-                    &[path(&estimate), "--odometry", path(&motions)],
-                ]
-                .concat(),
-            ),
-            ["odometry.csv", "line"],
-        ),
+        (format!("{evaluate}\n{}", path(&truth)), ["truth.tum", ""]),
+        (format!("{evaluate}\n{motions}"), ["odometry.csv", "line"]),
         (learned(Path::new("/dev/zero")), ["/dev/zero", "a device"]),
         (learned(&card), ["single-127.onnx", "MB"]),
     ] {
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let arguments: Vec<&str> = arguments.lines().collect();
         limited(&arguments).failed_with(&expected);
     }
 }
@@ -153,16 +122,13 @@ fn a_pipe_in_place_of_a_file_is_refused_at_once() {
     replace_by_pipe(&configuration);
     replace_by_pipe(&recorded);
     let is_pipe = "it is a pipe, not a file";
-    for (arguments, words) in [
-        (["inspect", path(options.path())], ["dataset.toml", is_pipe]),
-        (
-            ["inspect", path(images.path())],
-            ["holds no PNG images", ""],
-        ),
-        (["inspect", path(&recorded)], ["drive.mcap", is_pipe]),
-        (["run", path(&configuration)], ["run.toml", is_pipe]),
+    for (command, file, words) in [
+        ("inspect", options.path(), ["dataset.toml", is_pipe]),
+        ("inspect", images.path(), ["holds no PNG images", ""]),
+        ("inspect", &recorded, ["drive.mcap", is_pipe]),
+        ("run", &configuration, ["run.toml", is_pipe]),
     ] {
-        at_once(&arguments).refused_with(&words);
+        at_once(&[command, path(file)]).refused_with(&words);
     }
     for data in [options.path(), &recorded] {
         let out = folder.path().join("out");

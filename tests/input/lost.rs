@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path, thread, time::Duration};
 
-use crate::common::{Run, recording, send, undisturbed};
+use crate::common::{Run, Running, recording, send, undisturbed};
 use rustix::process::Signal;
 use tempfile::TempDir;
 
@@ -11,12 +11,18 @@ use tempfile::TempDir;
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
-fn whole() -> TempDir {
-    recording::copy(recording::SCANS)
+/// A whole recording, and a run of it at a rate.
+fn whole(rate: &str) -> (TempDir, Run) {
+    let recording = recording::copy(recording::SCANS);
+    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    (recording, run.rate(rate))
 }
 
-fn run_of(recording: &TempDir) -> Run {
-    Run::of_recording_named(recording.path().to_str().unwrap())
+/// Starts a run, and waits for its middle.
+fn started(run: &Run) -> Running {
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    running
 }
 
 /// Moves the folder of images away.
@@ -43,8 +49,7 @@ fn a_folder_that_is_away_for_a_moment_loses_nothing_whatever_restarts_meanwhile(
         &["radar-replay"],
         &["masking", "rotation-search", "pose-integration"],
     ] {
-        let recording = whole();
-        let run = run_of(&recording).rate(MODERATE);
+        let (recording, run) = whole(MODERATE);
         let mut running = run.start();
         let stages = running.await_stages();
         running.await_poses(MIDDLE);
@@ -62,12 +67,9 @@ fn a_folder_that_is_away_for_a_moment_loses_nothing_whatever_restarts_meanwhile(
 
 #[test]
 fn a_source_that_waits_for_its_input_has_not_stalled() {
-    let recording = whole();
-    let run = run_of(&recording)
-        .rate(MODERATE)
-        .set("run.stall_timeout_s=2");
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let (recording, run) = whole(MODERATE);
+    let run = run.set("run.stall_timeout_s=2");
+    let running = started(&run);
     take_away(recording.path());
     thread::sleep(Duration::from_secs(4));
     bring_back(recording.path());
@@ -78,26 +80,10 @@ fn a_source_that_waits_for_its_input_has_not_stalled() {
 }
 
 #[test]
-fn a_file_that_is_missing_for_a_moment_loses_nothing() {
-    let recording = whole();
-    let image = &recording::images(recording.path())[MIDDLE + 2];
-    let run = run_of(&recording).rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(2);
-    let aside = recording.path().join("aside");
-    fs::rename(image, &aside).unwrap();
-    thread::sleep(Duration::from_millis(1200));
-    fs::rename(&aside, image).unwrap();
-    running.finish().succeeded();
-    assert_whole(&run);
-}
-
-#[test]
 fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
-    let recording = whole();
-    let run = run_of(&recording).rate(MODERATE).set("source.retry_s=0.3");
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let (recording, run) = whole(MODERATE);
+    let run = run.set("source.retry_s=0.3");
+    let running = started(&run);
     take_away(recording.path());
     running.finish().failed_with(&[
         "radar-replay: cannot read",
@@ -114,12 +100,9 @@ fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
 
 #[test]
 fn a_run_that_waits_for_its_input_can_be_interrupted() {
-    let recording = whole();
-    let run = run_of(&recording)
-        .rate(MODERATE)
-        .set("source.retry_s=1e300");
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let (recording, run) = whole(MODERATE);
+    let run = run.set("source.retry_s=1e300");
+    let running = started(&run);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(300));
     running.signal(Signal::INT);
@@ -132,10 +115,9 @@ fn a_run_that_waits_for_its_input_can_be_interrupted() {
 
 #[test]
 fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
-    let recording = whole();
-    let run = run_of(&recording).rate("4").set("run.mode=live");
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let (recording, run) = whole("4");
+    let run = run.set("run.mode=live");
+    let running = started(&run);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(600));
     bring_back(recording.path());
@@ -145,18 +127,14 @@ fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
     assert_eq!(count("unreadable"), 0);
     assert_eq!(count("published"), recording::SCANS as u64);
     assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert!(
-        count("dropped") > 0,
-        "a sensor does not wait for the disk: {summary}"
-    );
+    // A sensor does not wait for the disk.
+    assert!(count("dropped") > 0, "{summary}");
 }
 
 #[test]
 fn a_source_restarted_after_files_came_and_went_plays_the_same_scans() {
-    let recording = whole();
-    let run = run_of(&recording).rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let (recording, run) = whole(MODERATE);
+    let mut running = started(&run);
     let images = recording::images(recording.path());
     fs::copy(&images[0], recording.path().join("radar/1.png")).unwrap();
     for image in &images[1..4] {
@@ -169,27 +147,27 @@ fn a_source_restarted_after_files_came_and_went_plays_the_same_scans() {
 
 // Damaged scans.
 
-fn damage(recording: &Path, scans: impl IntoIterator<Item = usize>) {
-    let images = recording::images(recording);
+/// A recording with damaged scans, and a run of it.
+fn damaged(scans: impl IntoIterator<Item = usize>) -> (TempDir, Run) {
+    let recording = recording::copy(recording::SCANS);
+    let images = recording::images(recording.path());
     for scan in scans {
         recording::truncate(&images[scan], 100_000);
     }
+    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    (recording, run)
 }
 
 #[test]
 fn many_damaged_scans_in_a_row_end_the_run_and_a_higher_limit_continues_it() {
-    let recording = whole();
-    damage(recording.path(), 8..11);
-    let run = run_of(&recording);
-    run.clone()
-        .set("source.max_unreadable=2")
-        .finish()
-        .failed_with(&[
-            "3 scans in a row cannot be read",
-            "is truncated",
-            "source.max_unreadable is 2",
-            "the same command resumes",
-        ]);
+    let (_recording, run) = damaged(8..11);
+    let few = run.clone().set("source.max_unreadable=2");
+    few.finish().failed_with(&[
+        "3 scans in a row cannot be read",
+        "is truncated",
+        "source.max_unreadable is 2",
+        "the same command resumes",
+    ]);
     run.complete();
     let summary = run.summary();
     assert_eq!(summary["unreadable"], 3);
@@ -198,31 +176,22 @@ fn many_damaged_scans_in_a_row_end_the_run_and_a_higher_limit_continues_it() {
 
 #[test]
 fn a_recording_with_many_damaged_scans_gives_results_but_no_success() {
-    let recording = whole();
-    damage(recording.path(), (1..recording::SCANS).step_by(3));
-    let run = run_of(&recording);
+    let (_recording, run) = damaged((1..recording::SCANS).step_by(3));
     let ended = run.finish();
     ended.failed_with(&["8 of the 24 scans", "cannot be read", "log.jsonl"]);
-    assert!(
-        ended.stdout.contains("complete but for unreadable scans"),
-        "{}",
-        ended.stdout
-    );
+    let said = &ended.stdout;
+    assert!(said.contains("complete but for unreadable scans"), "{said}");
     assert_eq!(run.summary()["processed"], 16);
 }
 
 #[test]
 fn scans_are_numbered_as_in_the_recording() {
-    let recording = whole();
-    damage(recording.path(), [9]);
-    let run = run_of(&recording).set("source.first=7");
+    let (_recording, run) = damaged([9]);
+    let run = run.set("source.first=7");
     run.complete();
     let rows = crate::common::odometry::rows(&run.odometry());
     assert_eq!((rows[0].scan, rows[0].previous_scan), (8, 7));
     assert_eq!((rows[1].scan, rows[1].previous_scan), (10, 8));
     let summary = run.summary();
-    assert_eq!(
-        (&summary["published"], &summary["unreadable"]),
-        (&16.into(), &1.into())
-    );
+    assert_eq!([&summary["published"], &summary["unreadable"]], [16, 1]);
 }

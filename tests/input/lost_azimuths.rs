@@ -108,13 +108,10 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
     let bag = run.folder().join("bag.mcap");
     let mut command = gyre();
     command.arg("export").arg(run.out()).arg("--mcap").arg(&bag);
-    let said = Ended::of(command);
+    let ended = Ended::of(command);
+    let said = &ended.succeeded().stderr;
     let sentence = format!("{repaired} scans have lost azimuths: their rows are at the angles");
-    assert!(
-        said.succeeded().stderr.contains(&sentence),
-        "{}",
-        said.stderr
-    );
+    assert!(said.contains(&sentence), "{said}");
     let mut dataset = gyre_recording::open(&bag, &DatasetOptions::default()).unwrap();
     let misplaced = |scans: &[OwnedScan]| misplaced(scans, &true_scans, &stale_before);
     let (wrong, right) = (misplaced(&before), misplaced(&read_all(dataset.as_mut())));

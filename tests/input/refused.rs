@@ -26,94 +26,41 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
     for image in recording::images(empty.path()) {
         recording::truncate(&image, 0);
     }
-    let set = |sentences: &[&str]| {
-        sentences
-            .iter()
-            .fold(Run::of_recording(), |run, it| run.set(it))
-    };
-    let data = format!("source.data={}", file.display());
-    let slam = "slam.kind=graph";
-    for (run, words) in [
-        (Run::configured(""), &["no dataset", "source.data"][..]),
-        (
-            run_of(Path::new("/nowhere/at/all")),
-            &["/nowhere/at/all", "is no file or folder"],
-        ),
-        (set(&[&data]), &["scan.txt is a file", "folder"]),
-        (
-            run_of(folder.path()),
-            &["not a known dataset", "no PNG images"],
-        ),
-        (
-            run_of(one.path()),
-            &["has 1 scan:", "a motion is between two"],
-        ),
-        (run_of(empty.path()), &["first image", ".png"]),
-        (
-            set(&["source.first=24"]),
-            &["source.first is 24", "24 scans, from 0 to 23"],
-        ),
-        (
-            set(&["masking.treshold=3"]),
-            &["[masking]", "did you mean `threshold`?"],
-        ),
-        (set(&["masking"]), &["--set", "section.key=value"]),
-        (
-            Run::of_file(Path::new("no/such.toml")),
-            &["no/such.toml", "No such file"],
-        ),
-        (
-            Run::configured("[raster]\nn = = 3"),
-            &["test.toml", "line 2"],
-        ),
-        (
-            Run::of_recording().into(&file.join("out")),
-            &["cannot write to", "scan.txt/out"],
-        ),
-        (
-            set(&["masking.kind=learned"]),
-            &["masking.model does not name a model"],
-        ),
-        (
-            set(&["doppler.kind=auto"]),
-            &["which azimuths", "doppler.kind"],
-        ),
-        (
-            set(&["gyro.kind=auto"]),
-            &["no log of a gyro lies beside the scans", "gyro.kind"],
-        ),
-        (
-            set(&["wheels.kind=auto"]),
-            &["no log of the wheels lies beside the scans", "wheels.kind"],
-        ),
-        (
-            configurations::with_gyro().set("gyro.delay_s=600"),
-            &[
-                "has no sample while the scans were measured",
-                "gyro.delay_s",
-            ],
-        ),
-        (
-            configurations::gyro_and_wheels()
-                .run()
-                .set("wheels.delay_s=600"),
-            &["the log of the wheels", "wheels.delay_s is wrong"],
-        ),
-        (
-            set(&[slam, "gnss.kind=auto"]),
-            &["no log of a GNSS receiver lies beside"],
-        ),
-        (
-            set(&[slam, "gnss.kind=log", "gnss.file=nowhere.csv"]),
-            &["nowhere.csv"],
-        ),
-        (
-            set(&[slam, "slam.map='nowhere'"]),
-            &["nowhere is not a map"],
-        ),
-    ] {
+    let refused = |run: Run, words: &[&str]| {
         run.finish().refused_with(words);
         assert!(!run.out().join("journal").exists(), "{words:?}");
+    };
+    refused(Run::configured(""), &["no dataset", "source.data"]);
+    let nowhere = Path::new("/nowhere/at/all");
+    refused(run_of(nowhere), &["/nowhere/at/all", "is no file or folder"]);
+    let data = format!("source.data={}", file.display());
+    let text = Run::of_recording().set(&data);
+    refused(text, &["scan.txt is a file", "folder"]);
+    let few = ["has 1 scan:", "a motion is between two"];
+    refused(run_of(one.path()), &few);
+    refused(run_of(empty.path()), &["first image", ".png"]);
+    let away = Run::of_file(Path::new("no/such.toml"));
+    refused(away, &["no/such.toml", "No such file"]);
+    let unwritable = Run::of_recording().into(&file.join("out"));
+    refused(unwritable, &["cannot write to", "scan.txt/out"]);
+    let late = configurations::gyro_and_wheels().run();
+    let late = late.set("wheels.delay_s=600");
+    refused(late, &["the log of the wheels", "wheels.delay_s is wrong"]);
+    // Settings, and what is said.
+    for case in [
+        "source.first=24|source.first is 24|24 scans, from 0 to 23",
+        "masking.treshold=3|[masking]|did you mean `threshold`?",
+        "masking.kind=learned|masking.model does not name a model",
+        "doppler.kind=auto|which azimuths|doppler.kind",
+        "gyro.kind=auto|no log of a gyro lies beside the scans|gyro.kind",
+        "slam.kind=graph gnss.kind=auto|no log of a GNSS receiver lies beside",
+        "slam.kind=graph gnss.kind=log gnss.file=nowhere.csv|nowhere.csv",
+        "slam.kind=graph slam.map='nowhere'|nowhere is not a map",
+    ] {
+        let (settings, words) = case.split_once('|').unwrap();
+        let settings = settings.split(' ');
+        let run = settings.fold(Run::of_recording(), Run::set);
+        refused(run, &words.split('|').collect::<Vec<_>>());
     }
 }
 
@@ -123,9 +70,8 @@ fn a_dataset_of_truncated_images_alone_is_reported() {
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 5000);
     }
-    run_of(recording.path())
-        .finish()
-        .failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
+    let ended = run_of(recording.path()).finish();
+    ended.failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
 }
 
 // A bad scan among good ones.
@@ -137,43 +83,31 @@ fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     let run = run_of(recording.path());
     run.finish().succeeded();
     let summary = run.summary();
-    assert_eq!(
-        (
-            &summary["published"],
-            &summary["processed"],
-            &summary["unreadable"]
-        ),
-        (&7.into(), &7.into(), &1.into())
-    );
-    assert_eq!(
-        (&summary["dropped"], &summary["breaks"]),
-        (&0.into(), &0.into())
-    );
+    for (key, count) in [
+        ("published", 7),
+        ("processed", 7),
+        ("unreadable", 1),
+        ("dropped", 0),
+        ("breaks", 0),
+    ] {
+        assert_eq!(summary[key], count, "{key}");
+    }
     let rows = odometry::rows(&run.odometry());
     odometry::assert_unbroken(&rows);
-    assert!(
-        rows.len() == 6 && rows.iter().all(|row| row.scan != bad as u64),
-        "{rows:?}"
-    );
+    assert_eq!(rows.len(), 6);
+    assert!(rows.iter().all(|row| row.scan != bad as u64), "{rows:?}");
     let log = run.result("log.jsonl");
-    let reported = log
-        .lines()
-        .filter(|line| line.contains("WARN") && line.contains(reason))
-        .count();
-    assert_eq!(reported, 1, "{log}");
+    let is_reported = |line: &&str| line.contains("WARN") && line.contains(reason);
+    assert_eq!(log.lines().filter(is_reported).count(), 1, "{log}");
 }
 
 #[test]
 fn an_image_that_cannot_be_read_is_skipped_wherever_it_is() {
     for bad in [0, 4, 7] {
-        skips(bad, "truncated", |image| {
-            recording::truncate(image, 100_000)
-        });
+        let truncate = |image: &Path| recording::truncate(image, 100_000);
+        skips(bad, "truncated", truncate);
     }
-}
-
-#[test]
-fn an_image_of_another_size_is_skipped() {
+    // An image of another size.
     skips(4, "most images of the dataset are", |image| {
         recording::resize(image, 1000, 400)
     });
@@ -192,10 +126,9 @@ fn a_time_longer_than_any_run_is_no_limit() {
 #[test]
 fn a_stage_command_that_does_not_exist_is_reported() {
     for stage in STAGES {
-        let run =
-            Run::of_recording().set(&format!("stages.{stage}.command=['/no/such/program', 'x']"));
-        run.finish()
-            .failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
+        let command = format!("stages.{stage}.command=['/no/such/program', 'x']");
+        let ended = Run::of_recording().set(&command).finish();
+        ended.failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
     }
 }
 
@@ -209,20 +142,21 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_reported() {
     stage("maskin").refused_with(&["`maskin`", "masking"]);
     let ended = stage("masking");
     assert_eq!(ended.code(), Some(2));
+    let said = &ended.stderr;
     assert!(
-        ended.stderr.lines().count() == 1 && ended.stderr.contains("gyre run"),
-        "{}",
-        ended.stderr
+        said.lines().count() == 1 && said.contains("gyre run"),
+        "{said}"
     );
 }
 
 #[test]
-fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
+fn too_little_shared_memory_is_reported_with_the_need_and_just_enough_suffices() {
     let run = Run::of_recording();
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
+    let with = |options: &str| run.with_tmpfs(Path::new(SHARED_MEMORY), options);
+    let Some(small) = with("size=1m") else {
         return;
     };
-    let ended = run.start_as(command).finish();
+    let ended = run.start_as(small).finish();
     ended.refused_with(&[
         "/dev/shm has 1.0 MB free",
         "the run needs",
@@ -230,37 +164,10 @@ fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
         "--shm-size",
     ]);
     assert!(!run.out().join("journal").exists(), "before the first scan");
-}
-
-#[test]
-fn shared_memory_that_cannot_be_written_is_reported() {
-    let run = Run::of_recording();
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "ro,size=1g") else {
-        return;
-    };
-    run.start_as(command)
-        .finish()
-        .refused_with(&["/dev/shm", "writable tmpfs"]);
-}
-
-#[test]
-fn just_enough_shared_memory_suffices() {
-    let run = Run::of_recording();
-    let Some(small) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
-        return;
-    };
-    let said = run.start_as(small).finish().stderr;
-    let needed: f64 = said
-        .split("needs ")
-        .nth(1)
-        .unwrap()
-        .split(' ')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
+    let read_only = run.start_as(with("ro,size=1g").unwrap()).finish();
+    read_only.refused_with(&["/dev/shm", "writable tmpfs"]);
+    let (_, needed) = ended.stderr.split_once("needs ").unwrap();
+    let needed: f64 = needed.split(' ').next().unwrap().parse().unwrap();
     let size = format!("size={}k", (needed * 1e6 / 1024.0) as u64 + 200);
-    run.start_as(run.with_tmpfs(Path::new(SHARED_MEMORY), &size).unwrap())
-        .finish()
-        .succeeded();
+    run.start_as(with(&size).unwrap()).finish().succeeded();
 }

@@ -23,13 +23,10 @@ fn streamed() -> Run {
 
 fn simulate(out: &Path, options: &[&str]) -> Command {
     let mut command = gyre();
-    command
-        .args(["simulate", "--scans", "12", "--seed", "3"])
-        .args(["--set", "simulation.sensor.profile=cts350x-radiate"])
-        .args(["--set", "simulation.output.format=oxford"])
-        .args(options)
-        .arg("--out")
-        .arg(out);
+    command.args(["simulate", "--scans", "12", "--seed", "3"]);
+    command.args(["--set", "simulation.sensor.profile=cts350x-radiate"]);
+    command.args(["--set", "simulation.output.format=oxford"]);
+    command.args(options).arg("--out").arg(out);
     command
 }
 
@@ -41,40 +38,29 @@ fn written(options: &[&str]) -> tempfile::TempDir {
 
 #[test]
 fn streamed_and_read_from_a_disk_it_gives_the_same_motions() {
-    for options in [
-        &["--format", "oxford"][..],
-        &["--format", "boreas", "--threads", "1"],
-        &[
-            "--format",
-            "radiate",
-            "--set",
-            "simulation.output.host_stamps=stalling",
-        ],
+    for (format, stamps, options) in [
+        ("oxford", "even", &[] as &[&str]),
+        ("boreas", "even", &["--threads", "1"]),
+        ("radiate", "stalling", &[]),
     ] {
-        let recording = written(options);
-        let set = |run: Run| {
-            let run = run.set(&format!("simulation.output.format={}", options[1]));
-            let stamps = if options[1] == "radiate" {
-                "stalling"
-            } else {
-                "even"
-            };
-            run.set(&format!("simulation.output.host_stamps={stamps}"))
-        };
-        let odometry = set(streamed()).complete();
+        let format_key = format!("simulation.output.format={format}");
+        let stamps_key = format!("simulation.output.host_stamps={stamps}");
+        let settings = ["--format", format, "--set", &stamps_key];
+        let recording = written(&[&settings[..], options].concat());
+        let run = || streamed().set(&format_key).set(&stamps_key);
+        let odometry = run().complete();
         assert_eq!(odometry::rows(&odometry).len(), SCANS - 1);
-        assert_eq!(
-            set(streamed()).data(recording.path()).complete(),
-            odometry,
-            "{options:?}"
-        );
+        let read = run().data(recording.path());
+        assert_eq!(read.complete(), odometry, "{format}");
     }
 }
 
 #[test]
-fn a_streamed_run_is_judged_and_leaves_no_recording() {
+fn a_streamed_run_is_judged_leaves_no_recording_and_is_repeated_by_its_configuration() {
     let run = streamed();
-    run.complete();
+    let odometry = run.complete();
+    let again = Run::of_file(&run.out().join("config.toml"));
+    assert_eq!(again.complete(), odometry);
     assert!(run.summary()["evaluation"]["rpe"].is_object());
     assert_eq!(run.summary()["data"], "a simulation");
     assert_eq!(run.result("ground_truth.tum").lines().count(), SCANS);
@@ -84,36 +70,18 @@ fn a_streamed_run_is_judged_and_leaves_no_recording() {
 #[test]
 fn a_stored_run_keeps_its_recording_and_gives_the_same_motions() {
     let run = streamed().set("simulation.output.store=true");
-    assert_eq!(run.complete(), streamed().complete());
-    assert_eq!(images(&run.out().join("recording")).len(), SCANS);
-    let written = fs::metadata(&images(&run.out().join("recording"))[0])
-        .unwrap()
-        .modified()
-        .unwrap();
+    let odometry = streamed().complete();
+    assert_eq!(run.complete(), odometry);
+    let stored = images(&run.out().join("recording"));
+    assert_eq!(stored.len(), SCANS);
+    let modified = || fs::metadata(&stored[0]).unwrap().modified().unwrap();
+    let written = modified();
     run.complete();
-    assert_eq!(
-        fs::metadata(&images(&run.out().join("recording"))[0])
-            .unwrap()
-            .modified()
-            .unwrap(),
-        written
-    );
+    assert_eq!(modified(), written);
     // Another drive takes its place.
-    run.clone()
-        .set("simulation.seed=4")
-        .option("--fresh")
-        .complete();
-    assert_ne!(run.odometry(), streamed().complete());
-}
-
-#[test]
-fn the_resolved_configuration_of_a_streamed_run_repeats_it() {
-    let run = streamed();
-    let odometry = run.complete();
-    assert_eq!(
-        Run::of_file(&run.out().join("config.toml")).complete(),
-        odometry
-    );
+    let other = run.clone().set("simulation.seed=4").option("--fresh");
+    other.complete();
+    assert_ne!(run.odometry(), odometry);
 }
 
 #[test]
@@ -140,13 +108,12 @@ fn images(recording: &Path) -> Vec<PathBuf> {
 fn all_files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     for folder in [folder.to_owned(), folder.join("radar"), folder.join("gt")] {
-        let entries = fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().path())
-            .filter(|path| path.is_file());
-        files.extend(
-            entries.map(|path| (path.file_name().unwrap().into(), fs::read(path).unwrap())),
-        );
+        let paths = fs::read_dir(folder).unwrap();
+        let paths = paths.map(|entry| entry.unwrap().path());
+        for path in paths.filter(|path| path.is_file()) {
+            let content = fs::read(&path).unwrap();
+            files.insert(path.file_name().unwrap().into(), content);
+        }
     }
     files
 }
@@ -156,48 +123,34 @@ fn a_simulation_that_was_killed_goes_on_with_what_is_complete() {
     let folder = tempfile::tempdir().unwrap();
     let mut killed = start(folder.path());
     while !folder.path().join("radar").is_dir() || images(folder.path()).len() < 3 {
-        assert!(
-            killed.try_wait().unwrap().is_none(),
-            "it is through before it could be killed"
-        );
+        let is_through = killed.try_wait().unwrap().is_some();
+        assert!(!is_through, "it is through before it could be killed");
         thread::sleep(Duration::from_millis(1));
     }
     crate::common::send(killed.id(), Signal::KILL);
     killed.wait().unwrap();
-    let kept = images(folder.path())
-        .into_iter()
+    let kept = images(folder.path()).into_iter();
+    let kept = kept
         .filter(|path| path.extension().unwrap() == "png")
         .count();
-    let ended = Ended::of(simulate(folder.path(), &[]));
-    assert!(
-        ended.stdout.contains(&format!("{kept} were there already")),
-        "{}",
-        ended.stdout
-    );
+    let said = Ended::of(simulate(folder.path(), &[])).stdout;
+    let sentence = format!("{kept} were there already");
+    assert!(said.contains(&sentence), "{said}");
     assert!(all_files(folder.path()) == all_files(written(&["--threads", "5"]).path()));
 }
 
 fn start(out: &Path) -> Child {
     let mut command = simulate(out, &[]);
-    command
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().unwrap()
 }
 
 #[test]
 fn a_folder_of_another_recording_is_refused() {
     let recording = written(&[]);
-    let refused = Ended::of(simulate(
-        recording.path(),
-        &["--set", "simulation.drive.speed_mps=5"],
-    ));
+    let faster = ["--set", "simulation.drive.speed_mps=5"];
+    let refused = Ended::of(simulate(recording.path(), &faster));
     refused.refused_with(&["dataset of another configuration", "another folder"]);
-    let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"]));
-    assert!(
-        unknown.stderr.contains("oxford, boreas, radiate"),
-        "{}",
-        unknown.stderr
-    );
+    let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"])).stderr;
+    assert!(unknown.contains("oxford, boreas, radiate"), "{unknown}");
 }

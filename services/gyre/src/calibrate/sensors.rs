@@ -103,7 +103,7 @@ macro_rules! sensor {
 sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
     GyroLog, GyroConfig, GyroKind::Log, GyroCalibration,
-    beside: GyroLog::beside,
+    beside: |folder: &Path| GyroLog::find(folder).ok(),
     read: |file: &Path, _: &GyroConfig| GyroLog::read(file),
     mean: GyroCalibration::mean,
     toml: |found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file)

@@ -11,33 +11,25 @@ use crate::PORT;
 
 /// The prefix of an address of datagrams.
 const UDP: &str = "udp://";
+const UNUSED: &str =
+    "interface is set, but only an address that begins with `udp://` needs one: remove it";
 
 /// The address where a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// Host and port of the radar, which is connected to by TCP.
     Tcp(String),
     /// The destination of the radar's datagrams.
     Udp {
-        /// A multicast group, or an address of this machine, and the port.
         to: SocketAddrV4,
         /// The address of this machine on the radar's network; unspecified: the system chooses.
         interface: Ipv4Addr,
     },
 }
 
-/// An address that cannot be used.
+/// An address that cannot be used: a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum BadAddress {
-    #[error(
-        "address `{0}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
-    )]
-    Udp(String),
-    #[error("interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`")]
-    Interface(String),
-    #[error("interface is set, but only an address that begins with `udp://` needs one: remove it")]
-    Unused,
-}
+#[error("{0}")]
+pub struct BadAddress(String);
 
 impl Address {
     /// Parses `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, for the last with an interface or "".
@@ -46,11 +38,19 @@ impl Address {
             return match interface {
                 "" if text.contains(':') => Ok(Self::Tcp(text.to_owned())),
                 "" => Ok(Self::Tcp(format!("{text}:{PORT}"))),
-                _ => Err(BadAddress::Unused),
+                _ => Err(BadAddress(UNUSED.to_owned())),
             };
         };
-        let bad = |_| BadAddress::Udp(text.to_owned());
-        let own = |_| BadAddress::Interface(interface.to_owned());
+        let bad = |_| {
+            BadAddress(format!(
+                "address `{text}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
+            ))
+        };
+        let own = |_| {
+            BadAddress(format!(
+                "interface `{interface}` is no IPv4 address: give this machine's, as in `192.168.0.2`"
+            ))
+        };
         Ok(Self::Udp {
             to: to.parse().map_err(bad)?,
             interface: match interface {
@@ -77,6 +77,7 @@ impl fmt::Display for Address {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
@@ -87,11 +88,13 @@ mod tests {
         let group = "udp://239.192.43.78:4378";
         assert_eq!(parse(group, "").as_deref(), Ok(group));
         assert_eq!(parse(group, "127.0.0.1").as_deref(), Ok(group));
-        assert_eq!(parse("radar", "127.0.0.1"), Err(BadAddress::Unused));
-        let no_port = "udp://239.192.43.78";
-        let bad = Err(BadAddress::Udp(no_port.to_owned()));
-        assert_eq!(parse(no_port, ""), bad);
-        let bad = Err(BadAddress::Interface("eth0".to_owned()));
-        assert_eq!(parse(group, "eth0"), bad);
+        for (address, interface, words) in [
+            ("radar", "127.0.0.1", "remove it"),
+            ("udp://239.192.43.78", "", "give group and port"),
+            (group, "eth0", "interface `eth0` is no IPv4 address"),
+        ] {
+            let BadAddress(refused) = parse(address, interface).unwrap_err();
+            assert!(refused.contains(words), "{refused}");
+        }
     }
 }

@@ -23,9 +23,11 @@ pub use datagrams::Datagrams;
 pub use write::{MAX_DATAGRAM_BYTES, write_azimuth, write_description};
 
 use crate::configuration::Configuration;
-use crate::malformed::{CATEGORY, MalformedDatagram};
+use crate::malformed::Malformed;
 use crate::message::MAX_PAYLOAD_BYTES;
 
+/// The category of ASTERIX: the first byte of a message.
+const CATEGORY: u8 = 240;
 /// The message type of a video message.
 const VIDEO: u8 = 2;
 /// Angles in a turn.
@@ -43,7 +45,6 @@ const BLOCK_BYTES: [usize; 3] = [4, 64, 256];
 const COLOSSUS_UDP_VERSION: u8 = 2;
 const COLOSSUS_UDP_IDS: std::ops::RangeInclusive<u8> = 10..=50;
 
-/// A video message: a part of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Video<'a> {
     /// Number of the message, incremented with each one; wraps.
@@ -52,7 +53,6 @@ struct Video<'a> {
     angle: u16,
     /// Depth of a bin, m.
     resolution_m: f32,
-    /// First bin.
     first: usize,
     /// Bytes per bin, 1 or 2.
     bin_bytes: usize,
@@ -94,60 +94,65 @@ fn encoder(angle: u16, encoder_size: u16) -> u16 {
     count.round() as u16 % size
 }
 
-/// The items of a message, from first to last.
 struct Items<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> Items<'a> {
-    fn take<const N: usize>(&mut self, item: &'static str) -> Result<[u8; N], MalformedDatagram> {
-        let (bytes, rest) = self
-            .rest
-            .split_first_chunk()
-            .ok_or(MalformedDatagram::Short(item))?;
+    fn take<const N: usize>(&mut self, item: &str) -> Result<[u8; N], Malformed> {
+        let split = self.rest.split_first_chunk();
+        let (bytes, rest) = split.ok_or_else(|| short(item))?;
         self.rest = rest;
         Ok(*bytes)
     }
 
-    fn bytes(&mut self, count: usize, item: &'static str) -> Result<&'a [u8], MalformedDatagram> {
-        let (bytes, rest) = self
-            .rest
-            .split_at_checked(count)
-            .ok_or(MalformedDatagram::Short(item))?;
+    fn bytes(&mut self, count: usize, item: &str) -> Result<&'a [u8], Malformed> {
+        let split = self.rest.split_at_checked(count);
+        let (bytes, rest) = split.ok_or_else(|| short(item))?;
         self.rest = rest;
         Ok(bytes)
     }
 
     /// Takes an item that begins with its own length, which it has at least; returns it without
     /// that byte.
-    fn counted(
-        &mut self,
-        item: &'static str,
-        at_least: usize,
-    ) -> Result<&'a [u8], MalformedDatagram> {
+    fn counted(&mut self, item: &str, at_least: usize) -> Result<&'a [u8], Malformed> {
         let [length] = self.take(item)?;
         match usize::from(length) {
             length if length >= at_least => self.bytes(length - 1, item),
-            _ => Err(MalformedDatagram::Short(item)),
+            _ => Err(short(item)),
         }
     }
 
-    /// Takes an item that begins with a number of blocks.
-    fn blocks(&mut self, block: usize, item: &'static str) -> Result<&'a [u8], MalformedDatagram> {
+    fn blocks(&mut self, block: usize, item: &str) -> Result<&'a [u8], Malformed> {
         let [blocks] = self.take(item)?;
         self.bytes(usize::from(blocks) * block, item)
     }
 }
 
+fn short(item: &str) -> Malformed {
+    Malformed::new(format!("a message ends within its item {item}"))
+}
+
+fn missing(item: &str) -> Malformed {
+    Malformed::new(format!("a message lacks the item {item}"))
+}
+
+fn bad_cells([cells, first, bytes, bins]: [usize; 4]) -> Malformed {
+    Malformed::new(format!(
+        "a message has {cells} bins from bin {first} in {bytes} bytes, of {bins} bins"
+    ))
+}
+
 /// Decodes a datagram; `None` if it is a message without powers, such as a summary.
-fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, MalformedDatagram> {
+fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     let mut items = Items { rest: datagram };
     let [category, l0, l1] = items.take("length")?;
     check_category(category, l0)?;
     let expected = usize::from(u16::from_be_bytes([l0, l1]));
     if expected != datagram.len() {
         let actual = datagram.len();
-        return Err(MalformedDatagram::Length { expected, actual });
+        let sentence = format!("a message of {expected} bytes is in a datagram of {actual}");
+        return Err(Malformed::new(sentence));
     }
     let has = features(&mut items)?;
     if has & 1 << 13 != 0 {
@@ -157,7 +162,7 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, MalformedDatagram> {
         return Ok(None);
     }
     if has & 1 << 11 == 0 {
-        return Err(MalformedDatagram::Missing("I240/020"));
+        return Err(missing("I240/020"));
     }
     let number = u32::from_be_bytes(items.take("I240/020")?);
     if has & 1 << 10 != 0 {
@@ -172,19 +177,13 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, MalformedDatagram> {
         items.counted("RE", 1)?;
     }
     if has & 1 == 0 {
-        return Err(MalformedDatagram::Missing("SP"));
+        return Err(missing("SP"));
     }
     let special = special(&mut items)?;
     let (first, bins) = (header.first, usize::from(special.bins));
     let cells = powers.len() / bin_bytes;
     if first.saturating_add(cells) > bins {
-        let bytes = powers.len();
-        return Err(MalformedDatagram::Cells {
-            cells,
-            first,
-            bytes,
-            bins,
-        });
+        return Err(bad_cells([cells, first, powers.len(), bins]));
     }
     Ok(Some(Video {
         number,
@@ -197,18 +196,20 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, MalformedDatagram> {
     }))
 }
 
-fn check_category(category: u8, second: u8) -> Result<(), MalformedDatagram> {
-    match category {
-        CATEGORY => Ok(()),
-        COLOSSUS_UDP_VERSION if COLOSSUS_UDP_IDS.contains(&second) => {
-            Err(MalformedDatagram::Colossus { id: second })
+fn check_category(category: u8, second: u8) -> Result<(), Malformed> {
+    Err(Malformed::new(match category {
+        CATEGORY => return Ok(()),
+        COLOSSUS_UDP_VERSION if COLOSSUS_UDP_IDS.contains(&second) => format!(
+            "Navtech's message {second} by UDP carries no powers: set the radar's data output to CAT-240"
+        ),
+        other => {
+            format!("a datagram begins with {other}, expected the category {CATEGORY} of ASTERIX")
         }
-        other => Err(MalformedDatagram::Category(other)),
-    }
+    }))
 }
 
 /// Returns which items follow: 14 bits, the first item in the highest one.
-fn features(items: &mut Items<'_>) -> Result<u16, MalformedDatagram> {
+fn features(items: &mut Items<'_>) -> Result<u16, Malformed> {
     let [first] = items.take("FSPEC")?;
     let second = match first & 1 {
         0 => 0,
@@ -216,7 +217,7 @@ fn features(items: &mut Items<'_>) -> Result<u16, MalformedDatagram> {
     };
     if second & 1 != 0 {
         // The specification has no third byte.
-        return Err(MalformedDatagram::Missing("end of FSPEC"));
+        return Err(missing("end of FSPEC"));
     }
     Ok(u16::from(first >> 1) << 7 | u16::from(second >> 1))
 }
@@ -227,14 +228,13 @@ struct Header {
     resolution_m: f32,
 }
 
-/// Takes the video header, in nanoseconds or femtoseconds.
-fn header(items: &mut Items<'_>, has: u16) -> Result<Header, MalformedDatagram> {
+fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
     let (bytes, per_second): ([u8; 12], f64) = if has & 1 << 9 != 0 {
         (items.take("I240/040")?, NANO)
     } else if has & 1 << 8 != 0 {
         (items.take("I240/041")?, FEMTO)
     } else {
-        return Err(MalformedDatagram::Missing("I240/041"));
+        return Err(missing("I240/041"));
     };
     let [a0, a1, _, _, f0, f1, f2, f3, d0, d1, d2, d3] = bytes;
     let duration = u32::from_be_bytes([d0, d1, d2, d3]);
@@ -248,9 +248,9 @@ fn header(items: &mut Items<'_>, has: u16) -> Result<Header, MalformedDatagram> 
 }
 
 /// Takes the powers, without the padding of their blocks.
-fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), MalformedDatagram> {
+fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malformed> {
     if has & 1 << 7 == 0 {
-        return Err(MalformedDatagram::Missing("I240/048"));
+        return Err(missing("I240/048"));
     }
     let [compression, resolution] = items.take("I240/048")?;
     let compressed = compression & 0x80 != 0;
@@ -258,14 +258,13 @@ fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malfo
         (false, 4) => 1,
         (false, 5) => 2,
         _ => {
-            return Err(MalformedDatagram::Resolution {
-                resolution,
-                compressed,
-            });
+            return Err(Malformed::new(format!(
+                "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
+            )));
         }
     };
     if has & 1 << 6 == 0 {
-        return Err(MalformedDatagram::Missing("I240/049"));
+        return Err(missing("I240/049"));
     }
     let [b0, b1, c0, c1, c2] = items.take("I240/049")?;
     let bytes = usize::from(u16::from_be_bytes([b0, b1]));
@@ -277,16 +276,11 @@ fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malfo
         }
     }
     let powers = blocks.get(..bytes).filter(|_| bytes == cells * bin_bytes);
-    let powers = powers.ok_or(MalformedDatagram::Cells {
-        cells,
-        first: 0,
-        bytes,
-        bins: MAX_PAYLOAD_BYTES,
-    })?;
+    let powers = powers.ok_or_else(|| bad_cells([cells, 0, bytes, MAX_PAYLOAD_BYTES]))?;
     Ok((bin_bytes, powers))
 }
 
-fn special(items: &mut Items<'_>) -> Result<Special, MalformedDatagram> {
+fn special(items: &mut Items<'_>) -> Result<Special, Malformed> {
     let field = items.counted("SP", SPECIAL_BYTES)?;
     let short = |at: usize| u16::from_be_bytes([field[at], field[at + 1]]);
     let long = |at: usize| [field[at], field[at + 1], field[at + 2], field[at + 3]];

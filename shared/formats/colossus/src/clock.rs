@@ -1,6 +1,4 @@
-//! The time of each azimuth. The time format of a radar depends on its software and on its network:
-//! the byte order of the seconds, the unit of their fraction, and whether the radar has the time at
-//! all.
+//! The time of each azimuth, in a format that depends on the radar's software and network.
 
 use std::{fmt, iter};
 
@@ -24,23 +22,12 @@ pub enum ByteOrder {
     /// Least significant byte first.
     #[default]
     Little,
-    /// Most significant byte first.
     Big,
-}
-
-impl fmt::Display for ByteOrder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Little => "little-endian",
-            Self::Big => "big-endian",
-        })
-    }
 }
 
 /// The unit of split seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplitUnit {
-    /// Nanoseconds.
     #[default]
     Nanoseconds,
     Microseconds,
@@ -55,15 +42,6 @@ impl SplitUnit {
     }
 }
 
-impl fmt::Display for SplitUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Nanoseconds => "nanoseconds",
-            Self::Microseconds => "microseconds",
-        })
-    }
-}
-
 /// The encoding of an azimuth's time. The default is what most radars send.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockFormat {
@@ -71,6 +49,19 @@ pub struct ClockFormat {
     pub order: ByteOrder,
     /// Unit of the split seconds.
     pub unit: SplitUnit,
+}
+
+impl fmt::Display for ClockFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match (self.order, self.unit) {
+            (ByteOrder::Little, SplitUnit::Nanoseconds) => "little-endian seconds and nanoseconds",
+            (ByteOrder::Little, SplitUnit::Microseconds) => {
+                "little-endian seconds and microseconds"
+            }
+            (ByteOrder::Big, SplitUnit::Nanoseconds) => "big-endian seconds and nanoseconds",
+            (ByteOrder::Big, SplitUnit::Microseconds) => "big-endian seconds and microseconds",
+        })
+    }
 }
 
 impl ClockFormat {
@@ -99,7 +90,6 @@ impl ClockFormat {
         })
     }
 
-    /// Returns whether the split seconds are less than a second.
     fn holds(self, azimuth: &Azimuth<'_>) -> bool {
         self.number(azimuth.split_seconds) * self.unit.ns() < SECOND_NS
     }
@@ -112,7 +102,6 @@ impl ClockFormat {
 /// The clock of a radar. Its `Display` is one sentence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FoundClock {
-    /// The radar has the time.
     Unix(ClockFormat),
     /// The radar measures time from another start, such as its own. The host's time at the first
     /// azimuth is added.
@@ -124,12 +113,10 @@ pub enum FoundClock {
 impl fmt::Display for FoundClock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unix(ClockFormat { order, unit }) => {
-                write!(f, "The radar sends its time as {order} seconds and {unit}.")
-            }
-            Self::Uptime(ClockFormat { order, unit }) => write!(
+            Self::Unix(format) => write!(f, "The radar sends its time as {format}."),
+            Self::Uptime(format) => write!(
                 f,
-                "The radar does not know the time: its {order} seconds and {unit} are counted from this host's time at the first azimuth."
+                "The radar does not know the time: its {format} are counted from this host's time at the first azimuth."
             ),
             Self::Arrival => f.write_str(
                 "The radar's time does not advance as it turns: azimuths have this host's time at which they arrive.",
@@ -152,7 +139,6 @@ pub struct RadarClock {
     found: Option<FoundClock>,
     /// Host's time minus radar's time; 0 if the radar has the time.
     offset_ns: i64,
-    /// The first azimuths with their times of arrival, until the clock is found.
     held: Vec<(KeptAzimuth, i64)>,
 }
 
@@ -218,17 +204,12 @@ impl RadarClock {
         }
     }
 
-    /// Finds the clock from this azimuth and one held back, or holds this one back too.
     fn find(&mut self, azimuth: &Azimuth<'_>, arrived_ns: i64) {
-        let format = self
-            .held
-            .iter()
-            .find_map(|(earlier, _)| self.format(&earlier.azimuth(), azimuth, arrived_ns));
+        let of = |earlier: &KeptAzimuth| self.format(&earlier.azimuth(), azimuth, arrived_ns);
+        let format = self.held.iter().find_map(|(earlier, _)| of(earlier));
         if let (Some(format), Some((first, first_arrived_ns))) = (format, self.held.first()) {
-            let first = first.azimuth();
-            let unix = format.is_unix(azimuth);
-            self.offset_ns = first_arrived_ns.saturating_sub(format.ns(&first));
-            self.found = Some(match unix {
+            self.offset_ns = first_arrived_ns.saturating_sub(format.ns(&first.azimuth()));
+            self.found = Some(match format.is_unix(azimuth) {
                 true => FoundClock::Unix(format),
                 false => FoundClock::Uptime(format),
             });
@@ -267,11 +248,10 @@ impl RadarClock {
             let from_host_ns = format.ns(later).abs_diff(arrived_ns);
             fits.then_some((apart, !format.is_unix(later), from_host_ns, format))
         });
-        candidates
-            .min_by(|a, b| {
-                let nearest = a.0.total_cmp(&b.0);
-                nearest.then((a.1, a.2).cmp(&(b.1, b.2)))
-            })
-            .map(|(.., format)| format)
+        let nearest = candidates.min_by(|a, b| {
+            let nearest = a.0.total_cmp(&b.0);
+            nearest.then((a.1, a.2).cmp(&(b.1, b.2)))
+        });
+        nearest.map(|(.., format)| format)
     }
 }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use gyre_radar::MAX_AZIMUTHS;
 use thiserror::Error;
 
-use crate::malformed::{MalformedMessage, head};
+use crate::malformed::{Malformed, head};
 use crate::protobuf::fields;
 
 /// Bytes before the protobuf.
@@ -74,43 +74,32 @@ impl Configuration {
 
     /// Rejects numbers that make no scan.
     pub fn check(&self) -> Result<(), BadConfiguration> {
-        let check = |what, value: f64, bounds: RangeInclusive<f64>| match bounds.contains(&value) {
-            true => Ok(()),
-            false => Err(BadConfiguration {
+        let (azimuths, any) = (f64::from(self.azimuth_samples), f64::from(u16::MAX));
+        let (bins, counts) = (self.range_in_bins.into(), self.encoder_size.into());
+        let (mhz, bin_m) = (self.rotation_mhz.into(), self.range_resolution_m().into());
+        let (most, least) = (MAX_AZIMUTHS as f64, azimuths.max(16.0));
+        let checks: [(_, f64, _); 5] = [
+            ("the number of azimuths", azimuths, 2.0..=most),
+            ("the number of range bins", bins, 1.0..=any),
+            // Fewer counts than azimuths: two azimuths would have the same count.
+            ("the encoder counts per turn", counts, least..=any),
+            // A slower sweep lasts longer than motions are searched.
+            ("the rotation in mHz", mhz, 100.0..=any),
+            ("the depth of a range bin in m", bin_m, 1e-3..=10.0),
+        ];
+        let mut checks = checks.into_iter();
+        match checks.find(|(_, value, bounds)| !bounds.contains(value)) {
+            None => Ok(()),
+            Some((what, value, bounds)) => Err(BadConfiguration {
                 what,
                 value,
                 bounds,
             }),
-        };
-        let (azimuths, any) = (f64::from(self.azimuth_samples), f64::from(u16::MAX));
-        check(
-            "the number of azimuths",
-            azimuths,
-            2.0..=MAX_AZIMUTHS as f64,
-        )?;
-        check(
-            "the number of range bins",
-            self.range_in_bins.into(),
-            1.0..=any,
-        )?;
-        // Fewer counts than azimuths: two azimuths would have the same count.
-        let counts = self.encoder_size.into();
-        check(
-            "the encoder counts per turn",
-            counts,
-            azimuths.max(16.0)..=any,
-        )?;
-        // A slower sweep lasts longer than motions are searched.
-        check("the rotation in mHz", self.rotation_mhz.into(), 100.0..=any)?;
-        check(
-            "the depth of a range bin in m",
-            self.range_resolution_m().into(),
-            1e-3..=10.0,
-        )
+        }
     }
 }
 
-pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> {
+pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, Malformed> {
     let head: [u8; CONFIGURATION_BYTES] = head("a configuration", payload)?;
     let number = |k: usize| u16::from_be_bytes([head[2 * k], head[2 * k + 1]]);
     let float =
@@ -129,7 +118,7 @@ pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> 
 }
 
 /// Returns the range resolution in a protobuf; all other fields are skipped.
-fn resolution(protobuf: &[u8]) -> Result<Option<f32>, MalformedMessage> {
+fn resolution(protobuf: &[u8]) -> Result<Option<f32>, Malformed> {
     let mut found = None;
     fields("a configuration", protobuf, |number, value| {
         if number == RESOLUTION_FIELD {
@@ -145,6 +134,12 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    fn assert_malformed(protobuf: &[u8], at: usize) {
+        let refused = resolution(protobuf).unwrap_err().to_string();
+        let expected = format!("the protobuf of a configuration is malformed at byte {at}");
+        assert_eq!(refused, expected, "{protobuf:?}");
+    }
+
     #[test]
     fn the_resolution_is_found_among_fields_of_all_types() {
         let float = 0.04381_f32.to_le_bytes();
@@ -159,11 +154,7 @@ mod tests {
         assert_eq!(resolution(&[]).unwrap(), None);
         assert_eq!(resolution(&bytes[..3]).unwrap(), None);
         for (cut, at) in [(2, 0), (5, 3), (15, 12), (24, 22), (26, 22)] {
-            let malformed = MalformedMessage::Protobuf {
-                message: "a configuration",
-                at,
-            };
-            assert_eq!(resolution(&bytes[..cut]), Err(malformed), "{cut}");
+            assert_malformed(&bytes[..cut], at);
         }
     }
 
@@ -179,11 +170,7 @@ mod tests {
             &[0xff; 20],
             &lengths,
         ] {
-            let malformed = MalformedMessage::Protobuf {
-                message: "a configuration",
-                at: 0,
-            };
-            assert_eq!(resolution(bytes), Err(malformed), "{bytes:?}");
+            assert_malformed(bytes, 0);
         }
     }
 }

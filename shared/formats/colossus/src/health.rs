@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::malformed::MalformedMessage;
+use crate::malformed::Malformed;
 use crate::protobuf::{Value, fields};
 
 const MESSAGE: &str = "health";
@@ -44,11 +44,9 @@ pub struct Reading {
 /// The quality of a reading, as the radar judges it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HealthStatus {
-    /// It is beyond its limits.
     Unhealthy,
     Warning,
     Healthy,
-    /// The radar does not report it.
     #[default]
     Unknown,
 }
@@ -72,7 +70,7 @@ impl Health {
     }
 }
 
-pub(crate) fn decode(payload: &[u8]) -> Result<Health, MalformedMessage> {
+pub(crate) fn decode(payload: &[u8]) -> Result<Health, Malformed> {
     let mut health = Health::default();
     fields(MESSAGE, payload, |number, value| {
         let place = READINGS.iter().position(|(field, _)| *field == number);
@@ -92,7 +90,7 @@ pub(crate) fn decode(payload: &[u8]) -> Result<Health, MalformedMessage> {
     Ok(health)
 }
 
-fn reading(protobuf: &[u8]) -> Result<Reading, MalformedMessage> {
+fn reading(protobuf: &[u8]) -> Result<Reading, Malformed> {
     let mut reading = Reading::default();
     fields(MESSAGE, protobuf, |number, value| {
         match number {

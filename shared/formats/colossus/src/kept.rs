@@ -2,7 +2,6 @@
 
 use crate::message::{Azimuth, Powers};
 
-/// A copy of an azimuth. Its memory is used again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KeptAzimuth {
     sweep_counter: u16,

@@ -4,8 +4,7 @@
 
 use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
-use crate::malformed::{AZIMUTH_BYTES, MalformedMessage, head};
-use crate::navigation::{self, Navigation};
+use crate::malformed::{Malformed, head};
 
 /// The TCP port of a radar.
 pub const PORT: u16 = 6317;
@@ -18,6 +17,8 @@ pub(crate) const SIGNATURE: [u8; 16] = [
 pub(crate) const VERSION: u8 = 1;
 /// Signature, version, id, payload size.
 pub(crate) const HEADER_BYTES: usize = 22;
+/// Bytes before the powers of an azimuth, at least.
+pub(crate) const AZIMUTH_BYTES: usize = 14;
 
 pub(crate) mod id {
     pub(crate) const KEEP_ALIVE: u8 = 1;
@@ -25,24 +26,19 @@ pub(crate) mod id {
     pub(crate) const AZIMUTH: u8 = 30;
     pub(crate) const AZIMUTH_16_BIT: u8 = 31;
     pub(crate) const HEALTH: u8 = 40;
-    pub(crate) const NAVIGATION: u8 = 123;
 }
 
 /// A message of a radar or of a client.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message<'a> {
-    /// The connection is alive: id 1.
     KeepAlive,
     /// The radar's description of itself: id 10.
     Configuration(Configuration),
-    /// The powers of one azimuth: id 30 (8 bits) or 31 (16 bits).
     Azimuth(Azimuth<'a>),
     /// A client's request.
     Request(Request),
     /// The radar's health: id 40.
     Health(Health),
-    /// Peaks that the radar has found in an azimuth: id 123.
-    Navigation(Navigation<'a>),
     Other {
         id: u8,
         /// The bytes.
@@ -60,7 +56,6 @@ pub enum Request {
     /// Send the health every 10 s.
     StartHealth = 23,
     StopHealth = 24,
-    /// Send azimuths of full length: no contours, which may vary in their number of bins.
     StartNonContourFft = 140,
 }
 
@@ -122,7 +117,7 @@ impl<'a> Powers<'a> {
     }
 }
 
-pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
+pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, Malformed> {
     if let Some(request) = Request::ALL.into_iter().find(|r| r.id() == id) {
         return Ok(Message::Request(request));
     }
@@ -134,12 +129,13 @@ pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
             let azimuth = azimuth(payload, Powers::Sixteen)?;
             let bytes = azimuth.powers.bytes().len();
             if bytes % 2 != 0 {
-                return Err(MalformedMessage::OddBytes { bytes });
+                return Err(Malformed::new(format!(
+                    "an azimuth of 16-bit powers has {bytes} bytes of powers, an odd number"
+                )));
             }
             Message::Azimuth(azimuth)
         }
         id::HEALTH => Message::Health(health::decode(payload)?),
-        id::NAVIGATION => Message::Navigation(navigation::decode(payload)?),
         id => Message::Other { id, payload },
     })
 }
@@ -147,17 +143,18 @@ pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
 fn azimuth<'a>(
     payload: &'a [u8],
     powers: impl Fn(&'a [u8]) -> Powers<'a>,
-) -> Result<Azimuth<'a>, MalformedMessage> {
+) -> Result<Azimuth<'a>, Malformed> {
     let head: [u8; AZIMUTH_BYTES] = head("an azimuth", payload)?;
     let [o0, o1, c0, c1, e0, e1, s0, s1, s2, s3, p0, p1, p2, p3] = head;
     let offset = u16::from_be_bytes([o0, o1]);
-    let bytes = payload
-        .get(offset.into()..)
-        .filter(|_| usize::from(offset) >= AZIMUTH_BYTES)
-        .ok_or(MalformedMessage::DataOffset {
-            offset,
-            payload_bytes: payload.len(),
-        })?;
+    let bytes = payload.get(offset.into()..);
+    let bytes = bytes.filter(|_| usize::from(offset) >= AZIMUTH_BYTES);
+    let bytes = bytes.ok_or_else(|| {
+        let all = payload.len();
+        Malformed::new(format!(
+            "the powers of an azimuth begin at byte {offset} of a payload of {all} bytes, expected {AZIMUTH_BYTES} or more"
+        ))
+    })?;
     Ok(Azimuth {
         sweep_counter: u16::from_be_bytes([c0, c1]),
         encoder: u16::from_be_bytes([e0, e1]),

@@ -1,11 +1,10 @@
 //! The fields of a protobuf.
 
-use crate::malformed::MalformedMessage;
+use crate::malformed::Malformed;
 
 /// The wire type of a float.
 pub(crate) const FOUR_BYTES: u64 = 5;
 
-/// The value of a field, as far as its wire type determines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value<'a> {
     Number(u64),
@@ -33,22 +32,24 @@ impl Value<'_> {
 /// Calls `each` with number and value of each field, in order. The last one of a number counts, as
 /// protobuf requires.
 pub(crate) fn fields<'a>(
-    message: &'static str,
+    message: &str,
     protobuf: &'a [u8],
-    mut each: impl FnMut(u64, Value<'a>) -> Result<(), MalformedMessage>,
-) -> Result<(), MalformedMessage> {
+    mut each: impl FnMut(u64, Value<'a>) -> Result<(), Malformed>,
+) -> Result<(), Malformed> {
     let mut rest = protobuf;
     while !rest.is_empty() {
-        let at = protobuf.len() - rest.len();
-        let malformed = MalformedMessage::Protobuf { message, at };
-        let (number, value, after) = field(rest).ok_or(malformed)?;
+        let (number, value, after) = field(rest).ok_or_else(|| {
+            let at = protobuf.len() - rest.len();
+            Malformed::new(format!(
+                "the protobuf of {message} is malformed at byte {at}"
+            ))
+        })?;
         each(number, value)?;
         rest = after;
     }
     Ok(())
 }
 
-/// Returns number and value of the first field, and what follows.
 fn field(protobuf: &[u8]) -> Option<(u64, Value<'_>, &[u8])> {
     let (tag, rest) = varint(protobuf)?;
     let number = tag >> 3;

@@ -1,7 +1,5 @@
-//! Azimuths to scans.
-//!
-//! Angles, times and scales equal a recording of the same azimuths, to the bit: see
-//! [`gyre_datasets::open`].
+//! Azimuths to scans, whose angles, times and scales equal a recording of the same azimuths, to the
+//! bit.
 
 mod counters;
 mod powers;
@@ -13,7 +11,6 @@ use std::cmp::Ordering;
 use gyre_datasets::{DatasetOptions, correct_eccentricity, middle_ns};
 use gyre_radar::{ScanLimits, ScanSlot, Sense, SweepGeometry};
 
-use crate::clock::ByteOrder;
 use crate::configuration::{BadConfiguration, Configuration};
 use crate::kept::KeptAzimuth;
 use crate::message::Azimuth;
@@ -55,17 +52,14 @@ pub struct Sweep {
     pub missing: usize,
 }
 
-/// The fate of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// Dropped: the sweep has begun before.
     Waiting,
     Open,
-    /// Dropped: the sweep is complete.
     Complete,
 }
 
-/// Encoder count and time of an azimuth.
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     encoder: u16,
@@ -83,7 +77,6 @@ pub struct SweepAssembler {
     range_resolution_m: f32,
     state: State,
     last: Option<Reading>,
-    /// The first azimuth of the next sweep, where the last one was returned in its place.
     kept: Option<(Reading, Seam)>,
     kept_azimuth: KeptAzimuth,
     counters: Counters,
@@ -117,7 +110,7 @@ impl SweepAssembler {
 
     /// Returns the memory that a scan needs.
     pub fn limits(&self) -> ScanLimits {
-        self.rows.limits()
+        self.rows.limits
     }
 
     /// Returns the losses, drops and changes so far.
@@ -128,8 +121,7 @@ impl SweepAssembler {
     /// Returns the number of azimuths from the last one to the end of its turn; `None` before the
     /// first one. No scan is complete before they are there.
     pub fn azimuths_left(&self) -> Option<f64> {
-        let last = self.last?;
-        Some(self.grid.azimuths_after(last))
+        Some(self.grid.azimuths_after(self.last?))
     }
 
     /// Returns whether the turn of the newest azimuth can still become a scan.
@@ -141,14 +133,7 @@ impl SweepAssembler {
     /// begins there has all of the turn.
     pub fn is_first(&self, count: u16) -> bool {
         let encoder = self.grid.encoder(count);
-        encoder.is_some_and(|encoder| self.grid.is_first(encoder))
-    }
-
-    /// Returns the order of the two bytes of 16-bit powers, once it is known. The order is
-    /// undocumented: it is the order that gives smaller differences between neighbouring bins. In
-    /// the wrong order the noise of the less significant byte is the more significant one.
-    pub fn power_order(&self) -> Option<ByteOrder> {
-        self.rows.order.decided()
+        encoder.is_some_and(|it| self.grid.is_first(it))
     }
 
     /// Writes an azimuth, and returns the sweep that is complete with it. An azimuth of the next
@@ -194,11 +179,9 @@ impl SweepAssembler {
         } else {
             self.last = Some(here);
             self.state = State::Waiting;
-            self.counters.discarded_azimuths += 1;
         }
     }
 
-    /// Adds an azimuth of the same turn as the last.
     fn proceed(
         &mut self,
         last: Reading,
@@ -208,16 +191,16 @@ impl SweepAssembler {
     ) -> Option<Sweep> {
         self.last = Some(here);
         match self.state {
-            State::Waiting => self.counters.discarded_azimuths += 1,
+            State::Waiting => {}
             State::Complete => self.counters.surplus_azimuths += 1,
             State::Open if self.grid.is_break(last, here) => {
                 self.counters.broken_sweeps += 1;
                 self.start(here, azimuth, slot);
             }
             State::Open => {
-                let gap = self.grid.gap(last, here);
                 let fits = self.rows.left().saturating_sub(1);
-                self.rows.write_empty(gap.forward(last, fits), slot);
+                let gap = self.grid.gap(last, here);
+                self.rows.write_empty(gap, fits, slot);
                 self.write(here, azimuth, slot);
             }
         }
@@ -234,8 +217,8 @@ impl SweepAssembler {
     ) -> Option<Sweep> {
         let seam = self.grid.seam(last, here);
         if self.state == State::Open {
-            self.rows
-                .write_empty(seam.trailing(last, self.rows.left()), slot);
+            let fits = self.rows.left();
+            self.rows.write_empty(seam.trailing(last), fits, slot);
             if let Some(sweep) = self.finish(slot) {
                 self.kept_azimuth.keep(azimuth);
                 self.kept = Some((here, seam));
@@ -260,7 +243,8 @@ impl SweepAssembler {
         self.last = Some(here);
         self.rows.clear();
         let fits = self.rows.left().saturating_sub(1);
-        self.rows.write_empty(seam.leading(here, fits), slot);
+        let empty = seam.leading(here, fits);
+        self.rows.write_empty(empty, fits, slot);
         self.write(here, azimuth, slot);
     }
 
@@ -272,8 +256,7 @@ impl SweepAssembler {
 
     /// Returns the sweep if no further azimuth fits.
     fn completed(&mut self, slot: &mut ScanSlot<'_>) -> Option<Sweep> {
-        let last = self.last?;
-        let ended = self.rows.left() == 0 || self.grid.is_last(last);
+        let ended = self.rows.left() == 0 || self.grid.is_last(self.last?);
         match self.state == State::Open && ended {
             true => self.finish(slot),
             false => None,
@@ -283,9 +266,8 @@ impl SweepAssembler {
     /// Ends the sweep, and returns it unless most of it is missing.
     fn finish(&mut self, slot: &mut ScanSlot<'_>) -> Option<Sweep> {
         self.state = State::Complete;
-        let (azimuths, missing) = (self.rows.written(), self.rows.missing());
-        let limits = self.rows.limits();
-        if 2 * (azimuths - missing) < limits.azimuths {
+        let (azimuths, missing) = (self.rows.written, self.rows.missing);
+        if 2 * (azimuths - missing) < self.rows.limits.azimuths {
             self.counters.incomplete_sweeps += 1;
             return None;
         }
@@ -293,7 +275,7 @@ impl SweepAssembler {
         self.counters.missing_azimuths += missing as u64;
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
         correct_eccentricity(azimuth_rad, self.constants.azimuth_eccentricity_rad);
-        let bins = self.rows.bins();
+        let bins = self.rows.bins;
         let geometry = SweepGeometry {
             azimuths,
             bins,

@@ -1,8 +1,9 @@
 //! Messages as bytes, appended to a buffer.
 
 use crate::configuration::{CONFIGURATION_BYTES, Configuration, RESOLUTION_FIELD};
-use crate::malformed::AZIMUTH_BYTES;
-use crate::message::{Azimuth, MAX_PAYLOAD_BYTES, Powers, Request, SIGNATURE, VERSION, id};
+use crate::message::{
+    AZIMUTH_BYTES, Azimuth, MAX_PAYLOAD_BYTES, Powers, Request, SIGNATURE, VERSION, id,
+};
 use crate::protobuf::FOUR_BYTES;
 
 /// Appends the configuration of a radar.

@@ -23,7 +23,6 @@ mod profiles;
 mod radiate;
 mod row_order;
 mod sensor_clock;
-
 mod stale;
 pub(crate) mod stamp;
 mod transposed;
@@ -33,6 +32,7 @@ use std::{ops::Range, path::Path};
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
+pub use dataset_toml::stored_options;
 pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -152,23 +152,21 @@ pub trait Dataset: Send {
 
 /// Checks that a slot is as large as the limits of a dataset.
 pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-    let slices = [
+    for (what, needed, actual) in [
         ("bytes", limits.bytes, slot.bytes.len()),
         ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
         ("stamps", limits.azimuths, slot.stamp_ns.len()),
         ("flags", limits.azimuths, slot.flags.len()),
-    ];
-    match slices
-        .into_iter()
-        .find(|(_, needed, actual)| actual < needed)
-    {
-        None => Ok(()),
-        Some((what, needed, actual)) => Err(ReadError::SlotTooSmall {
-            what,
-            needed,
-            actual,
-        }),
+    ] {
+        if actual < needed {
+            return Err(ReadError::SlotTooSmall {
+                what,
+                needed,
+                actual,
+            });
+        }
     }
+    Ok(())
 }
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
@@ -178,12 +176,6 @@ pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), Rea
 /// `dataset.toml` in the folder, if there is one.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     open_resolved(root, &options.or(&stored_options(root)?))
-}
-
-/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
-/// file.
-pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
-    dataset_toml::options(root)
 }
 
 /// Opens the dataset at `root` with these options only: the current `dataset.toml` is ignored.
@@ -225,10 +217,9 @@ fn open_found(
         format => match profiles::Profile::of(format) {
             Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),
             None => {
-                let path = found.folder.display();
-                return Err(OpenError::Recording(format!(
-                    "{path} is a folder of images, and the format `{format}` is not of images"
-                )));
+                let fault =
+                    format!("is a folder of images, and the format `{format}` is not of images");
+                return Err(OpenError::at(&found.folder, fault));
             }
         },
     })

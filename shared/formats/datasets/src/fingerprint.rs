@@ -29,15 +29,8 @@ impl Fingerprint {
         let (mut digest, mut bytes) = (Sha256::new(), 0);
         for index in 0..dataset.len() {
             let path = dataset.file(index);
-            let size = match fs::metadata(path) {
-                Ok(file) => file.len(),
-                Err(source) => {
-                    return Err(OpenError::Io {
-                        path: path.to_owned(),
-                        source,
-                    });
-                }
-            };
+            let file = fs::metadata(path).map_err(|source| OpenError::io(path, source))?;
+            let size = file.len();
             let name = path.file_name().unwrap_or_default().as_encoded_bytes();
             let stamp_ns = dataset.nominal_stamp_ns(index).unwrap_or(i64::MIN);
             digest.update((name.len() as u64).to_le_bytes());
@@ -61,34 +54,29 @@ impl Fingerprint {
     /// does not.
     pub fn difference(&self, now: &Self) -> Option<String> {
         let stamp = |ns: Option<i64>| ns.map_or("unknown".to_owned(), |ns| ns.to_string());
-        if self.format != now.format {
-            return Some(format!(
-                "its format was {} and is now {}",
-                self.format, now.format
-            ));
-        }
-        if self.scans != now.scans {
-            return Some(format!(
-                "it had {} scans and now has {}",
-                self.scans, now.scans
-            ));
-        }
-        for (which, begun, now) in [
-            ("first", self.first_stamp_ns, now.first_stamp_ns),
-            ("last", self.last_stamp_ns, now.last_stamp_ns),
+        let first = [self, now].map(|it| stamp(it.first_stamp_ns));
+        let last = [self, now].map(|it| stamp(it.last_stamp_ns));
+        let texts = |value: fn(&Self) -> String| [self, now].map(value);
+        // What comes before, between and behind the earlier and the present value.
+        for ([was, now], [before, between]) in [
+            (
+                texts(|it| it.format.to_string()),
+                ["its format was ", " and is now "],
+            ),
+            (
+                texts(|it| it.scans.to_string()),
+                ["it had ", " scans and now has "],
+            ),
+            (first, ["the time of its first scan was ", " and is now "]),
+            (last, ["the time of its last scan was ", " and is now "]),
+            (
+                texts(|it| it.bytes.to_string()),
+                ["its images had ", " bytes and now have "],
+            ),
         ] {
-            if begun != now {
-                let (begun, now) = (stamp(begun), stamp(now));
-                return Some(format!(
-                    "the time of its {which} scan was {begun} and is now {now}"
-                ));
+            if was != now {
+                return Some(format!("{before}{was}{between}{now}"));
             }
-        }
-        if self.bytes != now.bytes {
-            return Some(format!(
-                "its images had {} bytes and now have {}",
-                self.bytes, now.bytes
-            ));
         }
         (self.sha256 != now.sha256)
             .then(|| "the names, sizes or times of some of its scans are others".to_owned())

@@ -1,9 +1,4 @@
 //! The log of a GNSS receiver as a file, or in a bag.
-//!
-//! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
-//! - `table`: tables as CSV;
-//! - [`ReceivedFixes`]: the growing log of a live receiver;
-//! - `faults`: the faults of the fixes, and the removal of faulty fixes.
 
 mod faults;
 mod received;
@@ -72,34 +67,27 @@ impl GnssLog {
     /// Reads a log. The first row, or the number of columns, determines the format.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, is_plane) = Self::raw(path)?;
-        if let Some(reason) = raw.unreadable.are_most(raw.count()) {
-            let path = path.to_owned();
-            return Err(LogError::Unusable {
-                of: OF,
-                path,
-                reason,
-            });
+        match raw.unreadable.are_most(raw.count()) {
+            Some(reason) => Err(LogError::unusable(OF, path, reason)),
+            None => Self::usable(raw, is_plane, path),
         }
-        Self::usable(raw, is_plane, path)
     }
 
     /// Returns the fixes of a log as they stand there, and whether they are m east and north, and
     /// not degrees of latitude and longitude.
     fn raw(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
-        match path.is_dir() {
-            true => {
-                // The lines of the place and of the first two rows of its covariance.
-                let fix = |stamp_ns, [at, first, second]: [[f64; 3]; 3]| RawFix {
-                    stamp_ns,
-                    at: [at[0], at[1]],
-                    altitude_m: at[2],
-                    sigma_m: RawFix::sigma_of([first[0], second[1]]),
-                    ..RawFix::default()
-                };
-                Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
-            }
-            false => table::read(path),
+        if !path.is_dir() {
+            return table::read(path);
         }
+        // The lines of the place and of the first two rows of its covariance.
+        let fix = |stamp_ns, [at, first, second]: [[f64; 3]; 3]| RawFix {
+            stamp_ns,
+            at: [at[0], at[1]],
+            altitude_m: at[2],
+            sigma_m: RawFix::sigma_of([first[0], second[1]]),
+            ..RawFix::default()
+        };
+        Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
     }
 
     /// Returns all fixes of a log as one table.
@@ -194,11 +182,8 @@ impl GnssLog {
     fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> (Self, Option<LogError>) {
         let all = raw.count();
         let (fixes, plane, faults) = faults::examine(raw, is_plane);
-        let error = fixes.is_empty().then(|| LogError::Unusable {
-            of: OF,
-            path: path.to_owned(),
-            reason: faults.without_usable(all),
-        });
+        let unusable = || LogError::unusable(OF, path, faults.without_usable(all));
+        let error = fixes.is_empty().then(unusable);
         let log = Self {
             fixes,
             plane,

@@ -23,17 +23,13 @@ pub(crate) fn read<T, const N: usize>(
     lines: [usize; N],
     entry: impl Fn(i64, [[f64; 3]; N]) -> T,
 ) -> Result<Raw<T>, LogError> {
-    let unknown = |reason| LogError::Unknown {
-        of,
-        path: folder.to_owned(),
-        reason,
-    };
     let list = folder.with_extension("txt");
     if !list.is_file() {
         let list = list.display();
-        return Err(unknown(format!(
+        let reason = format!(
             "a folder as RADIATE's GPS_IMU_Twist needs the list of the times of its files beside it, {list}"
-        )));
+        );
+        return Err(LogError::unknown(of, folder, reason));
     }
     let mut raw = Raw::of(Vec::new());
     for (number, stamp_ns) in frame_stamps(&list)? {
@@ -46,12 +42,11 @@ pub(crate) fn read<T, const N: usize>(
         }
     }
     let is_empty = raw.entries.is_empty();
-    match is_empty && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none()) {
-        true => Err(unknown(
-            "the folder is empty: unpack the recording anew".to_owned(),
-        )),
-        false => Ok(raw),
+    if is_empty && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none()) {
+        let reason = "the folder is empty: unpack the recording anew";
+        return Err(LogError::unknown(of, folder, reason));
     }
+    Ok(raw)
 }
 
 /// Reads lines of three numbers; `None` if the file is missing, or of another form.

@@ -7,7 +7,6 @@ mod oxford;
 mod plane;
 mod tum;
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 pub use kitti::write_kitti;
@@ -15,6 +14,8 @@ pub use tum::{write_tum, write_tum_pose};
 
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
+
+use crate::logs::roots;
 
 /// Files of ground truth relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 9] = [
@@ -32,23 +33,10 @@ const PLACES: [&str; 9] = [
 /// The largest file: a month of poses at 10 Hz has 2.3 GB.
 const MAX_BYTES: u64 = 4 << 30;
 
-/// A trajectory that cannot be read.
+/// A trajectory that cannot be read: a sentence.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages explain the variants and fields")]
-pub enum TrajectoryError {
-    #[error("cannot read the trajectory {path}: {source}")]
-    Io { path: PathBuf, source: io::Error },
-    #[error(
-        "{path} is not a trajectory of a known format (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
-    )]
-    Unknown { path: PathBuf, reason: String },
-    #[error("{path}, line {line}: {reason}")]
-    Line {
-        path: PathBuf,
-        line: usize,
-        reason: String,
-    },
-}
+#[error("{0}")]
+pub struct TrajectoryError(String);
 
 /// An error in a line (from 1); the caller adds the path of the file.
 #[derive(Debug)]
@@ -57,59 +45,59 @@ struct LineError {
     reason: String,
 }
 
-/// Parses a format of trajectory files.
+impl LineError {
+    fn new(line: usize, reason: impl Into<String>) -> Self {
+        let reason = reason.into();
+        Self { line, reason }
+    }
+}
+
 type Parse = fn(&str) -> Result<Trajectory, LineError>;
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
 /// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward):
 /// their plane of motion is found. Of a folder, its ground truth is read.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let failed = |source| TrajectoryError::Io {
-        path: path.to_owned(),
-        source,
+    let failed = |reason: String| {
+        let path = path.display();
+        TrajectoryError(format!("cannot read the trajectory {path}: {reason}"))
     };
     let missing = "it is a folder without a ground truth at a usual place: name the file";
     let file = match path.is_dir() {
-        true => find_ground_truth(path).ok_or_else(|| failed(io::Error::other(missing)))?,
+        true => find_ground_truth(path).ok_or_else(|| failed(missing.to_owned()))?,
         false => path.to_owned(),
     };
-    let text = gyre_storage::read_text(&file, MAX_BYTES).map_err(failed)?;
+    let text = gyre_storage::read_text(&file, MAX_BYTES).map_err(|e| failed(e.to_string()))?;
     parse_trajectory(&text, &file)
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let parse = detect(text).map_err(|reason| TrajectoryError::Unknown {
-        path: path.to_owned(),
-        reason,
-    })?;
+    let name = path.display();
+    let unknown = |reason: String| {
+        let formats =
+            "Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI";
+        TrajectoryError(format!(
+            "{name} is not a trajectory of a known format ({formats}): {reason}"
+        ))
+    };
+    let parse = detect(text).map_err(unknown)?;
     let parsed = parse(text).and_then(|trajectory| {
         check_places(text, &trajectory)?;
         Ok(trajectory)
     });
-    parsed.map_err(|LineError { line, reason }| TrajectoryError::Line {
-        path: path.to_owned(),
-        line,
-        reason,
+    parsed.map_err(|LineError { line, reason }| {
+        TrajectoryError(format!("{name}, line {line}: {reason}"))
     })
 }
 
 /// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be
 /// the folder of images.
 pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
-    let above = root
-        .file_name()
-        .and_then(|n| n.to_str())
-        .is_some_and(|n| ["radar", "Navtech_Polar", "navtech", "polar"].contains(&n));
-    let roots = [Some(root), root.parent().filter(|_| above)];
-    roots
-        .into_iter()
-        .flatten()
-        .flat_map(|root| PLACES.iter().map(|p| root.join(p)))
-        .find(|path| path.is_file())
+    let mut places = roots(root).flat_map(|root| PLACES.map(|place| root.join(place)));
+    places.find(|path| path.is_file())
 }
 
-/// Rejects one time for several places.
 fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     let mut first = 0;
@@ -122,18 +110,15 @@ fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
         if apart_m > MAX_APART_M {
             let header = lines(text).count().saturating_sub(stamps.len());
             let line = lines(text).nth(header + index);
-            return Err(LineError {
-                line: line.map_or(0, |(line, _)| line),
-                reason: format!(
-                    "its place is {apart_m:.1} m from another one of the same time: the times are rounded, and need three decimals of a second or more"
-                ),
-            });
+            let reason = format!(
+                "its place is {apart_m:.1} m from another one of the same time: the times are rounded, and need three decimals of a second or more"
+            );
+            return Err(LineError::new(line.map_or(0, |(line, _)| line), reason));
         }
     }
     Ok(())
 }
 
-/// Returns the parser for the format of the first line.
 fn detect(text: &str) -> Result<Parse, String> {
     let (_, first) = lines(text).next().ok_or("it is empty")?;
     let commas = first.split(',').count();
@@ -153,13 +138,12 @@ fn detect(text: &str) -> Result<Parse, String> {
 /// of other formats.
 fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
     // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
-    let is_decimal = |word: &str| match word.split_once(',') {
-        Some((whole, fraction)) => {
-            whole.parse::<i64>().is_ok()
-                && fraction.starts_with(|c: char| c.is_ascii_digit())
-                && word.replace(',', ".").parse::<f64>().is_ok()
-        }
-        None => false,
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    let is_decimal = |word: &str| {
+        let parts = word.split_once(',');
+        let has_digit = |fraction: &str| fraction.starts_with(|c: char| c.is_ascii_digit());
+        parts.is_some_and(|(whole, fraction)| whole.parse::<i64>().is_ok() && has_digit(fraction))
+            && is_number(&word.replace(',', "."))
     };
     let columns = |count| match count {
         8 => "8 columns (TUM)",
@@ -170,7 +154,7 @@ fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), Stri
             "the numbers in its {} have decimal commas, and need decimal points: `sed 's/,/./g'` makes them",
             columns(words)
         )),
-        1 if matches!(commas, 8 | 12) && first.split(',').all(|word| word.trim().parse::<f64>().is_ok()) => {
+        1 if matches!(commas, 8 | 12) && first.split(',').all(|word| is_number(word.trim())) => {
             Err(format!("its {} are parted by commas, and need spaces: `sed 's/,/ /g'` makes them", columns(commas)))
         }
         1 => Ok(()),
@@ -184,10 +168,8 @@ fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), Stri
 
 /// Returns the non-empty lines, numbered from 1; `#` starts a comment.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines()
-        .enumerate()
-        .map(|(i, l)| (i + 1, l.trim()))
-        .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
+    let lines = (1..).zip(text.lines().map(str::trim));
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
 /// The largest distance between places of one time, m: poses may be repeated.
@@ -201,29 +183,18 @@ fn numbers<'a, const N: usize>(
     line: usize,
     fields: impl Iterator<Item = &'a str>,
 ) -> Result<[f64; N], LineError> {
-    let (mut values, mut count) = ([0.0; N], 0);
-    for field in fields {
+    let number = |field: &str| {
         let value = field.trim().parse::<f64>().ok();
-        let value = value.filter(|value| value.abs() <= LARGEST);
-        let value = value.ok_or_else(|| LineError {
-            line,
-            reason: format!(
-                "{} is not a number from -{LARGEST:e} to {LARGEST:e}",
-                quoted(field)
-            ),
-        })?;
-        if let Some(into) = values.get_mut(count) {
-            *into = value;
-        }
-        count += 1;
-    }
-    match count {
-        _ if count == N => Ok(values),
-        _ => Err(LineError {
-            line,
-            reason: format!("{count} columns instead of {N}"),
-        }),
-    }
+        value.filter(|value| value.abs() <= LARGEST).ok_or_else(|| {
+            let field = quoted(field);
+            let reason = format!("{field} is not a number from -{LARGEST:e} to {LARGEST:e}");
+            LineError::new(line, reason)
+        })
+    };
+    let values = fields.map(number).collect::<Result<Vec<_>, _>>()?;
+    let count = values.len();
+    let wrong = |_| LineError::new(line, format!("{count} columns instead of {N}"));
+    values.try_into().map_err(wrong)
 }
 
 /// Returns the columns of a csv with the given names.
@@ -231,23 +202,15 @@ fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N],
     let mut found = [0; N];
     for (into, name) in found.iter_mut().zip(names) {
         let position = header.split(',').position(|h| h.trim() == name);
-        *into = position.ok_or_else(|| LineError {
-            line: 1,
-            reason: format!("the header has no column {name}"),
-        })?;
+        let missing = || LineError::new(1, format!("the header has no column {name}"));
+        *into = position.ok_or_else(missing)?;
     }
     Ok(found)
 }
 
-/// Returns a field of a csv row.
 fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
-    row.split(',')
-        .nth(column)
-        .map(str::trim)
-        .ok_or_else(|| LineError {
-            line,
-            reason: format!("column {} is missing", column + 1),
-        })
+    let field = row.split(',').nth(column).map(str::trim);
+    field.ok_or_else(|| LineError::new(line, format!("column {} is missing", column + 1)))
 }
 
 fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
@@ -258,24 +221,19 @@ fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
 fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> {
     let text = field(line, row, column)?;
     let stamp = text.parse().ok().and_then(crate::dataset::stamp::to_ns);
-    stamp.ok_or_else(|| LineError {
-        line,
-        reason: format!(
-            "stamp {} is not an integer time of the years 2015 to 2040",
-            quoted(text)
-        ),
+    stamp.ok_or_else(|| {
+        let text = quoted(text);
+        let reason = format!("stamp {text} is not an integer time of the years 2015 to 2040");
+        LineError::new(line, reason)
     })
 }
 
-/// Rejects times that run backwards.
 fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
     match stamps.last() {
         Some(last) if next < *last => {
             let back_s = (last - next) as f64 * 1e-9;
-            Err(LineError {
-                line,
-                reason: format!("time runs backwards by {back_s:.6} s"),
-            })
+            let reason = format!("time runs backwards by {back_s:.6} s");
+            Err(LineError::new(line, reason))
         }
         _ => Ok(()),
     }

@@ -1,10 +1,4 @@
 //! The log of a gyro as a file.
-//!
-//! - [`GyroLog`]: where it lies beside the scans of a dataset, and how it is read;
-//! - `columns`: which columns of a table are what;
-//! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
-//! - `faults`: the faults of the samples, and the removal of faulty samples; `jumps`: which of them
-//!   change faster than a vehicle can.
 
 mod columns;
 pub(crate) mod faults;
@@ -64,19 +58,13 @@ pub struct GyroLog {
 impl GyroLog {
     /// Reads a log. The first row, or the number of columns, determines the format.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let (raw, unit_is_assumed) = match path.is_dir() {
-            true => {
-                // The lines of the angular rates and of the accelerations.
-                let sample =
-                    |ns, [rates, accelerations]: [_; 2]| columns::sample(ns, rates, accelerations);
-                (gps_imu_twist::read(path, OF, [5, 6], sample)?, false)
-            }
-            false => {
-                let rows = logs::rows::<GyroColumns>(path, OF)?;
-                (rows.raw, rows.columns.unit_is_assumed)
-            }
-        };
-        Self::examined(raw, unit_is_assumed, path)
+        if path.is_dir() {
+            // The lines of the angular rates and of the accelerations.
+            let raw = gps_imu_twist::read(path, OF, [5, 6], columns::sample)?;
+            return Self::examined(raw, false, path);
+        }
+        let rows = logs::rows::<GyroColumns>(path, OF)?;
+        Self::examined(rows.raw, rows.columns.unit_is_assumed, path)
     }
 
     fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
@@ -86,11 +74,6 @@ impl GyroLog {
             faults,
             path: path.to_owned(),
         })
-    }
-
-    /// Returns the log that lies beside the scans of a dataset folder.
-    pub fn beside(folder: &Path) -> Option<PathBuf> {
-        Self::find(folder).ok()
     }
 
     /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
@@ -113,19 +96,15 @@ impl GyroLog {
         let measured = self.up_by_gravity();
         let known = measured.or(is_radiates.then_some(UpAxis::MinusZ));
         let up = configured.or(known).unwrap_or_default();
-        match known.filter(|known| *known != up) {
-            None => Ok(up),
-            Some(known) => Err(LogError::Unusable {
-                of: OF,
-                path: self.path.clone(),
-                reason: format!(
-                    "gyro.up is {}, but by {} its axis {} points up: take gyro.up out of the configuration, or the accelerations out of the log if their sign is wrong",
-                    up.name(),
-                    measured.map_or("its format", |_| "gravity"),
-                    known.name()
-                ),
-            }),
-        }
+        let Some(known) = known.filter(|known| *known != up) else {
+            return Ok(up);
+        };
+        let by = measured.map_or("its format", |_| "gravity");
+        let (up, known) = (up.name(), known.name());
+        let reason = format!(
+            "gyro.up is {up}, but by {by} its axis {known} points up: take gyro.up out of the configuration, or the accelerations out of the log if their sign is wrong"
+        );
+        Err(LogError::unusable(OF, &self.path, reason))
     }
 
     /// Returns the axis along which the accelerations have gravity: what rests is accelerated

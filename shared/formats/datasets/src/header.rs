@@ -5,25 +5,22 @@ use std::collections::HashSet;
 use csv::StringRecord;
 use gyre_storage::quoted;
 
-use crate::{parse_seconds, stamp_to_ns};
+use crate::{
+    dataset::stamp::{MAX_NS, SECOND_NS},
+    parse_seconds, stamp_to_ns,
+};
 
 /// Tables of sensors have tens of columns.
 const MAX_COLUMNS: usize = 1000;
-/// Times are at most 146 years from 1970, so that no difference overflows.
-const MAX_NS: i64 = i64::MAX / 2;
-const SECOND_NS: i64 = 1_000_000_000;
 
 /// Names of the column of stamps that have no unit.
 const STAMPS: &str = "timestamp stamp time t gpstime header_stamp utime unix_time tv";
 /// Units at the end of a stamp's name.
-const STAMP_UNITS: [(&str, StampUnit); 7] = [
+const STAMP_UNITS: [(&str, StampUnit); 4] = [
     ("_ns", StampUnit::Ns(1)),
     ("_us", StampUnit::Ns(1_000)),
     ("_ms", StampUnit::Ns(1_000_000)),
-    ("_s", StampUnit::Seconds),
-    ("_sec", StampUnit::Seconds),
-    ("_secs", StampUnit::Seconds),
-    ("_seconds", StampUnit::Seconds),
+    ("_s _sec _secs _seconds", StampUnit::Seconds),
 ];
 /// Names of whole seconds, and, at the same place of another column's name, of the rest of them in
 /// this unit, ns.
@@ -33,14 +30,12 @@ const RESTS: [(&str, i64); 3] = [
     ("microseconds usec usecs us", 1_000),
     ("ms", 1_000_000),
 ];
+const UNKNOWN_RATES: &str = "angular_velocity_covariance_0 angular_velocity_covariance0";
 /// Columns that state that a row has no measurement, and the number for that.
 const UNMEASURED: [(&str, f64); 4] = [
     ("valid is_valid", 0.0),
     // ROS, of a gyro and of fixes.
-    (
-        "angular_velocity_covariance_0 angular_velocity_covariance0",
-        -1.0,
-    ),
+    (UNKNOWN_RATES, -1.0),
     ("status_status", -1.0),
     // NMEA.
     ("fix_quality", 0.0),
@@ -66,7 +61,6 @@ impl Sign {
     }
 }
 
-/// The names of the columns of a table.
 pub(crate) struct Header(Vec<String>);
 
 impl Header {
@@ -116,15 +110,15 @@ impl Header {
 
     /// Returns the columns that state that a row has no measurement, and the number for that.
     pub fn unmeasured(&self) -> Vec<(usize, f64)> {
-        let columns = UNMEASURED.iter();
-        columns
-            .filter_map(|(name, number)| Some((self.find(name)?, *number)))
-            .collect()
+        let column = |(name, number): &(&str, f64)| Some((self.find(name)?, *number));
+        UNMEASURED.iter().filter_map(column).collect()
     }
 
     /// Returns where the stamps are; `None` without such a column.
     pub fn stamp(&self) -> Option<Stamp> {
-        let of_name = self.first(stamp_unit);
+        let unit =
+            |name: &str| Some(unit_of(name, STAMPS, &STAMP_UNITS)?.unwrap_or(StampUnit::BySize));
+        let of_name = self.first(unit);
         let bare = || self.first(|it| SECONDS[..3].contains(&it).then_some(StampUnit::Seconds));
         let (column, unit) = of_name.or_else(bare)?;
         let name = self.0[column].as_str();
@@ -139,24 +133,14 @@ impl Header {
                 (!stem.is_empty() || word.len() > 2).then_some((column, ns))
             })
         };
+        let stems = [stem, format!("{name}_"), String::new()];
+        let found = stems.iter().find_map(|stem| rest(stem));
         let is_joined = matches!(unit, StampUnit::Seconds | StampUnit::BySize);
-        let found = || {
-            [stem, format!("{name}_"), String::new()]
-                .iter()
-                .find_map(|it| rest(it))
-        };
-        Some(Stamp {
-            column,
-            unit,
-            rest: is_joined
-                .then(found)
-                .flatten()
-                .filter(|(at, _)| *at != column),
-        })
+        let rest = found.filter(|(at, _)| is_joined && *at != column);
+        Some(Stamp { column, unit, rest })
     }
 }
 
-/// Where a table has its stamps.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Stamp {
     column: usize,
@@ -168,14 +152,12 @@ pub(crate) struct Stamp {
 impl Stamp {
     /// Stamps in the first column: in ns, or in the unit that their size implies.
     pub const fn first(is_by_size: bool) -> Self {
-        Self {
-            column: 0,
-            unit: match is_by_size {
-                true => StampUnit::BySize,
-                false => StampUnit::Ns(1),
-            },
-            rest: None,
-        }
+        let (column, rest) = (0, None);
+        let unit = match is_by_size {
+            true => StampUnit::BySize,
+            false => StampUnit::Ns(1),
+        };
+        Self { column, unit, rest }
     }
 
     /// Returns the time of a row, ns.
@@ -188,7 +170,6 @@ impl Stamp {
     }
 }
 
-/// Adds the rest to whole seconds. A rest of a second or more is all of the stamp.
 fn with_rest(whole_ns: i64, rest: &str, unit_ns: i64) -> Option<i64> {
     // Programs that know no integers write `500.0`.
     let rest = rest.strip_suffix(".0").unwrap_or(rest);
@@ -201,9 +182,7 @@ fn with_rest(whole_ns: i64, rest: &str, unit_ns: i64) -> Option<i64> {
 enum StampUnit {
     /// An integer number of so many ns.
     Ns(i64),
-    /// Decimal seconds.
     Seconds,
-    /// Decimal seconds, or an integer whose size implies its unit.
     BySize,
 }
 
@@ -222,24 +201,33 @@ impl StampUnit {
     }
 }
 
-/// Returns the unit of a column of stamps by its name; `None` for another column.
-fn stamp_unit(name: &str) -> Option<StampUnit> {
-    let is_stamp = |name: &str| STAMPS.split(' ').any(|it| it == name);
-    let with_unit = |(unit, meaning): &(&str, StampUnit)| {
-        let named = name.strip_suffix(unit)?;
-        is_stamp(named).then_some(*meaning)
+pub(crate) fn endings<T: Copy>(units: &[(&'static str, T)]) -> Vec<(&'static str, T)> {
+    let of_unit = |(endings, unit): &(&'static str, T)| {
+        let unit = *unit;
+        endings.split(' ').map(move |ending| (ending, unit))
     };
-    let by_name = STAMP_UNITS.iter().find_map(with_unit);
-    by_name.or_else(|| is_stamp(name).then_some(StampUnit::BySize))
+    units.iter().flat_map(of_unit).collect()
 }
 
-/// Returns a name of a column with what programs write in different ways made equal.
+/// Returns the unit of a column that has one of these names with the ending of a unit; `Some(None)`:
+/// without one; `None`: it has another name.
+pub(crate) fn unit_of<T: Copy>(
+    name: &str,
+    names: &str,
+    units: &[(&'static str, T)],
+) -> Option<Option<T>> {
+    let is_one = |name: &str| names.split(' ').any(|it| it == name);
+    let mut endings = endings(units).into_iter();
+    match endings.find(|(ending, _)| name.strip_suffix(ending).is_some_and(is_one)) {
+        Some((_, unit)) => Some(Some(unit)),
+        None => is_one(name).then_some(None),
+    }
+}
+
 fn plain(name: &str) -> String {
     let name = name.trim().trim_start_matches(['%', '#']);
     let name = name.strip_prefix("field.").unwrap_or(name).trim();
-    let name = name
-        .to_lowercase()
-        .replace([' ', '.', '/', '[', '('], "_")
-        .replace([']', ')'], "");
+    let name = name.to_lowercase().replace([']', ')'], "");
+    let name = name.replace([' ', '.', '/', '[', '('], "_");
     name.replace("__", "_").replace("^2", "2")
 }

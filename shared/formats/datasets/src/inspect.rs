@@ -1,7 +1,5 @@
-//! Summary of a dataset and of its faults: `gyre inspect`.
-//!
-//! Each part of the inspection adds its figures, its printed lines and its findings to the
-//! [`Report`].
+//! Summary of a dataset and of its faults: `gyre inspect`. Each part of the inspection adds its
+//! figures, its printed lines and its findings to the [`Report`].
 
 mod ground_truth;
 mod logs;
@@ -37,7 +35,6 @@ pub struct Report {
     pub figures: Map<String, Value>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
-    /// The printed figures: a name and a text.
     #[serde(skip)]
     lines: Vec<(String, String)>,
 }
@@ -117,7 +114,6 @@ impl Report {
         self.findings.push(sentence);
     }
 
-    /// Returns the name of a file in the dataset.
     fn name_of(&self, file: &Path) -> String {
         let name = file.strip_prefix(&self.root).unwrap_or(file);
         name.display().to_string()
@@ -136,27 +132,21 @@ impl fmt::Display for Report {
     }
 }
 
-/// Results of reading the scans.
 struct ScansRead {
     scans_read: usize,
     rows: rows::Survey,
-    /// Scans that could not be read, and why the first could not.
     unreadable: Vec<Value>,
-    first_error: String,
-    /// The last scan.
     scan: OwnedScan,
 }
 
 impl ScansRead {
     fn of(dataset: &mut dyn Dataset) -> Self {
-        let step = (dataset.len() * dataset.limits().bytes)
-            .div_ceil(PIXEL_BUDGET)
-            .max(1);
+        let bytes = dataset.len() * dataset.limits().bytes;
+        let step = bytes.div_ceil(PIXEL_BUDGET).max(1);
         let mut read = Self {
             scans_read: 0,
             rows: rows::Survey::default(),
             unreadable: Vec::new(),
-            first_error: String::new(),
             scan: OwnedScan::with_limits(dataset.limits()),
         };
         for index in dataset.scans().step_by(step) {
@@ -167,13 +157,9 @@ impl ScansRead {
                     read.rows.add(&read.scan.view());
                 }
                 Err(error) => {
-                    let error = error.to_string();
-                    let file = dataset.file(index);
-                    read.unreadable
-                        .push(json!({"scan": index, "file": file, "error": error}));
-                    if read.unreadable.len() == 1 {
-                        read.first_error = error;
-                    }
+                    let (file, error) = (dataset.file(index), error.to_string());
+                    let of_scan = json!({"scan": index, "file": file, "error": error});
+                    read.unreadable.push(of_scan);
                 }
             }
         }
@@ -183,13 +169,11 @@ impl ScansRead {
     fn images(&self, report: &mut Report, dataset: &dyn Dataset, options: &DatasetOptions) {
         let (scans, scans_read) = (report.scans, self.scans_read);
         report.line("format", report.format.to_string());
-        report.line(
-            "scans",
-            match scans_read < scans {
-                true => format!("{scans} ({scans_read} of them read)"),
-                false => scans.to_string(),
-            },
-        );
+        let of_them = match scans_read < scans {
+            true => format!(" ({scans_read} of them read)"),
+            false => String::new(),
+        };
+        report.line("scans", format!("{scans}{of_them}"));
         report.figure("scans_read", scans_read);
         let (image, transposed) = (dataset.image_size(), dataset.is_transposed());
         let side = match transposed {
@@ -201,10 +185,8 @@ impl ScansRead {
         report.figure("transposed", transposed);
         let (geometry, azimuths) = (self.scan.geometry, self.rows.most_rows());
         let (bins, bin_m) = (geometry.bins, geometry.range_resolution_m);
-        report.line(
-            "sweep",
-            format!("{azimuths} azimuths x {bins} range bins, clockwise"),
-        );
+        let sweep = format!("{azimuths} azimuths x {bins} range bins, clockwise");
+        report.line("sweep", sweep);
         report.figure("azimuths", azimuths);
         report.figure("bins", bins);
         let offset_m = geometry.range_offset_m;
@@ -213,10 +195,8 @@ impl ScansRead {
             false => format!(", offset {offset_m} m"),
         };
         let max_range_m = self.scan.view().range_m(bins as f32 - 1.0);
-        report.line(
-            "range",
-            format!("{bin_m:.6} m per bin{offset}, to {max_range_m:.1} m"),
-        );
+        let range = format!("{bin_m:.6} m per bin{offset}, to {max_range_m:.1} m");
+        report.line("range", range);
         for (name, value) in [
             ("range_resolution_m", bin_m),
             ("range_offset_m", offset_m),
@@ -225,9 +205,8 @@ impl ScansRead {
             // The number with the decimals that an f32 has.
             report.figure(name, value.to_string().parse::<f64>().ok());
         }
-        if matches!(report.format, Format::Oxford | Format::Oord)
-            && options.range_resolution_m.is_none()
-        {
+        let is_oxford = matches!(report.format, Format::Oxford | Format::Oord);
+        if is_oxford && options.range_resolution_m.is_none() {
             report.find(format!(
                 "The range resolution is {bin_m} m: with the 0.0432 m of the development kit, paths are more than 1 % short."
             ));
@@ -238,9 +217,9 @@ impl ScansRead {
         if report.scans == 1 {
             report.find("There is only one scan, but a motion requires two.".to_owned());
         }
-        if !self.unreadable.is_empty() {
+        if let Some(first) = self.unreadable.first() {
             let indices = self.unreadable.iter().map(|it| it["scan"].to_string());
-            let (places, first) = (some(indices), &self.first_error);
+            let (places, first) = (some(indices), first["error"].as_str().unwrap_or_default());
             let (count, all) = (self.unreadable.len(), self.scans_read);
             report.find(format!(
                 "{count} of {all} scans cannot be read (scans {places}): {first}."
@@ -250,7 +229,6 @@ impl ScansRead {
     }
 }
 
-/// Adds the velocity of the radar by the Doppler shift of a scan whose chirps alternate.
 fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
     let min_range_m = PointsConfig::default().min_range_m;
     let (text, figures) = match DopplerEstimator::default().estimate(scan, min_range_m) {
@@ -258,9 +236,8 @@ fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
             return report.figure("velocity", Value::Null);
         }
         Err(error) => {
-            let error = error.to_string();
+            let (error, none) = (error.to_string(), Value::Null);
             let text = format!("unknown: {error}");
-            let none = Value::Null;
             let figures =
                 json!({"velocity_mps": none, "sigma_mps": none, "bearings": 0, "error": error});
             (text, figures)
@@ -284,7 +261,6 @@ fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
     report.figure("velocity", figures);
 }
 
-/// Lists the first items, and counts the rest.
 fn some(items: impl ExactSizeIterator<Item = String>) -> String {
     let more = items.len().saturating_sub(MAX_LISTED);
     let named = items.take(MAX_LISTED).collect::<Vec<_>>().join(", ");

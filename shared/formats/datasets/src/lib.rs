@@ -1,12 +1,5 @@
-//! Recordings of radars on disk, and what lies beside them: one file per format.
-//!
-//! Reading order:
-//! - [`mod@dataset`]: the scans of a recording behind one trait;
-//! - [`fingerprint`]: the identity of a recording;
-//! - [`GyroLog`], [`WheelLog`], [`GnssLog`]: what other sensors logged; [`ScanSamples`]: which of
-//!   it goes with each scan;
-//! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
-//! - [`inspect()`]: a summary of a recording and of its faults.
+//! Recordings of radars on disk, and what lies beside them: one file per format. Begin with
+//! [`mod@dataset`]: the scans of a recording behind one trait.
 
 pub mod dataset;
 pub mod fingerprint;

@@ -2,11 +2,11 @@
 //! readers, and their errors.
 
 use std::{
+    fmt::Display,
     io,
     path::{Path, PathBuf},
 };
 
-use gyre_storage as storage;
 use thiserror::Error;
 
 use crate::{
@@ -26,7 +26,6 @@ const IMAGES: [&str; 5] = [
 /// A log that cannot be used. `of` is the section of the sensor in configurations. Each message
 /// names the fault, its place and a remedy.
 #[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum LogError {
     #[error(
         "no log of {} lies beside the scans in {folder}: name one with {of}.kind = \"log\" and {of}.file, or set {of}.kind = \"none\"",
@@ -41,35 +40,8 @@ pub enum LogError {
         "{of}.kind is that of a live sensor, but the scans are of a recording: set it to `auto`, `log` or `none`"
     )]
     Live { of: &'static str },
-    #[error("cannot read the log of the {} {path}: {source}", name(of))]
-    Io {
-        of: &'static str,
-        path: PathBuf,
-        source: io::Error,
-    },
-    #[error("{path} is no log of {}: {reason}", one(of))]
-    Unknown {
-        of: &'static str,
-        path: PathBuf,
-        reason: String,
-    },
-    #[error("the log of the {} {path} cannot be used: {reason}", name(of))]
-    Unusable {
-        of: &'static str,
-        path: PathBuf,
-        reason: String,
-    },
-    /// `steps` describes the steps of the clock, if there are any, in sentences that end with a
-    /// space.
-    #[error(
-        "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.delay_s is wrong"
-    )]
-    Elsewhere {
-        of: &'static str,
-        path: PathBuf,
-        after_s: f64,
-        steps: String,
-    },
+    #[error("{0}")]
+    Unusable(String),
     #[error(
         "the bag {bag} has no messages of sensor_msgs/msg/NavSatFix, and no log of a GNSS receiver lies beside it: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
     )]
@@ -83,7 +55,28 @@ pub enum LogError {
     Open(#[from] OpenError),
 }
 
-/// Returns the sensor of a section in words.
+impl LogError {
+    /// A log without a table of the sensor.
+    pub(crate) fn unknown(of: &str, path: &Path, reason: impl Display) -> Self {
+        let (path, one) = (path.display(), one(of));
+        Self::Unusable(format!("{path} is no log of {one}: {reason}"))
+    }
+
+    pub(crate) fn unusable(of: &str, path: &Path, reason: impl Display) -> Self {
+        let (path, name) = (path.display(), name(of));
+        Self::Unusable(format!(
+            "the log of the {name} {path} cannot be used: {reason}"
+        ))
+    }
+
+    pub(crate) fn unreadable(of: &str, path: &Path, source: io::Error) -> Self {
+        let (path, name) = (path.display(), name(of));
+        Self::Unusable(format!(
+            "cannot read the log of the {name} {path}: {source}"
+        ))
+    }
+}
+
 fn one(section: &str) -> &str {
     match section {
         "gyro" => "a gyro",
@@ -99,16 +92,13 @@ fn name(section: &str) -> &str {
     }
 }
 
-/// Returns whether a folder has RADIATE's list of times beside it.
-fn has_list(folder: &Path) -> bool {
-    folder.with_extension("txt").is_file()
-}
-
 /// Returns the first of these places with a log beside the scans of a dataset folder. The folder of
 /// the images may be given instead.
 pub(crate) fn find(folder: &Path, of: &'static str, places: &[&str]) -> Result<PathBuf, LogError> {
     let mut paths = roots(folder).flat_map(|root| places.iter().map(|place| root.join(place)));
-    let found = paths.find(|path| path.is_file() || (path.is_dir() && has_list(path)));
+    // RADIATE's folder has a list of times beside it.
+    let is_folder = |path: &Path| path.is_dir() && path.with_extension("txt").is_file();
+    let found = paths.find(|path| path.is_file() || is_folder(path));
     found.ok_or_else(|| LogError::None {
         of,
         folder: folder.to_owned(),
@@ -124,20 +114,10 @@ pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
     [Some(folder), above].into_iter().flatten()
 }
 
-/// Reads the text of a log.
 pub(crate) fn text(path: &Path, of: &'static str) -> Result<String, LogError> {
-    storage::read_text(path, MAX_BYTES).map_err(|source| LogError::Io {
-        of,
-        path: path.to_owned(),
-        source,
-    })
+    gyre_storage::read_text(path, MAX_BYTES).map_err(|e| LogError::unreadable(of, path, e))
 }
 
-/// Reads a log that is a table.
 pub(crate) fn rows<C: Columns>(path: &Path, of: &'static str) -> Result<Rows<C>, LogError> {
-    Rows::of(&text(path, of)?).map_err(|reason| LogError::Unknown {
-        of,
-        path: path.to_owned(),
-        reason,
-    })
+    Rows::of(&text(path, of)?).map_err(|reason| LogError::unknown(of, path, reason))
 }

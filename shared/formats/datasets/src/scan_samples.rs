@@ -15,15 +15,11 @@ use crate::{
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
 #[derive(Debug)]
 pub enum ScanSamples {
-    /// There are none.
     None,
-    /// From logs.
     Log {
         track: SampleTrack,
-        /// A sentence for each kind of fault in a log, with its path.
         faults: Vec<String>,
     },
-    /// Recorded with the scans of a run, whatever their stamps: the samples of these kinds.
     Recorded(Vec<SampleKind>),
 }
 
@@ -39,47 +35,38 @@ impl ScanSamples {
         if dataset.format() == Format::Mcap {
             return Ok(Self::recorded(gyro, wheels));
         }
+        let live = |of: SampleKind| Err(LogError::Live { of: of.section() });
         let turns = match gyro.kind {
             GyroKind::None => None,
-            GyroKind::Auto => {
-                let own = dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())?;
-                Some(match own {
+            GyroKind::Udp | GyroKind::Ros2 => return live(SampleKind::Gyro),
+            GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
+            GyroKind::Auto => Some(
+                match dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())? {
                     Some(samples) => GyroLog::of(samples, folder)?,
                     None => GyroLog::read(&GyroLog::find(folder)?)?,
-                })
-            }
-            GyroKind::Udp | GyroKind::Ros2 => {
-                return Err(LogError::Live {
-                    of: SampleKind::Gyro.section(),
-                });
-            }
-            GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
+                },
+            ),
         };
+        let read = |file: &Path| WheelLog::read(file, wheels.m_per_tick);
         let speeds = match wheels.kind {
             WheelsKind::None => None,
-            WheelsKind::Auto => {
-                let own = dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())?;
-                Some(match own {
+            WheelsKind::Udp | WheelsKind::Ros2 => return live(SampleKind::Wheels),
+            WheelsKind::Log => Some(read(&wheels.file.clone().unwrap_or_default())?),
+            WheelsKind::Auto => Some(
+                match dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())? {
                     Some(samples) => WheelLog::of(samples, folder)?,
-                    None => WheelLog::read(&WheelLog::find(folder)?, wheels.m_per_tick)?,
-                })
-            }
-            WheelsKind::Udp | WheelsKind::Ros2 => {
-                return Err(LogError::Live {
-                    of: SampleKind::Wheels.section(),
-                });
-            }
-            WheelsKind::Log => {
-                let file = wheels.file.clone().unwrap_or_default();
-                Some(WheelLog::read(&file, wheels.m_per_tick)?)
-            }
+                    None => read(&WheelLog::find(folder)?)?,
+                },
+            ),
         };
-        let of_gyro = turns.map(|log| Self::of_gyro(&log, gyro, dataset));
-        let of_wheels = speeds.map(|log| Self::of_wheels(&log, wheels, dataset));
-        let none = || Ok(Self::None);
-        Ok(of_gyro
-            .unwrap_or_else(none)?
-            .and(of_wheels.unwrap_or_else(none)?))
+        let mut all = Self::None;
+        if let Some(log) = turns {
+            all = Self::of_gyro(&log, gyro, dataset)?;
+        }
+        if let Some(log) = speeds {
+            all = all.and(Self::of_wheels(&log, wheels, dataset)?);
+        }
+        Ok(all)
     }
 
     /// Takes the samples of the log of a gyro.
@@ -92,7 +79,7 @@ impl ScanSamples {
             up: Some(log.up(config.up, dataset.format())?),
             ..config.clone()
         };
-        let track = SampleTrack::new(log, &config);
+        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
         Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 
@@ -102,7 +89,7 @@ impl ScanSamples {
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let track = log.track(config);
+        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
         Self::of_track(track, (SampleKind::Wheels, &log.path), &log.faults, dataset)
     }
 
@@ -111,14 +98,13 @@ impl ScanSamples {
     pub fn and(self, other: Self) -> Self {
         match (self, other) {
             (
-                Self::Log { track, mut faults },
+                Self::Log { track, faults },
                 Self::Log {
                     track: other,
                     faults: more,
                 },
             ) => {
-                faults.extend(more);
-                let track = track.and(other);
+                let (track, faults) = (track.and(other), [faults, more].concat());
                 Self::Log { track, faults }
             }
             (Self::None, other) => other,
@@ -138,15 +124,13 @@ impl ScanSamples {
         }
     }
 
-    /// The samples that a recording has, of the kinds that are used.
     fn recorded(gyro: &GyroConfig, wheels: &WheelsConfig) -> Self {
-        let used = [
-            gyro.is_used().then_some(SampleKind::Gyro),
-            wheels.is_used().then_some(SampleKind::Wheels),
-        ];
-        match used.iter().flatten().count() {
-            0 => Self::None,
-            _ => Self::Recorded(used.into_iter().flatten().collect()),
+        let gyro = gyro.is_used().then_some(SampleKind::Gyro);
+        let wheels = wheels.is_used().then_some(SampleKind::Wheels);
+        let used: Vec<SampleKind> = gyro.into_iter().chain(wheels).collect();
+        match used.is_empty() {
+            true => Self::None,
+            false => Self::Recorded(used),
         }
     }
 
@@ -162,15 +146,15 @@ impl ScanSamples {
         if let (Some(first_ns), Some(last_ns), Some(span_ns)) = (first_ns, last_ns, track.span_ns())
             && track.between(first_ns, last_ns).is_empty()
         {
-            return Err(LogError::Elsewhere {
-                of: of.section(),
-                path: path.to_owned(),
-                after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
-                steps: match faults.clock_steps_s.is_empty() {
-                    true => String::new(),
-                    false => format!("{}. ", faults.clock_steps()),
-                },
-            });
+            let (of, path) = (of.section(), path.display());
+            let after_s = (span_ns[0] - first_ns) as f64 * 1e-9;
+            let steps = match faults.clock_steps_s.is_empty() {
+                true => String::new(),
+                false => format!("{}. ", faults.clock_steps()),
+            };
+            return Err(LogError::Unusable(format!(
+                "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.delay_s is wrong"
+            )));
         }
         let named = |sentence| format!("{}: {sentence}", path.display());
         let jumps = track.leave_out_jumps(of);

@@ -12,12 +12,9 @@ const MARKS: [u8; 3] = [b',', b';', b'\t'];
 /// The first field of a row that replaces unreadable rows; the second field is their number.
 const UNREADABLE: &str = "unreadable";
 
-/// The columns of a table with one entry per row.
 pub(crate) trait Columns: Sized {
-    /// The entry that a row becomes.
     type Entry;
 
-    /// Finds the columns by their names.
     fn by_names(header: &Header) -> Result<Self, String>;
 
     /// Finds the columns of a table without names, by their number.
@@ -30,20 +27,16 @@ pub(crate) trait Columns: Sized {
     /// Reads a row; `None` if a field is missing or no number. `nan` is one.
     fn entry(&self, row: &StringRecord) -> Option<Self::Entry>;
 
-    /// Returns whether a row states that nothing was measured.
     fn is_unmeasured(&self, _row: &StringRecord) -> bool {
         false
     }
 }
 
-/// The rows of a table.
 #[derive(Clone)]
 pub(crate) struct Rows<C: Columns> {
     pub columns: C,
     pub raw: Raw<C::Entry>,
-    /// Columns that state so, with the number for that.
     stating: Vec<(usize, f64)>,
-    /// The number of columns, and the mark between them.
     count: usize,
     mark: u8,
     lines: usize,
@@ -112,9 +105,8 @@ impl<C: Columns> Rows<C> {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
                 let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
                 let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
-                self.raw
-                    .unreadable
-                    .add(times, line, || why(row, self.count));
+                let why = || why(row, self.count);
+                self.raw.unreadable.add(times, line, why);
             }
         }
     }
@@ -129,7 +121,13 @@ fn reader(text: &str, mark: u8) -> csv::Reader<&[u8]> {
         .from_reader(text.as_bytes())
 }
 
-/// The entries of a log as they stand there.
+/// Leaves out bad entries, and returns their number.
+pub(crate) fn leave_out<T>(entries: &mut Vec<T>, is_bad: impl Fn(&T) -> bool) -> usize {
+    let before = entries.len();
+    entries.retain(|entry| !is_bad(entry));
+    before - entries.len()
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Raw<T> {
     pub entries: Vec<T>,
@@ -154,7 +152,6 @@ impl<T> Raw<T> {
     }
 }
 
-/// Rows that cannot be read.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unreadable {
     pub count: usize,
@@ -181,7 +178,6 @@ impl Unreadable {
     }
 }
 
-/// Returns the fault of a row of a table with so many columns, and the remedy.
 fn why(row: &StringRecord, columns: usize) -> String {
     let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
     let is_date = |text: &str| {

@@ -7,14 +7,14 @@ mod counts;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use gyre_samples::{Sample, SampleKind, WheelsConfig};
+use gyre_samples::{Sample, SampleKind};
 
 use counts::CountColumns;
 
 use crate::{
-    LogError, LogFaults, SampleTrack,
+    LogError, LogFaults,
     gyro_log::faults::{Plausible, examine},
-    header::{Header, Sign, Stamp},
+    header::{Header, Sign, Stamp, unit_of},
     logs,
     table::{Columns, Raw},
 };
@@ -67,16 +67,8 @@ impl WheelLog {
         Self::examined(Raw::of(samples), false, path)
     }
 
-    /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
-    pub fn track(&self, config: &WheelsConfig) -> SampleTrack {
-        SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
-    }
-
     fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
-        Ok(Self::with(
-            examine(raw, unit_is_assumed, path, &SPEEDS)?,
-            path,
-        ))
+        examine(raw, unit_is_assumed, path, &SPEEDS).map(|examined| Self::with(examined, path))
     }
 
     fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
@@ -90,14 +82,9 @@ impl WheelLog {
 
 const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
 /// Units at the end of its name.
-const UNITS: [(&str, f64); 8] = [
-    ("_mps", 1.0),
-    ("_m_s", 1.0),
-    ("_m_per_s", 1.0),
-    ("_kmh", 1.0 / 3.6),
-    ("_km_h", 1.0 / 3.6),
-    ("_kmph", 1.0 / 3.6),
-    ("_kph", 1.0 / 3.6),
+const UNITS: [(&str, f64); 3] = [
+    ("_mps _m_s _m_per_s", 1.0),
+    ("_kmh _km_h _kmph _kph", 1.0 / 3.6),
     ("_mph", 0.44704),
 ];
 
@@ -117,7 +104,6 @@ const REVERSE: Sign = Sign {
 
 const SIGNS: [&Sign; 2] = [&DIRECTION, &REVERSE];
 
-/// Where a table has what.
 struct SpeedColumns {
     stamp: Stamp,
     speed: usize,
@@ -131,14 +117,15 @@ impl Columns for SpeedColumns {
 
     fn by_names(header: &Header) -> Result<Self, String> {
         let sign = header.sign(&SIGNS);
+        let columns = header.listed();
         let missing = |what| match sign {
             Some(_) => format!(
-                "its columns {} have a direction, which is applied to speeds alone: let the counts run backwards, and remove the direction",
-                header.listed()
+                "its columns {columns} have a direction, which is applied to speeds alone: let the counts run backwards, and remove the direction"
             ),
-            None => format!("its columns {} have no {what}: {REMEDY}", header.listed()),
+            None => format!("its columns {columns} have no {what}: {REMEDY}"),
         };
-        let (speed, unit) = header.first(speed_unit).ok_or_else(|| missing("speed"))?;
+        let speed = header.first(|name| unit_of(name, NAMES, &UNITS));
+        let (speed, unit) = speed.ok_or_else(|| missing("speed"))?;
         Ok(Self {
             stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             speed,
@@ -155,15 +142,4 @@ impl Columns for SpeedColumns {
         };
         Some(Sample::speed(self.stamp.ns(row)?, speed))
     }
-}
-
-/// The unit of a column of this name; `None` if it is no speed, `Some(None)` if it has no unit.
-fn speed_unit(name: &str) -> Option<Option<f64>> {
-    let is_speed = |name: &str| NAMES.split(' ').any(|it| it == name);
-    let of_unit = |(unit, factor): &(&str, f64)| {
-        let named = name.strip_suffix(unit)?;
-        is_speed(named).then_some(Some(*factor))
-    };
-    let by_name = UNITS.iter().find_map(of_unit);
-    by_name.or_else(|| is_speed(name).then_some(None))
 }

@@ -2,6 +2,7 @@
 
 use std::{fmt::Write, fs};
 
+use crate::common::assert_refused;
 use gyre_datasets::{TrajectoryError, read_trajectory};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
@@ -49,12 +50,8 @@ fn camera_from_vehicle() -> UnitQuaternion<f64> {
 
 fn kitti_line(pose: &Isometry3<f64>) -> String {
     let m = pose.to_homogeneous();
-    let row = |r: usize| {
-        [0, 1, 2, 3]
-            .map(|c| format!("{:.15e}", m[(r, c)]))
-            .join(" ")
-    };
-    format!("{} {} {}\n", row(0), row(1), row(2))
+    let row = |r: usize| [0, 1, 2, 3].map(|c| format!("{:.15e}", m[(r, c)]));
+    [0, 1, 2].map(row).as_flattened().join(" ") + "\n"
 }
 
 fn kitti(drive: &[Isometry3<f64>]) -> String {
@@ -62,28 +59,21 @@ fn kitti(drive: &[Isometry3<f64>]) -> String {
 }
 
 fn tum(drive: &[Isometry3<f64>]) -> String {
-    let mut text = String::new();
-    for (k, pose) in drive.iter().enumerate() {
-        let (t, q) = (pose.translation, pose.rotation.coords);
-        let (x, y, z) = (t.x, t.y, t.z);
-        let _ = writeln!(
-            text,
-            "{k} {x:.12} {y:.12} {z:.12} {:.15} {:.15} {:.15} {:.15}",
-            q.x, q.y, q.z, q.w
-        );
-    }
-    text
+    let line = |(k, pose): (usize, &Isometry3<f64>)| {
+        let place = pose.translation.vector.iter().map(|x| format!("{x:.12}"));
+        let turn = pose.rotation.coords.iter().map(|x| format!("{x:.15}"));
+        format!("{k} {}\n", place.chain(turn).collect::<Vec<_>>().join(" "))
+    };
+    drive.iter().enumerate().map(line).collect()
 }
 
 fn assert_near(found: &[Pose], expected: &[Pose], apart_m: f64) {
     assert_eq!(found.len(), expected.len());
     for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
         let apart = found.translation.vector - expected.translation.vector;
-        let turn = found.rotation.angle_to(&expected.rotation);
-        assert!(
-            apart.norm() < apart_m && turn.abs() < 1e-6,
-            "{k}: {found} instead of {expected}"
-        );
+        let turn = found.rotation.angle_to(&expected.rotation).abs();
+        let is_near = apart.norm() < apart_m && turn < 1e-6;
+        assert!(is_near, "{k}: {found} instead of {expected}");
     }
 }
 
@@ -143,10 +133,8 @@ fn positions_of_a_camera_are_in_its_plane_of_motion() {
             .map(|p| Isometry3::from_parts(p.into(), UnitQuaternion::identity()))
             .collect()
     };
-    let expected = drive
-        .iter()
-        .map(|p| pose(p.translation.x, p.translation.y, 0.0));
-    let expected: Vec<_> = expected.collect();
+    let ahead = |p: &Isometry3<f64>| pose(p.translation.x, p.translation.y, 0.0);
+    let expected: Vec<_> = drive.iter().map(ahead).collect();
     for turn in [UnitQuaternion::identity(), camera_from_vehicle()] {
         let found = read(&kitti(&only(turn))).unwrap();
         assert_near(&found.poses, &expected, 1e-6);
@@ -174,7 +162,6 @@ fn poses_of_no_known_frame_are_refused() {
     let axes = UnitQuaternion::from_matrix(&axes);
     let tilted: Vec<_> = drive(0.9).iter().map(|pose| axes * pose).collect();
     for text in [kitti(&tilted), tum(&tilted)] {
-        let error = read(&text).unwrap_err().to_string();
-        assert!(error.contains("does not stay upright"), "{error}");
+        assert_refused(read(&text), "does not stay upright");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::real;
+use crate::common::{assert_refused, real};
 use gyre_datasets::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
 use gyre_radar::Trajectory;
 use nalgebra::{Isometry2, Vector2};
@@ -18,14 +18,8 @@ fn from_text(name: &str, text: &str) -> Result<Trajectory, TrajectoryError> {
 const HEADER: &str = "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,source_radar_timestamp,destination_radar_timestamp\n";
 
 fn row(from: i64, to: i64, x: f64, y: f64, yaw: f64) -> String {
-    let us = |t: i64| 1_547_131_046_000_000 + t;
-    format!(
-        "{},{},{x},{y},0,0,0,{yaw},{},{}\n",
-        us(to),
-        us(from),
-        us(to),
-        us(from)
-    )
+    let [to, from] = [to, from].map(|us| 1_547_131_046_000_000 + us);
+    format!("{to},{from},{x},{y},0,0,0,{yaw},{to},{from}\n")
 }
 
 #[test]
@@ -33,38 +27,18 @@ fn oxford_motions_are_converted_to_rep_103_and_composed_from_identity() {
     // 2 m ahead with a right turn of 90 degrees, then 1 m ahead and 0.5 m to the right. Rows may be
     // in any order.
     let quarter = std::f64::consts::FRAC_PI_2;
-    let text = [
-        HEADER,
-        &row(250, 500, 1.0, 0.5, 0.0),
-        &row(0, 250, 2.0, 0.0, quarter),
-    ]
-    .concat();
+    let (later, earlier) = (row(250, 500, 1.0, 0.5, 0.0), row(0, 250, 2.0, 0.0, quarter));
+    let text = [HEADER, &later, &earlier].concat();
     let trajectory = from_text("radar_odometry.csv", &text).unwrap();
-    assert_eq!(
-        trajectory.stamp_ns.as_deref().unwrap()[2] - trajectory.stamp_ns.as_deref().unwrap()[0],
-        500_000
-    );
+    let stamps = trajectory.stamp_ns.as_deref().unwrap();
+    assert_eq!(stamps[2] - stamps[0], 500_000);
     assert_eq!(trajectory.poses[0], Isometry2::identity());
     assert!((trajectory.poses[1].rotation.angle() + quarter).abs() < 1e-12);
-    let last = trajectory.poses[2].translation;
-    assert!(
-        (last.x - 1.5).abs() < 1e-12 && (last.y + 1.0).abs() < 1e-12,
-        "{last}"
-    );
-}
-
-#[test]
-fn a_gap_in_oxford_motions_is_an_error_with_its_line() {
-    let text = [
-        HEADER,
-        &row(0, 250, 2.0, 0.0, 0.0),
-        &row(500, 750, 1.0, 0.5, 0.0),
-    ]
-    .concat();
-    let error = from_text("radar_odometry.csv", &text)
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("line 3") && error.contains("gap"), "{error}");
+    let last = trajectory.poses[2].translation.vector;
+    assert!((last - Vector2::new(1.5, -1.0)).norm() < 1e-12, "{last}");
+    let (first, second) = (row(0, 250, 2.0, 0.0, 0.0), row(500, 750, 1.0, 0.5, 0.0));
+    let refused = from_text("radar_odometry.csv", &[HEADER, &first, &second].concat());
+    assert_refused(refused, "line 3: this motion starts 0.000250 s after");
 }
 
 #[test]
@@ -72,17 +46,14 @@ fn the_oxford_drive_is_nine_kilometres() {
     let Some(root) = real("trajectories") else {
         return;
     };
-    let trajectory =
-        read_trajectory(&root.join("oxford-2019-01-10-11-46-21.radar_odometry.csv")).unwrap();
+    let file = root.join("oxford-2019-01-10-11-46-21.radar_odometry.csv");
+    let trajectory = read_trajectory(&file).unwrap();
     assert_eq!(trajectory.len(), 8866);
-    assert!(
-        (8_900.0..9_200.0).contains(&trajectory.path_length_m()),
-        "{}",
-        trajectory.path_length_m()
-    );
+    let path_m = trajectory.path_length_m();
+    assert!((8_900.0..9_200.0).contains(&path_m), "{path_m}");
     let golden = read_trajectory(&real("golden/csv-chain").unwrap().join("estimate.txt")).unwrap();
     // The estimate was made without mirroring y; the lengths of the paths agree nevertheless.
-    let ratio = golden.path_length_m() / trajectory.path_length_m();
+    let ratio = golden.path_length_m() / path_m;
     assert!((0.98..1.03).contains(&ratio), "{ratio}");
 }
 
@@ -91,17 +62,13 @@ fn boreas_headings_follow_the_course_over_ground() {
     let Some(root) = real("trajectories") else {
         return;
     };
-    let trajectory =
-        read_trajectory(&root.join("boreas-2021-09-02-11-42-radar_poses.csv")).unwrap();
+    let file = root.join("boreas-2021-09-02-11-42-radar_poses.csv");
+    let trajectory = read_trajectory(&file).unwrap();
     assert_eq!(trajectory.len(), 4134);
-    let mut slips: Vec<f64> = trajectory
-        .poses
-        .windows(2)
-        .map(|w| w[0].inverse() * w[1])
-        .map(|m| m.translation.vector)
-        .filter(|t| t.norm() > 1.5)
-        .map(|t| t.y.atan2(t.x))
-        .collect();
+    let steps = trajectory.poses.windows(2);
+    let steps = steps.map(|w| (w[0].inverse() * w[1]).translation.vector);
+    let steps = steps.filter(|step| step.norm() > 1.5);
+    let mut slips: Vec<f64> = steps.map(|step| step.y.atan2(step.x)).collect();
     slips.sort_by(f64::total_cmp);
     assert!(slips.len() > 500);
     let median = slips[slips.len() / 2].to_degrees();
@@ -115,21 +82,13 @@ fn real_kitti_and_tum_files_are_read() {
     };
     for name in ["estimate.txt", "ground_truth.txt"] {
         let trajectory = read_trajectory(&root.join(name)).unwrap();
-        assert_eq!(
-            (
-                trajectory.len(),
-                trajectory.stamp_ns.is_none(),
-                trajectory.has_heading()
-            ),
-            (4470, true, true)
-        );
+        assert_eq!((trajectory.len(), trajectory.has_heading()), (4470, true));
+        assert!(trajectory.stamp_ns.is_none());
     }
-    let radiate =
-        read_trajectory(&real("radiate-2019-02-12").unwrap().join("ground_truth.tum")).unwrap();
-    assert_eq!(
-        (radiate.len(), radiate.span_ns().unwrap().0),
-        (2362, 1_549_986_606_800_100_000)
-    );
+    let radiate = real("radiate-2019-02-12").unwrap().join("ground_truth.tum");
+    let radiate = read_trajectory(&radiate).unwrap();
+    assert_eq!(radiate.len(), 2362);
+    assert_eq!(radiate.span_ns().unwrap().0, 1_549_986_606_800_100_000);
     assert!((radiate.poses[0].rotation.angle() - 2.0 * (-0.076_197_180_f64).asin()).abs() < 1e-6);
     let fomo = read_trajectory(&real("samples/fomo-2025-10-14").unwrap().join("gt.txt")).unwrap();
     assert!(!fomo.has_heading() && fomo.len() == 1692);
@@ -147,10 +106,7 @@ fn invalid_files_are_rejected_with_their_line() {
         ("1 inf 0 0 0 0 0 1\n", "line 1"),
         // Finite, but their squares or sums are not.
         ("1 0 0 0 1e200 0 0 1e200\n", "line 1"),
-        (
-            "1 0 0 1e308 0 1 0 1e308 0 0 1 0\n1 0 0 0 -1e308 1 0 0 0 0 1 0\n",
-            "line 1",
-        ),
+        ("1 0 0 1e308 0 1 0 1e308 0 0 1 0\n", "line 1"),
         (HEADER, "no motion"),
         ("GPSTime,easting\n1,2\n", "northing"),
         // Rounded to four a second.
@@ -160,93 +116,39 @@ fn invalid_files_are_rejected_with_their_line() {
         ),
     ];
     for (text, words) in cases {
-        let error = from_text("a.txt", text).unwrap_err().to_string();
-        assert!(error.contains(words), "{text:?}: {error}");
+        assert_refused(from_text("a.txt", text), words);
     }
-    assert!(matches!(
-        read_trajectory("/nonexistent/a.tum".as_ref()),
-        Err(TrajectoryError::Io { .. })
-    ));
-    let folder = read_trajectory("/proc/self/fdinfo".as_ref());
-    let error = folder.unwrap_err().to_string();
-    assert!(error.contains("without a ground truth"), "{error}");
+    for (path, words) in [
+        ("/nowhere/a.tum", "trajectory /nowhere/a.tum: No such"),
+        ("/proc/self/fdinfo", "without a ground truth"),
+    ] {
+        assert_refused(read_trajectory(path.as_ref()), words);
+    }
 }
 
 #[test]
 fn what_spreadsheets_write_is_refused_with_what_to_do() {
-    let columns = |separator: &str, number: &str, count: usize| vec![number; count].join(separator);
-    let cases = [
-        (
-            columns(" ", "1,5", 8),
-            "8 columns (TUM) have decimal commas",
-        ),
-        (
-            columns("\t", "1,5", 12),
-            "columns (KITTI) have decimal commas",
-        ),
-        (
-            columns(";", "1,5", 8),
-            "8 columns (TUM) are parted by semicolons, and need spaces",
-        ),
-        (
-            columns(";", "1.5", 12),
-            "columns (KITTI) are parted by semicolons, and need spaces",
-        ),
-        (
-            columns(", ", "1.5", 8),
-            "8 columns (TUM) are parted by commas, and need spaces",
-        ),
-        (
-            columns(", ", "1", 8),
-            "8 columns (TUM) are parted by commas, and need spaces",
-        ),
-        (
-            "GPSTime;easting;northing\n".to_owned(),
-            "parted by semicolons, and need commas",
-        ),
-    ];
-    for (text, words) in cases {
-        let error = from_text("a.txt", &text).unwrap_err().to_string();
-        assert!(error.contains(words), "{text:?}: {error}");
+    for (separator, number, count, words) in [
+        (" ", "1,5", 8, "8 columns (TUM) have decimal commas"),
+        ("\t", "1,5", 12, "columns (KITTI) have decimal commas"),
+        (";", "1,5", 8, "parted by semicolons, and need spaces"),
+        (";", "1.5", 12, "parted by semicolons, and need spaces"),
+        (", ", "1.5", 8, "parted by commas, and need spaces"),
+        (", ", "1", 8, "parted by commas, and need spaces"),
+        (";", "GPSTime", 3, "parted by semicolons, and need commas"),
+    ] {
+        let text = vec![number; count].join(separator);
+        assert_refused(from_text("a.txt", &text), words);
     }
-}
-
-#[test]
-fn columns_may_have_a_space_behind_their_comma() {
+    // The poses of the lidar of Boreas, and columns with a space behind their comma.
+    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
+    let lidar = from_text("a", &boreas.replace("GPSTime", "ROSTime"));
+    assert_eq!(lidar.unwrap(), from_text("a", boreas).unwrap());
     let row = "1561000444390857630,0,-1,0,353062.125,1,0,0,4026023,0,0,1,20\n";
     assert_eq!(
         from_text("global_pose.csv", &row.replace(',', ", ")).unwrap(),
         from_text("global_pose.csv", row).unwrap()
     );
-}
-
-#[test]
-fn a_byte_order_mark_is_no_part_of_a_trajectory() {
-    let tum = "1.5 1 2 0 0 0 0 1\n";
-    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
-    let lidar = boreas.replace("GPSTime", "ROSTime");
-    assert_eq!(
-        from_text("a", &lidar).unwrap(),
-        from_text("a", boreas).unwrap()
-    );
-    let oxford = [HEADER, &row(0, 250, 2.0, 0.0, 0.1)].concat();
-    for text in [tum, boreas, &oxford] {
-        let marked = from_text("a.txt", &format!("\u{feff}{text}")).unwrap();
-        assert_eq!(marked, from_text("a.txt", text).unwrap());
-    }
-}
-
-#[test]
-fn a_word_of_a_damaged_file_is_quoted_in_part() {
-    let long = "9".repeat(5000);
-    for text in [
-        format!("1 0 0 {long}x 0 1 0 0 0 0 1 0\n"),
-        format!("{long}x 0 0 0 0 0 0 1\n"),
-        format!("GPSTime,easting,northing,roll,pitch,heading\n{long},0,0,0,0,0\n"),
-    ] {
-        let error = from_text("truth.txt", &text).unwrap_err().to_string();
-        assert!(error.len() < 300 && error.contains("999\"..."), "{error}");
-    }
 }
 
 #[test]
@@ -273,29 +175,22 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
     let pose = (1_i64..1_000_000_000, -1e4..1e4, -1e4..1e4, -3.1..3.1);
     prop::collection::vec(pose, 1..20).prop_map(|steps| {
         let mut stamp = 1_549_986_607_000_000_000;
-        let mut trajectory = Trajectory {
-            stamp_ns: Some(Vec::new()),
-            poses: Vec::new(),
-        };
+        let (mut stamps, mut poses) = (Vec::new(), Vec::new());
         for (step, x, y, yaw) in steps {
             stamp += step;
-            trajectory.stamp_ns.get_or_insert_default().push(stamp);
-            trajectory
-                .poses
-                .push(Isometry2::new(Vector2::new(x, y), yaw));
+            stamps.push(stamp);
+            poses.push(Isometry2::new(Vector2::new(x, y), yaw));
         }
-        trajectory
+        let stamp_ns = Some(stamps);
+        Trajectory { stamp_ns, poses }
     })
 }
 
 fn assert_close(a: &Trajectory, b: &Trajectory) {
     assert_eq!(a.len(), b.len());
     for (a, b) in a.poses.iter().zip(&b.poses) {
-        let apart = a.inverse() * b;
-        assert!(
-            (a.translation.vector - b.translation.vector).norm() < 1e-5
-                && apart.rotation.angle().abs() < 1e-9
-        );
+        assert!((a.translation.vector - b.translation.vector).norm() < 1e-5);
+        assert!((a.inverse() * b).rotation.angle().abs() < 1e-9);
     }
 }
 

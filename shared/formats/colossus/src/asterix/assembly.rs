@@ -6,24 +6,20 @@ use crate::message::{Azimuth, Powers};
 /// The most messages of an azimuth.
 const MAX_PARTS: usize = 1024;
 
-/// The parts of an azimuth that have arrived. Its memory is used again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Assembly {
     /// Angle and description, the same in all parts; `None` before the first.
     of: Option<(u16, Special)>,
     bin_bytes: usize,
     powers: Vec<u8>,
-    /// Bytes of the parts: from, to.
     parts: Vec<(usize, usize)>,
     bytes: usize,
-    /// Numbers of the first and the last message.
     numbers: (u32, u32),
     /// It has been returned; further parts are duplicates.
     is_done: bool,
 }
 
 impl Assembly {
-    /// Returns whether a message is a part of this azimuth.
     pub(super) fn is_of(&self, video: &Video<'_>) -> bool {
         self.of == Some((video.angle, video.special)) && self.bin_bytes == video.bin_bytes
     }
@@ -82,7 +78,6 @@ impl Assembly {
         is_whole
     }
 
-    /// Returns the azimuth, whose encoder has so many counts.
     pub(super) fn azimuth(&self, encoder_size: u16) -> Option<Azimuth<'_>> {
         let (angle, special) = self.of?;
         Some(Azimuth {

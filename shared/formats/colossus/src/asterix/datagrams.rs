@@ -2,10 +2,10 @@
 
 use std::mem;
 
-use super::{MalformedDatagram, Video, assembly::Assembly, decode};
+use super::{Video, assembly::Assembly, decode};
 use crate::configuration::Configuration;
 use crate::message::Message;
-use crate::parser::{Damage, Event};
+use crate::parser::Event;
 
 /// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
@@ -29,20 +29,16 @@ pub struct Datagrams {
     /// Bytes of the datagram in the buffer; 0: none.
     filled: usize,
     described: Option<Configuration>,
-    /// Number of the newest message.
     newest: Option<u32>,
     open: Assembly,
-    /// The azimuth that was returned last, when the datagram in the buffer is still to be handled.
     ended: Assembly,
     /// A datagram of the radar has come, with or without powers.
     has_part: bool,
 }
 
-/// The result of a datagram.
 enum Step {
     Nothing,
     Description(Configuration),
-    /// The open azimuth is complete.
     Complete,
     /// The azimuth before this datagram's has ended; the datagram is still to be handled.
     Ended,
@@ -102,7 +98,10 @@ impl Datagrams {
                 self.filled = bytes;
                 message(&self.ended, self.encoder_size)
             }
-            Err(malformed) => Some(damaged(malformed, bytes)),
+            Err(malformed) => Some(Event::Damaged {
+                reason: malformed.into(),
+                skipped_bytes: bytes,
+            }),
         }
     }
 
@@ -154,13 +153,6 @@ impl Datagrams {
 fn message(azimuth: &Assembly, encoder_size: u16) -> Option<Event<'_>> {
     let azimuth = azimuth.azimuth(encoder_size)?;
     Some(Event::Message(Message::Azimuth(azimuth)))
-}
-
-fn damaged(malformed: MalformedDatagram, bytes: usize) -> Event<'static> {
-    Event::Damaged {
-        reason: Damage::Datagram(malformed),
-        skipped_bytes: bytes,
-    }
 }
 
 #[cfg(test)]

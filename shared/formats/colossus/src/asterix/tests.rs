@@ -23,12 +23,10 @@ fn radar() -> Configuration {
 
 /// The datagrams of an azimuth whose powers begin with its row.
 fn datagrams(row: u16, number: &mut u32, bins: u16) -> Vec<Vec<u8>> {
-    let powers: Vec<u8> = (0..bins)
-        .map(|bin| (bin.wrapping_mul(31) ^ row) as u8)
-        .collect();
-    let order = ByteOrder::Big;
+    let power = |bin: u16| (bin.wrapping_mul(31) ^ row) as u8;
+    let powers: Vec<u8> = (0..bins).map(power).collect();
     let format = ClockFormat {
-        order,
+        order: ByteOrder::Big,
         ..ClockFormat::default()
     };
     let stamp_ns = 1_700_000_000_000_000_000 + i64::from(row) * 625_000;
@@ -41,10 +39,15 @@ fn datagrams(row: u16, number: &mut u32, bins: u16) -> Vec<Vec<u8>> {
         powers: Powers::Eight(&powers),
     };
     let mut sent = Vec::new();
-    write_azimuth(&radar(), &azimuth, number, &mut |bytes| {
-        sent.push(bytes.to_vec())
-    });
+    let mut send = |bytes: &[u8]| sent.push(bytes.to_vec());
+    write_azimuth(&radar(), &azimuth, number, &mut send);
     sent
+}
+
+/// The datagrams of the first azimuths of a turn.
+fn turn(azimuths: u16, mut number: u32, bins: u16) -> Vec<Vec<u8>> {
+    let rows = (0..azimuths).map(|row| datagrams(row, &mut number, bins));
+    rows.flatten().collect()
 }
 
 /// The encoder counts and first powers of the azimuths that a parser finds.
@@ -70,29 +73,17 @@ fn received(parser: &mut Datagrams, sent: &[Vec<u8>]) -> Vec<u16> {
 
 #[test]
 fn azimuths_are_put_together_from_their_datagrams() {
-    let mut number = u32::MAX - 2;
-    let sent: Vec<_> = (0..400)
-        .flat_map(|row| datagrams(row, &mut number, BINS))
-        .collect();
-    assert_eq!(
-        sent.len(),
-        400 * 3,
-        "3000 bins do not fit into two datagrams"
-    );
-    assert!(
-        sent.iter()
-            .all(|datagram| datagram.len() <= MAX_DATAGRAM_BYTES)
-    );
+    let sent = turn(400, u32::MAX - 2, BINS);
+    // 3000 bins do not fit into two datagrams.
+    assert_eq!(sent.len(), 400 * 3);
+    assert!(sent.iter().all(|sent| sent.len() <= MAX_DATAGRAM_BYTES));
     let mut parser = Datagrams::new(ENCODER);
     assert!(received(&mut parser, &sent).into_iter().eq(0..400));
 }
 
 #[test]
 fn order_and_doubles_within_an_azimuth_do_not_matter_and_a_missing_part_loses_it() {
-    let mut number = 7;
-    let mut sent: Vec<_> = (0..4)
-        .flat_map(|row| datagrams(row, &mut number, BINS))
-        .collect();
+    let mut sent = turn(4, 7, BINS);
     sent.swap(0, 2);
     sent.insert(4, sent[3].clone());
     let late = sent.remove(8);
@@ -104,10 +95,7 @@ fn order_and_doubles_within_an_azimuth_do_not_matter_and_a_missing_part_loses_it
 
 #[test]
 fn an_azimuth_of_fewer_bins_than_the_radar_says_ends_with_the_next_one() {
-    let mut number = 0;
-    let mut sent: Vec<_> = (0..3)
-        .flat_map(|row| datagrams(row, &mut number, 2000))
-        .collect();
+    let mut sent = turn(3, 0, 2000);
     let mut parser = Datagrams::new(ENCODER);
     assert_eq!(received(&mut parser, &sent), [0, 1]);
     sent.remove(1);
@@ -158,10 +146,8 @@ fn what_is_no_azimuth_is_named() {
         parser.filled(datagram.len());
         match parser.next() {
             Some(Event::Damaged { reason, .. }) => {
-                assert!(
-                    reason.to_string().contains(expected),
-                    "{reason}, not {expected}"
-                );
+                let said = reason.to_string();
+                assert!(said.contains(expected), "{said}, not {expected}");
             }
             other => panic!("{other:?}, not {expected}"),
         }

@@ -12,16 +12,12 @@ pub struct Counters {
     /// set. One each, however many turns are missing: turns without an azimuth are not counted
     /// here.
     pub broken_sweeps: u64,
-    /// Azimuths dropped because their sweep had begun before the stream.
-    pub discarded_azimuths: u64,
     /// Azimuths dropped because their sweep was complete.
     pub surplus_azimuths: u64,
     /// Azimuths dropped because they have the encoder count of the azimuth before.
     pub repeated_azimuths: u64,
     /// Azimuths dropped because their encoder count is beyond a turn.
     pub invalid_azimuths: u64,
-    /// Rows with fewer bins than configured, padded with zeros.
-    pub padded_rows: u64,
     /// Rows with more bins than configured, cut.
     pub cut_rows: u64,
 }

@@ -6,7 +6,9 @@ use crate::message::Powers;
 /// Pairs of neighbouring bins that decide the order of bytes.
 const DECIDING_PAIRS: u64 = 256;
 
-/// The order of the bytes of 16-bit powers, found from the powers.
+/// The order of the bytes of 16-bit powers. The order is undocumented: it is the order that gives
+/// smaller differences between neighbouring bins. In the wrong order the noise of the less
+/// significant byte is the more significant one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PowerOrder {
     /// Sums of the differences between neighbouring bins in either order, until one is decided.
@@ -17,10 +19,6 @@ pub(super) struct PowerOrder {
 }
 
 impl PowerOrder {
-    pub(super) fn decided(&self) -> Option<ByteOrder> {
-        self.decided
-    }
-
     /// Writes the powers to the first bytes of `row`.
     pub(super) fn write(&mut self, powers: Powers<'_>, row: &mut [u8]) {
         match powers {
@@ -44,10 +42,8 @@ impl PowerOrder {
             return order;
         }
         let difference = |number: fn([u8; 2]) -> u16| -> u64 {
-            let pairs = powers.windows(2);
-            pairs
-                .map(|pair| u64::from(number(pair[0]).abs_diff(number(pair[1]))))
-                .sum()
+            let of_pair = |pair: &[[u8; 2]]| number(pair[0]).abs_diff(number(pair[1])).into();
+            powers.windows(2).map(of_pair).sum()
         };
         self.little += difference(u16::from_le_bytes);
         self.big += difference(u16::from_be_bytes);

@@ -8,13 +8,11 @@ use super::powers::PowerOrder;
 use crate::configuration::Configuration;
 use crate::message::Powers;
 
-/// Rows of azimuths that did not arrive, evenly spaced.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Empty {
     pub(super) count: usize,
     /// Encoder count and time of the row before the first.
     pub(super) from: (f64, i64),
-    /// Counts from row to row.
     pub(super) counts: f64,
     /// Time from row to row, ns.
     pub(super) ns: f64,
@@ -23,12 +21,12 @@ pub(super) struct Empty {
 /// Writes the rows of a scan in order.
 #[derive(Clone, Debug)]
 pub(super) struct RowWriter {
-    limits: ScanLimits,
-    bins: usize,
+    pub(super) limits: ScanLimits,
+    pub(super) bins: usize,
     encoder_size: f64,
-    written: usize,
-    missing: usize,
-    pub(super) order: PowerOrder,
+    pub(super) written: usize,
+    pub(super) missing: usize,
+    order: PowerOrder,
 }
 
 impl RowWriter {
@@ -48,25 +46,6 @@ impl RowWriter {
         }
     }
 
-    pub(super) fn limits(&self) -> ScanLimits {
-        self.limits
-    }
-
-    pub(super) fn bins(&self) -> usize {
-        self.bins
-    }
-
-    /// Number of rows, measured or not.
-    pub(super) fn written(&self) -> usize {
-        self.written
-    }
-
-    /// Number of rows that were not measured.
-    pub(super) fn missing(&self) -> usize {
-        self.missing
-    }
-
-    /// Number of rows that a turn may have beside those written.
     pub(super) fn left(&self) -> usize {
         self.limits.azimuths - self.written
     }
@@ -76,17 +55,12 @@ impl RowWriter {
     }
 
     pub(super) fn assert_fits(&self, slot: &ScanSlot<'_>) {
-        let azimuths = [
-            slot.azimuth_rad.len(),
-            slot.stamp_ns.len(),
-            slot.flags.len(),
-        ];
-        let fits = slot.bytes.len() >= self.limits.bytes
-            && azimuths.into_iter().all(|len| len >= self.limits.azimuths);
+        let (azimuths, stamps) = (slot.azimuth_rad.len(), slot.stamp_ns.len());
+        let azimuths = azimuths.min(stamps).min(slot.flags.len());
+        let fits = slot.bytes.len() >= self.limits.bytes && azimuths >= self.limits.azimuths;
         assert!(fits, "the slot is smaller than the limits");
     }
 
-    /// Writes a row that was measured at an encoder count and time.
     pub(super) fn write_measured(
         &mut self,
         place: (f64, i64),
@@ -98,17 +72,16 @@ impl RowWriter {
             return;
         };
         let bins = powers.bins();
-        counters.padded_rows += u64::from(bins < row.len());
         counters.cut_rows += u64::from(bins > row.len());
         let measured = bins.min(row.len());
         self.order.write(powers, &mut row[..measured]);
         row[measured..].fill(0);
     }
 
-    /// Writes rows that were not measured.
-    pub(super) fn write_empty(&mut self, empty: Empty, slot: &mut ScanSlot<'_>) {
+    /// Writes rows that were not measured, at most `fits`.
+    pub(super) fn write_empty(&mut self, empty: Empty, fits: usize, slot: &mut ScanSlot<'_>) {
         let (encoder, stamp_ns) = empty.from;
-        for k in 1..=empty.count {
+        for k in 1..=empty.count.min(fits) {
             let after_ns = (k as f64 * empty.ns).round() as i64;
             let place = (
                 // Rounding must not lead before the start of the turn, or to its end.

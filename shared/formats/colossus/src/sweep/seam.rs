@@ -7,33 +7,21 @@ use crate::configuration::Configuration;
 /// Where it differs by more, a turn or more is missing, or the clock was set.
 const BREAK_TURNS: f64 = 0.75;
 
-/// The encoder counts and times of a turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     encoder_size: u16,
-    /// Counts from azimuth to azimuth.
     step: f64,
     ns_per_count: f64,
 }
 
-/// The azimuths missing between the last one of a sweep and the first one of the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seam {
     /// Number of those before zero.
     trailing: usize,
     /// Number of those after zero.
     leading: usize,
-    /// Counts from row to row.
     counts: f64,
     /// Time from row to row, ns.
-    ns: f64,
-}
-
-/// The azimuths missing between two of a sweep.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gap {
-    count: usize,
-    counts: f64,
     ns: f64,
 }
 
@@ -52,33 +40,30 @@ impl Grid {
         (count <= self.encoder_size).then_some(count % self.encoder_size)
     }
 
-    /// Returns whether no other azimuth fits between zero and this one.
     pub(super) fn is_first(&self, encoder: u16) -> bool {
         f64::from(encoder) < self.step
     }
 
-    /// Returns whether no further azimuth fits into the turn.
     pub(super) fn is_last(&self, last: Reading) -> bool {
         f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
     }
 
-    /// Returns the number of azimuths between one and the end of its turn.
     pub(super) fn azimuths_after(&self, last: Reading) -> f64 {
         (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
     }
 
-    /// Returns whether the time between two azimuths differs from the rotation between them.
     pub(super) fn is_break(&self, last: Reading, here: Reading) -> bool {
         let expected_ns = self.counts(last, here) * self.ns_per_count;
         let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;
         (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
     }
 
-    pub(super) fn gap(&self, last: Reading, here: Reading) -> Gap {
+    pub(super) fn gap(&self, last: Reading, here: Reading) -> Empty {
         let counts = self.counts(last, here);
         let rows = (counts / self.step).round().max(1.0);
-        Gap {
+        Empty {
             count: rows as usize - 1,
+            from: (last.encoder.into(), last.stamp_ns),
             counts: counts / rows,
             ns: elapsed_ns(last, here) / rows,
         }
@@ -88,28 +73,28 @@ impl Grid {
         let to_zero = f64::from(self.encoder_size - last.encoder);
         // Positions before zero, which zero itself is not.
         let before_zero = (to_zero / self.step).ceil() as usize - 1;
+        // The step across zero may be shorter than the others.
+        let counts = self.step;
         if self.is_break(last, here) {
             // Nothing is known of the time in between: both sweeps are continued at the radar's
             // rotation.
             return Seam {
                 trailing: before_zero,
                 leading: (f64::from(here.encoder) / self.step) as usize,
-                counts: self.step,
+                counts,
                 ns: self.step * self.ns_per_count,
             };
         }
-        let Gap { count, ns, .. } = self.gap(last, here);
+        let Empty { count, ns, .. } = self.gap(last, here);
         let trailing = before_zero.min(count);
         Seam {
             trailing,
             leading: count - trailing,
-            // The step across zero may be shorter than the others.
-            counts: self.step,
+            counts,
             ns,
         }
     }
 
-    /// Encoder counts from one azimuth to the next, of less than a turn.
     fn counts(&self, last: Reading, here: Reading) -> f64 {
         let counts = f64::from(here.encoder) - f64::from(last.encoder);
         match counts < 0.0 {
@@ -119,23 +104,11 @@ impl Grid {
     }
 }
 
-impl Gap {
-    /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn forward(&self, last: Reading, fits: usize) -> Empty {
-        Empty {
-            count: self.count.min(fits),
-            from: (last.encoder.into(), last.stamp_ns),
-            counts: self.counts,
-            ns: self.ns,
-        }
-    }
-}
-
 impl Seam {
-    /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn trailing(&self, last: Reading, fits: usize) -> Empty {
+    /// Returns the rows after `last`.
+    pub(super) fn trailing(&self, last: Reading) -> Empty {
         Empty {
-            count: self.trailing.min(fits),
+            count: self.trailing,
             from: (last.encoder.into(), last.stamp_ns),
             counts: self.counts,
             ns: self.ns,
@@ -147,12 +120,10 @@ impl Seam {
         let count = self.leading.min(fits);
         let rows = (count + 1) as f64;
         let before_ns = (rows * self.ns).round() as i64;
+        let encoder = f64::from(here.encoder) - rows * self.counts;
         Empty {
             count,
-            from: (
-                f64::from(here.encoder) - rows * self.counts,
-                here.stamp_ns.saturating_sub(before_ns),
-            ),
+            from: (encoder, here.stamp_ns.saturating_sub(before_ns)),
             counts: self.counts,
             ns: self.ns,
         }

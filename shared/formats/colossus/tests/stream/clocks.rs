@@ -102,10 +102,8 @@ fn a_clock_that_stands_still_gives_times_of_arrival() {
         let mut clock = RadarClock::new(&radar());
         let mut stamps = Vec::new();
         for row in &rows {
-            let still = crate::support::SentAzimuth {
-                stamp_ns: still_ns,
-                ..row.clone()
-            };
+            let mut still = row.clone();
+            still.stamp_ns = still_ns;
             let azimuth = still.azimuth(ClockFormat::default());
             stamps.extend(clock.stamp(azimuth, row.stamp_ns).map(|(_, ns)| ns));
         }
@@ -133,16 +131,13 @@ fn stamps_that_come_in_bursts_are_understood() {
 #[test]
 fn a_radar_that_learns_the_time_is_offset_no_more() {
     let mut rows = turns(&radar(), 0, 5_000_000_000, 1);
-    rows[200..]
-        .iter_mut()
-        .for_each(|row| row.stamp_ns += START_NS);
+    let later = rows[200..].iter_mut();
+    later.for_each(|row| row.stamp_ns += START_NS);
     let mut clock = RadarClock::new(&radar());
     let found = stamped(&mut clock, &rows, ClockFormat::default());
     assert_eq!(found[200..], rows[200..]);
     let unix = FoundClock::Unix(ClockFormat::default());
     assert_eq!(clock.found(), Some(unix));
-    assert_eq!(
-        unix.to_string(),
-        "The radar sends its time as little-endian seconds and nanoseconds."
-    );
+    let expected = "The radar sends its time as little-endian seconds and nanoseconds.";
+    assert_eq!(unix.to_string(), expected);
 }

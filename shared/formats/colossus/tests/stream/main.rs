@@ -5,7 +5,6 @@
 mod clocks;
 mod messages;
 mod parsing;
-mod recordings;
 mod scans;
 mod support;
 mod sweeps;

@@ -27,10 +27,8 @@ fn served(
     feed(&mut Parser::new(), &bytes, piece, |event| match event {
         Event::Message(Message::Configuration(configuration)) => {
             assert_eq!(configuration, *radar);
-            client = Some((
-                RadarClock::new(&configuration),
-                Assembly::new(&configuration),
-            ));
+            let clock = RadarClock::new(&configuration);
+            client = Some((clock, Assembly::new(&configuration)));
         }
         Event::Message(Message::Azimuth(azimuth)) => {
             let (clock, assembly) = client.as_mut().unwrap();
@@ -55,9 +53,8 @@ fn every_scan_of_a_recording_comes_back_identical() {
             let radar = configuration(encoder_size, 50);
             let mut rows = turns(&radar, first, start_ns, 4);
             // The recording has a gap.
-            rows[800..]
-                .iter_mut()
-                .for_each(|row| row.stamp_ns += 1_997_738_586);
+            let later = rows[800..].iter_mut();
+            later.for_each(|row| row.stamp_ns += 1_997_738_586);
             let assembly = served(&radar, &rows, ClockFormat::default(), 1400);
             assert_eq!(assembly.sweeps.len(), 4);
             for ((sweep, scan), rows) in assembly.sweeps.iter().zip(rows.chunks(400)) {

@@ -81,10 +81,11 @@ impl Assembly {
         // Earlier content of a slot must not show.
         slot.bytes.fill(0xaa);
         slot.flags.fill(0xaa);
+        let sweeps = Vec::new();
         Self {
-            slot,
             assembler,
-            sweeps: Vec::new(),
+            slot,
+            sweeps,
         }
     }
 
@@ -111,6 +112,16 @@ impl Assembly {
     pub fn counters(&self) -> Counters {
         self.assembler.counters()
     }
+}
+
+/// Adds rows to the scans of a radar.
+pub fn assembled<'a>(
+    radar: &Configuration,
+    rows: impl IntoIterator<Item = &'a SentAzimuth>,
+) -> Assembly {
+    let mut assembly = Assembly::new(radar);
+    assembly.add_rows(rows);
+    assembly
 }
 
 /// Appends bytes to a parser in pieces of at most `piece` bytes, and calls back with each event.

@@ -3,10 +3,10 @@
 use gyre_colossus::{
     Azimuth, ByteOrder, ClockFormat, Configuration, Constants, Counters, Powers, SweepAssembler,
 };
-use gyre_radar::{Sense, scan::flag};
+use gyre_radar::{OwnedScan, Sense, scan::flag};
 use proptest::prelude::*;
 
-use crate::support::{Assembly, START_NS, configuration, turns};
+use crate::support::{Assembly, START_NS, assembled, configuration, turns};
 
 /// Angle of an encoder count as the readers of recordings compute it.
 fn angle(encoder: u16, encoder_size: u16) -> f32 {
@@ -25,8 +25,7 @@ proptest! {
         let rows = turns(&radar, first, START_NS, 4);
         // The first turn shows where turns begin, the last one that the third has ended.
         let lost = |k: &usize| (400..1200).contains(k) && lost.contains(k);
-        let mut assembly = Assembly::new(&radar);
-        assembly.add_rows((0..1600).filter(|k| !lost(k)).map(|k| &rows[k]));
+        let assembly = assembled(&radar, (0..1600).filter(|k| !lost(k)).map(|k| &rows[k]));
         prop_assert_eq!(assembly.sweeps.len(), 4);
         let total = (0..1600).filter(lost).count();
         prop_assert_eq!(assembly.counters(), Counters { sweeps: 4, missing_azimuths: total as u64, ..Counters::default() });
@@ -51,30 +50,6 @@ proptest! {
             }
         }
     }
-
-    #[test]
-    fn any_azimuths_give_consistent_scans(
-        samples in 2_u16..20,
-        counts in 16_u16..200,
-        rotation_mhz in 100_u16..,
-        azimuths in prop::collection::vec((0_u16..210, prop_oneof![
-            4 => 0_i64..2_000_000_000,
-            1 => any::<i64>(),
-        ], prop::collection::vec(any::<u8>(), 0..9), any::<bool>()), 0..200),
-    ) {
-        let radar = Configuration { azimuth_samples: samples, encoder_size: counts.max(samples), rotation_mhz, ..configuration(5600, 6) };
-        let constants = Constants { azimuth_eccentricity_rad: 0.0, ..Constants::default() };
-        let mut assembly = Assembly::with(&radar, constants);
-        for (encoder, stamp_ns, powers, wide) in &azimuths {
-            let powers = match wide {
-                true => Powers::Sixteen(&powers[..powers.len() / 2 * 2]),
-                false => Powers::Eight(powers),
-            };
-            let azimuth = Azimuth { sweep_counter: 0, encoder: *encoder, seconds: [0; 4], split_seconds: [0; 4], powers };
-            assembly.add(&azimuth, *stamp_ns);
-        }
-        prop_assert_eq!(assembly.counters().sweeps, assembly.sweeps.len() as u64);
-    }
 }
 
 #[test]
@@ -92,24 +67,15 @@ fn a_sweep_is_complete_at_its_last_azimuth() {
 #[test]
 fn a_sweep_that_began_before_the_stream_is_discarded() {
     let radar = configuration(5600, 4);
-    let rows = turns(&radar, 13, START_NS, 3);
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(&rows[150..]);
-    assert_eq!(assembly.sweeps.len(), 2);
-    assert_eq!(assembly.sweeps[0].1.stamp_ns[0], rows[400].stamp_ns);
-    assert_eq!(assembly.counters().discarded_azimuths, 250);
-}
-
-#[test]
-fn a_stream_that_begins_at_the_second_azimuth_of_a_turn_begins_with_the_next_one() {
-    let radar = configuration(5600, 4);
-    let rows = turns(&radar, 0, START_NS, 2);
-    let mut assembly = Assembly::new(&radar);
-    assert!(assembly.assembler.is_first(0) && !assembly.assembler.is_first(14));
-    assembly.add_rows(&rows[1..]);
-    assert_eq!(assembly.sweeps.len(), 1);
-    assert_eq!(assembly.sweeps[0].1.stamp_ns[0], rows[400].stamp_ns);
-    assert_eq!(assembly.counters().discarded_azimuths, 399);
+    assert!(Assembly::new(&radar).assembler.is_first(0));
+    assert!(!Assembly::new(&radar).assembler.is_first(14));
+    // From the second azimuth of a turn on, and from its middle on.
+    for (first, from) in [(0, 1), (13, 150)] {
+        let rows = turns(&radar, first, START_NS, 3);
+        let assembly = assembled(&radar, &rows[from..]);
+        assert_eq!(assembly.sweeps.len(), 2);
+        assert_eq!(assembly.sweeps[0].1.stamp_ns[0], rows[400].stamp_ns);
+    }
 }
 
 #[test]
@@ -136,14 +102,10 @@ fn a_sweep_that_lost_its_end_is_returned_at_the_next_one_without_losing_its_firs
 fn a_sweep_that_misses_more_than_half_is_counted_and_not_returned() {
     let radar = configuration(5600, 4);
     let rows = turns(&radar, 0, START_NS, 3);
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(&rows[..400]);
-    assembly.add_rows(rows[400..800].iter().take(199));
-    assembly.add_rows(&rows[800..]);
+    let assembly = assembled(&radar, rows[..599].iter().chain(&rows[800..]));
     assert_eq!(assembly.sweeps.len(), 2);
     assert_eq!(assembly.counters().incomplete_sweeps, 1);
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(rows.iter().step_by(2));
+    let assembly = assembled(&radar, rows.iter().step_by(2));
     assert_eq!(assembly.sweeps.len(), 2);
     assert_eq!(assembly.counters().missing_azimuths, 400);
 }
@@ -152,12 +114,9 @@ fn a_sweep_that_misses_more_than_half_is_counted_and_not_returned() {
 fn a_pause_between_sweeps_is_not_between_their_azimuths() {
     let radar = configuration(5600, 4);
     let mut rows = turns(&radar, 0, START_NS, 2);
-    rows[400..]
-        .iter_mut()
-        .for_each(|row| row.stamp_ns += 7_000_000_000);
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(&rows[..390]);
-    assembly.add_rows(&rows[405..]);
+    let later = rows[400..].iter_mut();
+    later.for_each(|row| row.stamp_ns += 7_000_000_000);
+    let assembly = assembled(&radar, rows[..390].iter().chain(&rows[405..]));
     let [(_, ended), (second, begun)] = &assembly.sweeps[..] else {
         panic!("{} sweeps", assembly.sweeps.len());
     };
@@ -171,9 +130,7 @@ fn a_pause_between_sweeps_is_not_between_their_azimuths() {
 fn a_sweep_whose_middle_is_of_another_turn_is_dropped() {
     let radar = configuration(5600, 4);
     let rows = turns(&radar, 0, START_NS, 5);
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(&rows[..600]);
-    assembly.add_rows(&rows[1000 + 5..]);
+    let assembly = assembled(&radar, rows[..600].iter().chain(&rows[1000 + 5..]));
     assert_eq!(assembly.sweeps.len(), 3);
     assert_eq!(assembly.counters().broken_sweeps, 1);
     assert_eq!(assembly.sweeps[1].1.stamp_ns[0], rows[1200].stamp_ns);
@@ -184,13 +141,10 @@ fn azimuths_that_are_too_many_repeated_or_invalid_are_dropped_and_counted() {
     let mut radar = configuration(5600, 4);
     let rows = turns(&radar, 0, START_NS, 2);
     radar.azimuth_samples = 200;
-    let mut assembly = Assembly::new(&radar);
-    // Twice as many as configured: the scans are of the first half of each turn.
-    assembly.add_rows(&rows);
-    assembly.add_rows(&rows[799..]);
     let mut invalid = rows[0].clone();
     invalid.encoder = 5601;
-    assembly.add_rows([&invalid]);
+    // Twice as many as configured: the scans are of the first half of each turn.
+    let assembly = assembled(&radar, rows.iter().chain(&rows[799..]).chain([&invalid]));
     let expected = Counters {
         sweeps: 2,
         surplus_azimuths: 400,
@@ -208,15 +162,13 @@ fn rows_of_other_lengths_are_padded_and_cut() {
     rows[1].powers = vec![9; 4];
     rows[2].powers = vec![9; 8];
     rows[3].powers = vec![];
-    let mut assembly = Assembly::new(&radar);
-    assembly.add_rows(&rows);
+    let assembly = assembled(&radar, &rows);
     let scan = assembly.sweeps[0].1.view();
     assert_eq!(scan.row(1), [9, 9, 9, 9, 0, 0]);
     assert_eq!(scan.row(2), [9; 6]);
     assert_eq!(scan.row(3), [0; 6]);
     assert_eq!(scan.row(4), rows[4].powers);
-    let counters = assembly.counters();
-    assert_eq!((counters.padded_rows, counters.cut_rows), (2, 1));
+    assert_eq!(assembly.counters().cut_rows, 1);
 }
 
 #[test]
@@ -228,68 +180,55 @@ fn the_order_of_16_bit_powers_is_found() {
     for order in [ByteOrder::Little, ByteOrder::Big] {
         let mut assembly = Assembly::new(&radar);
         for (k, row) in rows.iter().enumerate() {
-            let bytes: Vec<u8> = (0..300)
-                .flat_map(|bin| match order {
-                    ByteOrder::Little => power(k, bin).to_le_bytes(),
-                    ByteOrder::Big => power(k, bin).to_be_bytes(),
-                })
-                .collect();
+            let bytes = |bin| match order {
+                ByteOrder::Little => power(k, bin).to_le_bytes(),
+                ByteOrder::Big => power(k, bin).to_be_bytes(),
+            };
+            let bytes: Vec<u8> = (0..300).flat_map(bytes).collect();
             let azimuth = Azimuth {
                 powers: Powers::Sixteen(&bytes),
                 ..row.azimuth(ClockFormat::default())
             };
             assembly.add(&azimuth, row.stamp_ns);
         }
-        assert_eq!(assembly.assembler.power_order(), Some(order));
         let scan = assembly.sweeps[0].1.view();
         for k in 0..400 {
             let expected: Vec<u8> = (0..300).map(|bin| (power(k, bin) >> 8) as u8).collect();
             assert_eq!(scan.row(k), expected);
         }
-        assert_eq!(assembly.counters().padded_rows, 0);
     }
 }
 
 #[test]
 fn a_scan_has_the_constants_given() {
     let radar = configuration(5600, 4);
-    let rows = turns(&radar, 0, START_NS, 1);
     let constants = Constants {
         range_resolution_m: Some(0.0596),
         range_offset_m: -0.31,
         doppler_s: 0.04,
         azimuth_eccentricity_rad: -0.01,
     };
-    let mut assembly = Assembly::with(&radar, constants);
-    for row in &rows {
+    let mut assembler = SweepAssembler::new(&radar, constants).unwrap();
+    let mut scan = OwnedScan::with_limits(assembler.limits());
+    let rows = turns(&radar, 0, START_NS, 1);
+    let mut sweeps = rows.iter().filter_map(|row| {
         let azimuth = row.azimuth(ClockFormat::default());
-        let mut scan = gyre_radar::OwnedScan::with_limits(assembly.assembler.limits());
-        // The memory of the last call alone is read here, for its geometry.
-        if let Some(sweep) = assembly.assembler.add(&azimuth, row.stamp_ns, scan.slot()) {
-            let geometry = sweep.geometry;
-            assert_eq!(geometry.range_resolution_m, 0.0596);
-            assert_eq!(geometry.range_offset_m, -0.31);
-            assert_eq!(geometry.doppler_s, 0.04);
-            assert_eq!(geometry.sense, Sense::Clockwise);
-            let mut expected = [angle(5586, 5600)];
-            gyre_datasets::correct_eccentricity(&mut expected, -0.01);
-            assert_eq!(scan.azimuth_rad[399], expected[0]);
-            return;
-        }
-    }
-    panic!("no scan");
+        assembler.add(&azimuth, row.stamp_ns, scan.slot())
+    });
+    let geometry = sweeps.next().unwrap().geometry;
+    assert_eq!(geometry.range_resolution_m, 0.0596);
+    assert_eq!([geometry.range_offset_m, geometry.doppler_s], [-0.31, 0.04]);
+    assert_eq!(geometry.sense, Sense::Clockwise);
+    let mut expected = [angle(5586, 5600)];
+    gyre_datasets::correct_eccentricity(&mut expected, -0.01);
+    assert_eq!(scan.azimuth_rad[399], expected[0]);
 }
 
 #[test]
 fn a_configuration_out_of_bounds_is_refused() {
-    let bad = Configuration {
-        azimuth_samples: 0,
-        ..configuration(5600, 4)
-    };
-    assert!(SweepAssembler::new(&bad, Constants::default()).is_err());
     // A resolution that is given replaces the radar's.
     let none = Configuration {
-        range_resolution_m: None,
+        range_resolution_m: Some(0.0),
         bin_size: 0,
         ..configuration(5600, 4)
     };

@@ -1,8 +1,4 @@
-//! `dataset.toml`: options stored with a recording.
-//!
-//! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they
-//! are best stored beside its recordings. Simulated recordings include the file. Options given
-//! explicitly take precedence.
+//! `dataset.toml`: options stored with a recording. Options given explicitly take precedence.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -13,29 +9,25 @@ use crate::in_plain_words;
 /// File name, beside the folder of images or in it.
 const FILE: &str = "dataset.toml";
 
-/// Reads the file in the root of a dataset or its parent. Without a file, all options are unset.
-pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
+pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     let places = [Some(root), root.parent()].into_iter().flatten();
     for path in places.map(|folder| folder.join(FILE)) {
         let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
             Ok(text) => text,
-            Err(error)
-                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
-            {
-                continue;
-            }
-            Err(source) => return Err(OpenError::Io { path, source }),
+            Err(error) => match error.kind() {
+                ErrorKind::NotFound | ErrorKind::NotADirectory => continue,
+                _ => return Err(OpenError::io(&path, error)),
+            },
         };
-        let invalid = |error: toml::de::Error| OpenError::DatasetToml {
-            path: path.clone(),
-            reason: reason(&text, &error),
-        };
-        return toml::from_str(&text).map_err(invalid);
+        return toml::from_str(&text).map_err(|error| {
+            let reason = reason(&text, &error);
+            let fault = format!("does not hold keys of the section [dataset]: {reason}");
+            OpenError::at(&path, fault)
+        });
     }
     Ok(DatasetOptions::default())
 }
 
-/// Returns the error, with the key of its line.
 fn reason(text: &str, error: &toml::de::Error) -> String {
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = before.and_then(|before| before.rsplit('\n').next());
@@ -56,44 +48,37 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let images = folder.path().join("radar");
         fs::create_dir(&images).unwrap();
-        assert_eq!(options(&images).unwrap(), DatasetOptions::default());
-        fs::write(
-            folder.path().join(FILE),
-            "range_offset_m = -0.25\nencoder_counts = 3600\n",
-        )
-        .unwrap();
+        assert_eq!(stored_options(&images).unwrap(), DatasetOptions::default());
+        let text = "range_offset_m = -0.25\nencoder_counts = 3600\n";
+        fs::write(folder.path().join(FILE), text).unwrap();
         let stored = DatasetOptions {
             range_offset_m: Some(-0.25),
             encoder_counts: Some(3600),
             ..Default::default()
         };
-        assert_eq!(options(folder.path()).unwrap(), stored);
-        assert_eq!(options(&images).unwrap(), stored);
+        assert_eq!(stored_options(folder.path()).unwrap(), stored);
+        assert_eq!(stored_options(&images).unwrap(), stored);
         let explicit = DatasetOptions {
             range_offset_m: Some(0.5),
             ..Default::default()
         };
-        assert_eq!(
-            explicit.or(&stored),
-            DatasetOptions {
-                range_offset_m: Some(0.5),
-                ..stored
-            }
-        );
+        let both = explicit.or(&stored);
+        assert_eq!(both.range_offset_m, Some(0.5));
+        assert_eq!(both.encoder_counts, Some(3600));
     }
 
     #[test]
     fn unknown_keys_are_rejected_by_name() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(FILE), "range_ofset_m = 1.0").unwrap();
-        let error = options(folder.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("dataset.toml") && error.contains("range_ofset_m"),
-            "{error}"
-        );
-        fs::write(folder.path().join(FILE), "# mine\nencoder_counts = 'many'").unwrap();
-        let error = options(folder.path()).unwrap_err().to_string();
-        let expected = "encoder_counts is \"many\", but must be a whole number from 0 to 65535";
-        assert!(error.contains(expected), "{error}");
+        let many = "encoder_counts is \"many\", but must be a whole number from 0 to 65535";
+        for (text, expected) in [
+            ("range_ofset_m = 1.0", "range_ofset_m"),
+            ("# mine\nencoder_counts = 'many'", many),
+        ] {
+            fs::write(folder.path().join(FILE), text).unwrap();
+            let error = stored_options(folder.path()).unwrap_err().to_string();
+            assert!(error.contains("dataset.toml"), "{error}");
+            assert!(error.contains(expected), "{error}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Detection of the format of a folder: by its layout, otherwise by the first image.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
@@ -11,13 +12,10 @@ use super::format::Format;
 use super::image_list::has_png;
 use super::image_source::ImageSource;
 use super::images::Images;
-use super::profiles::{KNOWN, Profile};
+use super::profiles::{KNOWN, Known, Profile};
 
-/// A located dataset, the input of the readers.
-#[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) format: Format,
-    /// The folder of images.
     pub(crate) folder: PathBuf,
     pub(crate) images: Images,
     /// Sentences on files that are left out, and on the format, if it was detected from the first
@@ -28,17 +26,21 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// Returns a dataset whose files are known.
+    fn new(format: Format, folder: PathBuf, images: Images) -> Self {
+        Self {
+            format,
+            folder,
+            images,
+            notes: Vec::new(),
+            stamps: None,
+        }
+    }
+
     pub(crate) fn listed(root: &Path, format: Format, files: FileList) -> Result<Self, OpenError> {
         let folder = files.get(0).and_then(Path::parent).unwrap_or(root);
         let folder = folder.to_owned();
-        Ok(Self {
-            format,
-            images: Images::listed(&folder, files)?,
-            folder,
-            notes: Vec::new(),
-            stamps: None,
-        })
+        let images = Images::listed(&folder, files)?;
+        Ok(Self::new(format, folder, images))
     }
 
     /// Returns a recording that is not on disk.
@@ -49,11 +51,8 @@ impl Found {
         let format = forced.unwrap_or(source.format());
         let (folder, stamps) = (source.folder(), source.stamps());
         Ok(Self {
-            format,
-            folder,
-            images: Images::of(source)?,
-            notes: Vec::new(),
             stamps,
+            ..Self::new(format, folder, Images::of(source)?)
         })
     }
 }
@@ -82,21 +81,19 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     let format = match forced.or_else(|| by_layout(root, &folder)) {
         Some(format) => format,
         None => {
-            let (format, note) = by_image(root, &folder, &mut images)?;
-            notes.push(note);
+            let (format, evidence) = by_image(root, &folder, &mut images)?;
+            notes.push(format!(
+                "The layout of the folder matches no dataset; read as {format} by its first image: {evidence}"
+            ));
             format
         }
     };
     Ok(Found {
-        format,
-        folder,
-        images,
         notes,
-        stamps: None,
+        ..Found::new(format, folder, images)
     })
 }
 
-/// Returns whether the presence of row times in the images differs from the format.
 fn is_other_form(format: Format, image: &FirstImage) -> bool {
     let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
     image.has_stamps() != has_stamps
@@ -105,16 +102,18 @@ fn is_other_form(format: Format, image: &FirstImage) -> bool {
 /// Returns whether both the names of images and the files beside them belong to a different format.
 /// A recording of one's own may differ in either.
 fn is_marked_otherwise(format: Format, image: &FirstImage, root: &Path, folder: &Path) -> bool {
-    let names = Profile::of(format)
-        .filter(|it| it.bins.is_some())
-        .map(|it| it.named_by);
-    let is_named_otherwise =
-        names.is_some() && image.named_by().is_some_and(|by| names != Some(by));
-    let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
+    let profile = Profile::of(format).filter(|it| it.bins.is_some());
+    let is_named_otherwise = profile
+        .zip(image.named_by())
+        .is_some_and(|(profile, by)| profile.named_by != by);
     // The names of folders are weaker evidence: `navtech` may hold anything.
     let has_oxford_files = by_layout(root, folder) == Some(Format::Oxford);
     let by_files = has_oxford_files && format != Format::Oxford;
-    is_named_otherwise && (by_files || (has_boreas_folders(root) && !is_boreas))
+    is_named_otherwise && (by_files || (has_boreas_folders(root) && !is_boreas(format)))
+}
+
+fn is_boreas(format: Format) -> bool {
+    matches!(format, Format::Boreas | Format::BoreasRt)
 }
 
 fn has_boreas_folders(root: &Path) -> bool {
@@ -124,36 +123,33 @@ fn has_boreas_folders(root: &Path) -> bool {
 /// Returns an error if a folder is a dataset of another format than is configured.
 fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
     let (configured, found) = (configured?, locate(root, None).ok()?.format);
-    (found != configured).then(|| OpenError::OtherFormat {
-        path: root.to_owned(),
-        found,
-        configured,
-    })
+    let fault = format!(
+        "looks like {found}, but the configuration says `format = \"{configured}\"`: use a configuration of {found}, or none"
+    );
+    (found != configured).then(|| OpenError::at(root, fault))
 }
 
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(foreign(root).unwrap_or(OpenError::NotAFolder {
-            path: root.to_owned(),
+        Ok(_) => Err(foreign(root).unwrap_or_else(|| {
+            let fault = "is a file: give the folder of the dataset, which holds the radar images or their folder, or a recording or bag of ROS 2 as MCAP";
+            OpenError::at(root, fault)
         })),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(OpenError::Missing {
-            path: root.to_owned(),
-        }),
-        Err(source) => Err(OpenError::Io {
-            path: root.to_owned(),
-            source,
-        }),
+        Err(e) if e.kind() == ErrorKind::NotFound => Err(OpenError::Recording(format!(
+            "there is no dataset at {}: no such folder; check the path",
+            root.display()
+        ))),
+        Err(source) => Err(OpenError::io(root, source)),
     }
 }
 
 /// Returns the folder of the images: the folder of a known layout, otherwise the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
     let known = || {
-        KNOWN
-            .iter()
-            .filter(|(f, ..)| forced.is_none_or(|forced| forced == *f))
-            .flat_map(|(_, folders, _)| folders.iter())
+        let of_format = |(format, ..): &&Known| forced.is_none_or(|forced| forced == *format);
+        let known = KNOWN.iter().filter(of_format);
+        known.flat_map(|(_, folders, _)| folders.iter())
     };
     let mut candidates = known().map(|folder| root.join(folder));
     if let Some(folder) = candidates.clone().find(|folder| has_png(folder)) {
@@ -165,12 +161,10 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
     }
     // An empty folder of a known layout is more informative than the root.
     if let Some(folder) = candidates.find(|folder| folder.is_dir()) {
-        return Err(OpenError::NoImages { path: folder });
+        return Err(OpenError::no_images(&folder));
     }
     if fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_none()) {
-        return Err(OpenError::NoImages {
-            path: root.to_owned(),
-        });
+        return Err(OpenError::no_images(root));
     }
     if let Some(error) = foreign_in(root) {
         return Err(error);
@@ -190,90 +184,53 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
             SET_FORMAT,
         ),
     };
-    Err(OpenError::UnknownLayout {
-        path: root.to_owned(),
-        reason,
-        remedy,
-    })
+    Err(OpenError::unknown_layout(root, &reason, remedy))
 }
 
 /// Returns the format if the name of the folder and the files beside it determine it.
 fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     let name = folder.file_name()?.to_str()?;
-    let beside = |file: &str| {
-        root.join(file).exists()
-            || folder
-                .parent()
-                .is_some_and(|parent| parent.join(file).exists())
-    };
-    match name {
-        // A folder of this name may be of several formats.
-        "radar" => {
-            let is_oxford = beside("radar.timestamps") || beside("gt/radar_odometry.csv");
-            is_oxford.then_some(Format::Oxford)
-        }
-        _ => {
-            let is_of = |folder: &&str| Path::new(folder).ends_with(name);
-            let mut known = KNOWN.iter();
-            let found = known.find(|(_, folders, _)| folders.iter().any(is_of));
-            found.map(|(format, ..)| *format)
-        }
+    // A folder of this name may be of several formats.
+    if name == "radar" {
+        let folders = [Some(root), folder.parent()].into_iter().flatten();
+        let files = ["radar.timestamps", "gt/radar_odometry.csv"];
+        let mut places = folders.flat_map(|folder| files.map(|file| folder.join(file)));
+        return places.any(|file| file.exists()).then_some(Format::Oxford);
     }
+    let is_of = |folder: &&str| Path::new(folder).ends_with(name);
+    let mut known = KNOWN.iter();
+    let found = known.find(|(_, folders, _)| folders.iter().any(is_of));
+    found.map(|(format, ..)| *format)
 }
 
-/// Returns the format that fits the first image best.
 fn by_image(
     root: &Path,
     folder: &Path,
     images: &mut Images,
 ) -> Result<(Format, String), OpenError> {
-    let size = images.size;
-    let unknown = |reason: &str| OpenError::UnknownLayout {
-        path: folder.to_owned(),
-        reason: format!("its images ({size}) {reason}"),
-        remedy: SET_FORMAT,
-    };
     let Some(image) = FirstImage::read(images)?.filter(FirstImage::has_stamps) else {
-        let without_metadata =
-            images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
-        return match without_metadata {
-            true => Ok((
-                Format::Mulran,
-                decided(Format::Mulran, "transposed images, named by times"),
-            )),
-            false => Err(unknown(
-                "have no stamps in their first 8 columns, have no list of stamps beside them, and are not named by times",
-            )),
-        };
+        let size = images.size;
+        if size.height > size.width && images.name_stamp_ns(0).is_some() {
+            let evidence = "transposed images, named by times.";
+            return Ok((Format::Mulran, evidence.to_owned()));
+        }
+        let reason = format!(
+            "its images ({size}) have no stamps in their first 8 columns, have no list of stamps beside them, and are not named by times"
+        );
+        return Err(OpenError::unknown_layout(folder, &reason, SET_FORMAT));
     };
     let boreas_folders = has_boreas_folders(root);
-    let mut scores: Vec<(i32, Format)> = Format::ALL
-        .iter()
-        .map(|f| (score(*f, &image, boreas_folders), *f))
-        .collect();
-    scores.sort_by_key(|(score, format)| (-score, *format));
+    let mut scores = Format::ALL.map(|format| (-score(format, &image, boreas_folders), format));
+    scores.sort_unstable();
     let (best, format) = scores[0];
-    let equal: Vec<&str> = scores
-        .iter()
-        .skip(1)
-        .filter(|(s, _)| *s == best)
-        .map(|(_, f)| f.name())
-        .collect();
-    let mut note = decided(format, &evidence(&image));
-    if !equal.is_empty() {
-        note += &format!(
-            " It fits {} equally: set `format = \"{}\"` for that.",
-            equal.join(" and "),
-            equal[0]
-        );
+    let equal = scores[1..].iter().filter(|(score, _)| *score == best);
+    let equal: Vec<&str> = equal.map(|(_, format)| format.name()).collect();
+    let mut evidence = evidence(&image);
+    if let Some(first) = equal.first() {
+        let equal = equal.join(" and ");
+        evidence += &format!(" It fits {equal} equally: set `format = \"{first}\"` for that.");
     }
-    Ok((format, note))
-}
-
-fn decided(format: Format, evidence: &str) -> String {
-    format!(
-        "The layout of the folder matches no dataset; read as {format} by its first image: {evidence}."
-    )
+    Ok((format, evidence))
 }
 
 fn evidence(image: &FirstImage) -> String {
@@ -281,26 +238,19 @@ fn evidence(image: &FirstImage) -> String {
         || "names that are not times of the sweep".to_owned(),
         |by| format!("named by {}", by.description()),
     );
-    let chirps = match image.chirps_alternate() {
-        true => ", chirps alternate",
-        false => "",
-    };
-    let unit = match image.nanoseconds() {
-        true => ", stamps in ns",
-        false => "",
-    };
-    format!("{} range bins, {named}{chirps}{unit}", image.bins())
+    let of = |is_so: bool, words| if is_so { words } else { "" };
+    let chirps = of(image.chirps_alternate(), ", chirps alternate");
+    let unit = of(image.nanoseconds(), ", stamps in ns");
+    format!("{} range bins, {named}{chirps}{unit}.", image.bins())
 }
 
 /// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// Scores how well a format fits the first image.
 fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     let Some(profile) = Profile::of(format).filter(|it| it.bins.is_some()) else {
         return NEVER;
     };
-    let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
     let by_name = match image.named_by() {
         None => 0,
         Some(by) if by == profile.named_by => 2,
@@ -312,5 +262,5 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
         + 2 * i32::from(image.chirps_alternate() == profile.chirps)
         - 1
         - 3 * i32::from(image.nanoseconds() != is_in_ns)
-        + 4 * i32::from(boreas_folders && is_boreas)
+        + 4 * i32::from(boreas_folders && is_boreas(format))
 }

@@ -43,7 +43,6 @@ impl EncoderTurn {
         EncoderStep::of(&self.counts)
     }
 
-    /// Returns whether it took the time of a turn, as far as both are known.
     fn is_turn(&self, turn_ns: Option<i64>) -> bool {
         let times = self.turn_ns.zip(turn_ns);
         let share = times.map(|(ns, turn_ns)| ns as f64 / turn_ns as f64);
@@ -63,23 +62,19 @@ fn turn_ns(counts: &[u16], time_ns: impl Fn(usize) -> Option<i64>) -> Option<i64
     Some(steps_ns.checked_mul(rows as i64)? / steps.max(1) as i64)
 }
 
-/// The step of an encoder from azimuth to azimuth in a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EncoderStep {
     azimuths: usize,
     /// Counts from the first azimuth after zero to the last one before it.
     span: u32,
-    /// Counts from one azimuth to the next.
     pub(crate) step: u16,
 }
 
 impl EncoderStep {
     /// Returns the step of a turn, which may begin anywhere; `None` for counts that are of no turn.
     pub(crate) fn of(counts: &[u16]) -> Option<Self> {
-        let zero = counts
-            .windows(2)
-            .position(|w| w[1] < w[0])
-            .map_or(0, |row| row + 1);
+        let zero = counts.windows(2).position(|w| w[1] < w[0]);
+        let zero = zero.map_or(0, |row| row + 1);
         let (before, after) = counts.split_at(zero);
         let turn = || after.iter().chain(before);
         let steps = turn().zip(turn().skip(1));
@@ -93,7 +88,6 @@ impl EncoderStep {
         })
     }
 
-    /// Returns the counts per turn that make the step over the seam equal to the others.
     pub(crate) fn size(self) -> Option<u16> {
         u16::try_from(self.span + u32::from(self.step)).ok()
     }
@@ -169,12 +163,8 @@ mod tests {
 
     #[test]
     fn counts_that_are_no_turn_show_no_size() {
-        for counts in [
-            &[][..],
-            &[5, 19, 33],
-            &[7; 400],
-            &[9, 3, 9, 3, 9, 3, 9, 3, 9],
-        ] {
+        let back_and_forth = [9, 3].repeat(5);
+        for counts in [&[][..], &[5, 19, 33], &[7; 400], &back_and_forth] {
             assert_eq!(found(&[counts]), None, "{counts:?}");
         }
     }

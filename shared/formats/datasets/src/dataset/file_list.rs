@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 /// Paths in one piece of memory, as there may be hundreds of thousands.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileList {
-    /// All paths, each with a NUL behind it.
     bytes: Vec<u8>,
-    /// Positions of the NULs.
     ends: Vec<usize>,
 }
 
@@ -26,9 +24,8 @@ impl FileList {
     /// Returns the path of a file; `None` past the end.
     pub fn get(&self, index: usize) -> Option<&Path> {
         let end = *self.ends.get(index)?;
-        let start = index
-            .checked_sub(1)
-            .map_or(0, |before| self.ends[before] + 1);
+        let before = index.checked_sub(1);
+        let start = before.map_or(0, |before| self.ends[before] + 1);
         Some(Path::new(OsStr::from_bytes(&self.bytes[start..end])))
     }
 

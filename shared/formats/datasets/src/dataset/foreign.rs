@@ -9,46 +9,24 @@ use super::error::OpenError;
 /// Bytes that identify the type of a file: the signature of a tar archive is the last of them.
 const HEAD_BYTES: u64 = 512;
 
-/// Where a signature begins, the signature, the kind of the file, and what to do with it.
-type Kind = (usize, &'static [u8], &'static str, &'static str);
+type Kind = (usize, &'static [u8], &'static str);
 
-const UNPACK: &str = "unpack it, and name the folder that it held";
-const KINDS: [Kind; 10] = [
-    (
-        0,
-        b"#ROSBAG V",
-        "a bag of ROS 1",
-        "convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags), and name that folder",
-    ),
-    (
-        0,
-        b"SQLite format 3\0",
-        "an SQLite database, as bags of ROS 2 may be",
-        "convert it with `ros2 bag convert` and `storage_id: mcap`",
-    ),
-    (0, b"PK\x03\x04", "a ZIP archive", UNPACK),
-    (257, b"ustar", "a tar archive", UNPACK),
-    (
-        0,
-        b"\x1f\x8b",
-        "compressed by gzip, as a .tar.gz is",
-        UNPACK,
-    ),
-    (0, b"BZh", "compressed by bzip2, as a .tar.bz2 is", UNPACK),
-    (
-        0,
-        b"\xfd7zXZ\0",
-        "compressed by xz, as a .tar.xz is",
-        UNPACK,
-    ),
+const BAG: &str = "a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags), and name that folder";
+const DATABASE: &str = "an SQLite database, as bags of ROS 2 may be: convert it with `ros2 bag convert` and `storage_id: mcap`";
+const CONVERTED: [Kind; 2] = [(0, b"#ROSBAG V", BAG), (0, b"SQLite format 3\0", DATABASE)];
+const UNPACKED: [Kind; 8] = [
+    (0, b"PK\x03\x04", "a ZIP archive"),
+    (257, b"ustar", "a tar archive"),
+    (0, b"\x1f\x8b", "compressed by gzip, as a .tar.gz is"),
+    (0, b"BZh", "compressed by bzip2, as a .tar.bz2 is"),
+    (0, b"\xfd7zXZ\0", "compressed by xz, as a .tar.xz is"),
     (
         0,
         b"\x28\xb5\x2f\xfd",
         "compressed by Zstandard, as a .tar.zst is",
-        UNPACK,
     ),
-    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
-    (0, b"Rar!\x1a\x07", "a RAR archive", UNPACK),
+    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive"),
+    (0, b"Rar!\x1a\x07", "a RAR archive"),
 ];
 
 /// Returns an error that names the type of the file, if it is one of these.
@@ -56,19 +34,17 @@ pub fn foreign(path: &Path) -> Option<OpenError> {
     let mut head = Vec::new();
     let file = gyre_storage::open(path).ok()?;
     file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
-    let has = |(at, signature, ..): &&Kind| {
-        head.get(*at..)
-            .is_some_and(|bytes| bytes.starts_with(signature))
+    let has = |(at, signature, _): &&Kind| {
+        let bytes = head.get(*at..);
+        bytes.is_some_and(|bytes| bytes.starts_with(signature))
     };
-    let (_, _, kind, remedy) = KINDS.iter().find(has)?;
-    Some(OpenError::Foreign {
-        path: path.to_owned(),
-        kind,
-        remedy,
-    })
+    let packed = UNPACKED.iter().find(has);
+    let packed =
+        packed.map(|(.., kind)| format!("is {kind}: unpack it, and name the folder that it held"));
+    let other = || Some(format!("is {}", CONVERTED.iter().find(has)?.2));
+    Some(OpenError::at(path, packed.or_else(other)?))
 }
 
-/// Returns the same for the first of these files in a folder, by name.
 pub(crate) fn foreign_in(folder: &Path) -> Option<OpenError> {
     let entries = fs::read_dir(folder).ok()?.flatten();
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();

@@ -14,20 +14,16 @@ use super::stamp;
 /// Files that are named at most where several are left out.
 const MAX_NAMED: usize = 4;
 
-/// The scans of a folder, and a sentence on its other images.
 #[derive(Debug, Default)]
 pub(crate) struct ImageList {
     pub(crate) files: FileList,
     pub(crate) note: Option<String>,
 }
 
-/// The place of an image in its series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SeriesPosition {
-    /// ns since 1970.
     Time(i64),
     Number(i64),
-    /// Named by words.
     Name,
 }
 
@@ -46,10 +42,7 @@ impl SeriesPosition {
 /// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
 /// half of the images, and a second file of the same number.
 pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
-    let io_error = |source| OpenError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io_error = |source| OpenError::io(folder, source);
     let mut names: Vec<OsString> = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
         names.extend(png_name(&entry.map_err(io_error)?).map_err(io_error)?);
@@ -62,41 +55,31 @@ pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
     })
 }
 
-/// Returns a sentence on files that are left out.
 pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {
-    let named: Vec<String> = left_out
-        .iter()
-        .take(MAX_NAMED)
-        .map(|name| format!("`{}`", name.to_string_lossy()))
-        .collect();
-    let (named, more) = (named.join(", "), left_out.len().saturating_sub(MAX_NAMED));
-    let rest = match more {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    match left_out.len() {
-        0 => None,
-        1 => Some(format!("1 image is left out, {because}: {named}.")),
-        n => Some(format!(
-            "{n} images are left out, {because}: {named}{rest}."
-        )),
+    let named = left_out.iter().take(MAX_NAMED);
+    let named = named.map(|name| format!("`{}`", name.to_string_lossy()));
+    let mut named = named.collect::<Vec<_>>().join(", ");
+    if left_out.len() > MAX_NAMED {
+        named += &format!(" and {} more", left_out.len() - MAX_NAMED);
     }
+    let are = match left_out.len() {
+        0 => return None,
+        1 => "1 image is".to_owned(),
+        n => format!("{n} images are"),
+    };
+    Some(format!("{are} left out, {because}: {named}."))
 }
 
 /// Divides names into the names of the series, in order, and the others.
 fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
     let (hidden, shown): (Vec<_>, Vec<_>) = names.into_iter().partition(is_hidden);
-    let numbers: HashSet<i64> = shown
-        .iter()
-        .filter_map(|n| file_number(Path::new(n)))
-        .collect();
-    let (copies, shown): (Vec<_>, Vec<_>) = shown
-        .into_iter()
-        .partition(|name| copied_number(name).is_some_and(|number| numbers.contains(&number)));
-    let placed = shown
-        .into_iter()
-        .map(|name| (SeriesPosition::of(Path::new(&name)), name));
-    let (mut placed, strangers) = most(placed.collect());
+    let numbers = shown.iter().filter_map(|name| file_number(Path::new(name)));
+    let numbers: HashSet<i64> = numbers.collect();
+    let is_copy =
+        |name: &OsString| copied_number(name).is_some_and(|number| numbers.contains(&number));
+    let (copies, shown): (Vec<_>, Vec<_>) = shown.into_iter().partition(is_copy);
+    let placed = |name: OsString| (SeriesPosition::of(Path::new(&name)), name);
+    let (mut placed, strangers) = most(shown.into_iter().map(placed).collect());
     placed.sort_unstable_by(|(a, one), (b, other)| a.cmp(b).then_with(|| natural(one, other)));
     let (mut kept, mut others) = (Vec::<OsString>::new(), [hidden, copies, strangers].concat());
     let mut last = None;
@@ -145,10 +128,8 @@ fn copied_number(name: &OsString) -> Option<i64> {
 /// Compares names, and numbers in them as numbers: `scan2` is before `scan10`.
 fn natural(one: &OsString, other: &OsString) -> Ordering {
     let stem = |name| {
-        Path::new(name)
-            .file_stem()
-            .unwrap_or_default()
-            .as_encoded_bytes()
+        let stem = Path::new(name).file_stem();
+        stem.unwrap_or_default().as_encoded_bytes()
     };
     let (mut a, mut b) = (stem(one), stem(other));
     while let (Some(first), Some(second)) = (a.first(), b.first()) {
@@ -171,10 +152,8 @@ fn natural(one: &OsString, other: &OsString) -> Ordering {
 
 /// Splits the digits off the start of a text, without leading zeros.
 fn number_in(text: &[u8]) -> Option<(&[u8], &[u8])> {
-    let end = text
-        .iter()
-        .position(|b| !b.is_ascii_digit())
-        .unwrap_or(text.len());
+    let end = text.iter().position(|b| !b.is_ascii_digit());
+    let end = end.unwrap_or(text.len());
     let (digits, rest) = text.split_at(end);
     let zeros = digits.iter().take_while(|b| **b == b'0').count();
     (end > 0).then(|| (&digits[zeros..], rest))
@@ -183,9 +162,8 @@ fn number_in(text: &[u8]) -> Option<(&[u8], &[u8])> {
 /// Returns whether a folder exists and holds a PNG that is not hidden.
 pub(crate) fn has_png(folder: &Path) -> bool {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| png_name(&entry))
-        .any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
+    let mut names = entries.map(|entry| png_name(&entry));
+    names.any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
 }
 
 /// Returns the name of an entry if it is a PNG file, or a link to one.
@@ -202,7 +180,6 @@ fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
     Ok(is_file.then_some(name))
 }
 
-/// Returns the number that a file is named by.
 pub(crate) fn file_number(path: &Path) -> Option<i64> {
     path.file_stem()?.to_str()?.parse().ok()
 }
@@ -213,10 +190,8 @@ mod tests {
 
     fn divided(names: &[&str]) -> (Vec<String>, Vec<String>) {
         let text = |names: Vec<OsString>| -> Vec<String> {
-            let names = names.iter().map(|name| name.to_string_lossy());
-            names
-                .map(|name| name.trim_end_matches(".png").to_owned())
-                .collect()
+            let stem = |name: &OsString| name.to_string_lossy().trim_end_matches(".png").to_owned();
+            names.iter().map(stem).collect()
         };
         let names = names.iter().map(|name| format!("{name}.png").into());
         let (kept, others) = series(names.collect());
@@ -241,33 +216,18 @@ mod tests {
     #[test]
     fn copies_hidden_files_and_strangers_are_no_scans_of_a_series() {
         let (a, b) = ("1547131046100000", "1547131046350000");
-        let hidden = format!("._{a}");
-        let copies = [
-            format!("{a} (1)"),
-            format!("{b} - Kopie"),
-            format!("{b}_copy"),
-        ];
-        let names = [
-            a, &hidden, &copies[0], &copies[1], &copies[2], b, "7", "map",
-        ];
-        let (kept, mut others) = divided(&names);
+        let (hidden, copy) = (format!("._{a}"), format!("{a} (1)"));
+        let (other, third) = (format!("{b} - Kopie"), format!("{b}_copy"));
+        let mut strangers = [hidden.as_str(), &copy, &other, &third, "7", "map"];
+        let (kept, mut others) = divided(&[&strangers[..], &[b, a]].concat());
         assert_eq!(kept, [a, b]);
         others.sort_unstable();
-        let mut expected = vec![
-            hidden.as_str(),
-            &copies[0],
-            &copies[1],
-            &copies[2],
-            "7",
-            "map",
-        ];
-        expected.sort_unstable();
-        assert_eq!(others, expected);
+        strangers.sort_unstable();
+        assert_eq!(others, strangers);
         // Two files of one frame.
-        assert_eq!(
-            divided(&["000001", "1", "2"]),
-            (vec!["000001".into(), "2".into()], vec!["1".into()])
-        );
+        let (kept, others) = divided(&["000001", "1", "2"]);
+        assert_eq!(kept, ["000001", "2"]);
+        assert_eq!(others, ["1"]);
         assert_eq!(divided(&["001", "002", "overview"]).1, ["overview"]);
     }
 }

@@ -1,12 +1,12 @@
 //! The images of a dataset: their files, order and size.
 
 use std::collections::BTreeSet;
-use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
+use super::format::Format;
 use super::image_list::{self, ImageList, file_number};
 use super::image_size::ImageSize;
 use super::image_source::ImageSource;
@@ -20,30 +20,13 @@ const FIRST_TRIES: usize = 8;
 const SIZES: usize = 32;
 
 /// Images in order, of one width.
-#[derive(Debug)]
 pub(crate) struct Images {
-    files: FileList,
-    /// The size of most images.
+    pub(crate) files: FileList,
     pub(crate) size: ImageSize,
-    /// Rows of the tallest image of that width that is expected.
     pub(crate) max_rows: usize,
-    origin: Origin,
-}
-
-/// The origin of the pixels.
-enum Origin {
-    Files(ImageReader),
-    Source(Box<dyn ImageSource>),
-}
-
-impl fmt::Debug for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if matches!(self, Self::Files(_)) {
-            "Files"
-        } else {
-            "Source"
-        })
-    }
+    reader: ImageReader,
+    /// The origin of the pixels, if that is no file.
+    source: Option<Box<dyn ImageSource>>,
 }
 
 impl Images {
@@ -56,41 +39,34 @@ impl Images {
     /// Reads the sizes of some of the `files` in `folder`.
     pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
         if files.is_empty() {
-            return Err(OpenError::NoImages {
-                path: folder.to_owned(),
-            });
+            return Err(OpenError::no_images(folder));
         }
         let (size, max_rows) = sizes(&files)?;
         Ok(Self {
             files,
             size,
             max_rows,
-            origin: Origin::Files(ImageReader::default()),
+            reader: ImageReader::default(),
+            source: None,
         })
     }
 
-    /// Returns the images of a source.
     pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
         let (files, size): (FileList, _) = (source.files().into_iter().collect(), source.size());
-        match files.is_empty() {
-            true => Err(OpenError::NoImages {
-                path: source.folder(),
-            }),
-            false => Ok(Self {
-                files,
-                size,
-                max_rows: size.height,
-                origin: Origin::Source(source),
-            }),
+        if files.is_empty() {
+            return Err(OpenError::no_images(&source.folder()));
         }
+        Ok(Self {
+            files,
+            size,
+            max_rows: size.height,
+            reader: ImageReader::default(),
+            source: Some(source),
+        })
     }
 
     pub(crate) fn len(&self) -> usize {
         self.files.len()
-    }
-
-    pub(crate) fn files(&self) -> &FileList {
-        &self.files
     }
 
     /// The file of an image; an empty path past the end.
@@ -98,7 +74,6 @@ impl Images {
         self.files.get(index).unwrap_or(Path::new(""))
     }
 
-    /// The number in the name of a file.
     pub(crate) fn number(&self, index: usize) -> Option<i64> {
         file_number(self.file(index))
     }
@@ -108,40 +83,35 @@ impl Images {
         self.number(index).and_then(stamp::to_ns)
     }
 
-    /// Decodes an image of the usual size.
-    pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
-        let rows = self.size.height;
-        self.decode_rows(index, rows..=rows, pixels).map(|_| ())
+    pub(crate) fn wrong(&self, format: Format, reason: &str) -> OpenError {
+        let fault = format!("is {}, not a {format} image: {reason}", self.size);
+        OpenError::at(self.file(0), fault)
     }
 
-    /// Decodes an image of the usual width with as many rows as are accepted, and returns its size.
-    pub(crate) fn decode_rows(
+    pub(crate) fn decode(
         &mut self,
         index: usize,
         rows: RangeInclusive<usize>,
         pixels: &mut [u8],
     ) -> Result<ImageSize, ReadError> {
         let len = self.files.len();
-        let path = self
-            .files
-            .get(index)
-            .ok_or(ReadError::NoSuchScan { index, len })?;
+        let path = self.files.get(index);
+        let path = path.ok_or(ReadError::NoSuchScan { index, len })?;
         let (actual, needed) = (pixels.len(), self.size.width * rows.end());
         let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
             what: "bytes",
             needed,
             actual,
         })?;
-        match &mut self.origin {
-            Origin::Files(reader) => reader.decode(path, self.size, rows, pixels),
-            Origin::Source(source) => {
+        match &mut self.source {
+            None => self.reader.decode(path, self.size, rows, pixels),
+            Some(source) => {
                 source.draw(index, pixels);
                 Ok(self.size)
             }
         }
     }
 
-    /// Returns the rows that a turn may have: azimuths may have been lost.
     pub(crate) fn accepted_rows(&self) -> RangeInclusive<usize> {
         2..=self.max_rows
     }
@@ -149,9 +119,9 @@ impl Images {
     /// Returns the first bytes of an image's first row, without reading all of it; `None` if it
     /// cannot be read, or is not on disk.
     pub(crate) fn first_bytes<const N: usize>(&self, index: usize) -> Option<[u8; N]> {
-        match self.origin {
-            Origin::Files(_) => png_image::first_bytes(self.file(index)),
-            Origin::Source(_) => None,
+        match self.source {
+            None => png_image::first_bytes(self.file(index)),
+            Some(_) => None,
         }
     }
 
@@ -169,7 +139,7 @@ impl Images {
         let (rows, mut failed) = (self.accepted_rows(), None);
         let mut pixels = vec![0; self.size.width * rows.end()];
         for index in 0..self.len().min(FIRST_TRIES) {
-            match self.decode_rows(index, rows.clone(), &mut pixels) {
+            match self.decode(index, rows.clone(), &mut pixels) {
                 Ok(size) => return Ok(Some((index, size, pixels))),
                 Err(error) => failed = failed.or(error.is_io().then_some(error)),
             }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use super::error::ReadError;
 use super::image_size::ImageSize;
-use super::options::AzimuthSource;
 use super::stamp;
 use gyre_radar::scan::{check_sweep, flag};
 
@@ -16,14 +15,11 @@ const ALTERNATING_SHARE: f64 = 0.9;
 /// size.
 const MAX_GAP_SHARE: f64 = 0.25;
 
-/// The metadata of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowMetadata {
     /// Bytes 0 to 7, little-endian: time since 1970, us or ns.
     pub(crate) stamp: i64,
-    /// Bytes 8 and 9, little-endian: the encoder count.
     pub(crate) count: u16,
-    /// Byte 10: validity, direction of the chirp, or unused.
     pub(crate) byte_ten: u8,
 }
 
@@ -45,10 +41,8 @@ pub(crate) fn rows(
     pixels: &[u8],
     size: ImageSize,
 ) -> impl Iterator<Item = RowMetadata> + Clone + '_ {
-    pixels
-        .chunks_exact(size.width)
-        .take(size.height)
-        .map(RowMetadata::parse)
+    let rows = pixels.chunks_exact(size.width).take(size.height);
+    rows.map(RowMetadata::parse)
 }
 
 /// Returns whether byte 10 alternates between 0 and 255 from row to row. Then it is the direction
@@ -93,14 +87,9 @@ pub(crate) fn fill_azimuths(
     path: &Path,
     pixels: &[u8],
     size: ImageSize,
-    source: AzimuthSource,
     counts: u16,
     azimuth_rad: &mut [f32],
 ) -> Result<(), ReadError> {
-    if source == AzimuthSource::Uniform {
-        fill_uniform(&mut azimuth_rad[..size.height], 0.0);
-        return Ok(());
-    }
     check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
     check_turn(path, rows(pixels, size).map(|row| row.count), counts)?;
     let step = std::f64::consts::TAU / f64::from(counts);
@@ -127,12 +116,10 @@ fn check_order(
     let (mut first, mut last, mut wrapped) = (0, None, false);
     for (row, count) in row_counts.enumerate() {
         if count > counts {
-            return Err(ReadError::EncoderCount {
-                path: path.to_owned(),
-                row,
-                count,
-                counts,
-            });
+            let fault = format!(
+                "encoder count {count} exceeds {counts} counts per turn; set `encoder_counts`, or `azimuth_source = \"uniform\"`"
+            );
+            return Err(ReadError::row(path, row, fault));
         }
         let count = count % counts;
         match last.replace(count) {
@@ -141,12 +128,10 @@ fn check_order(
                 let wraps = count < previous;
                 let lapped = (wrapped || wraps) && count >= first;
                 if count == previous || lapped || (wraps && wrapped) {
-                    return Err(ReadError::AzimuthOrder {
-                        path: path.to_owned(),
-                        row,
-                        count,
-                        previous,
-                    });
+                    let fault = format!(
+                        "azimuth does not increase (encoder count {count} after {previous}); the rows are not one sweep"
+                    );
+                    return Err(ReadError::row(path, row, fault));
                 }
                 wrapped |= wraps;
             }
@@ -165,19 +150,18 @@ fn check_turn(
         return Ok(());
     };
     let next = row_counts.clone().skip(1).chain([first]);
-    let step = |(count, next): (u16, u16)| {
-        (i32::from(next) - i32::from(count)).rem_euclid(i32::from(counts))
-    };
+    let step =
+        |(count, next): (u16, u16)| (i32::from(next) - i32::from(count)).rem_euclid(counts.into());
     let widest = row_counts.zip(next).map(step).max().unwrap_or(0);
     let gap = f64::from(widest) / f64::from(counts);
-    match gap <= MAX_GAP_SHARE {
-        true => Ok(()),
-        false => Err(ReadError::NotATurn {
-            path: path.to_owned(),
-            gap_deg: 360.0 * gap,
-            counts,
-        }),
+    if gap <= MAX_GAP_SHARE {
+        return Ok(());
     }
+    let gap_deg = 360.0 * gap;
+    let fault = format!(
+        ": no row is in {gap_deg:.0} degrees of the turn, for an encoder of {counts} counts per turn: the image holds a part of a turn, or `encoder_counts` is another number"
+    );
+    Err(ReadError::image(path, fault))
 }
 
 /// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one
@@ -190,17 +174,16 @@ pub(crate) fn fill_stamps(
     stamp_ns: &mut [i64],
 ) -> Result<(), ReadError> {
     for (row, (metadata, into)) in rows(pixels, size).zip(stamp_ns.iter_mut()).enumerate() {
-        let ns = stamp::to_ns(metadata.stamp);
-        *into = ns.ok_or_else(|| ReadError::StampYear {
-            path: path.to_owned(),
-            row,
-            value: metadata.stamp,
+        let value = metadata.stamp;
+        *into = stamp::to_ns(value).ok_or_else(|| {
+            let fault = format!(
+                "stamp {value} is not a time of the years 2015 to 2040 in s, ms, us or ns: the first 11 bytes of the row are not Navtech metadata"
+            );
+            ReadError::row(path, row, fault)
         })?;
     }
-    check_sweep(&stamp_ns[..size.height], max_sweep_ns).map_err(|fault| ReadError::Times {
-        path: path.to_owned(),
-        fault,
-    })
+    check_sweep(&stamp_ns[..size.height], max_sweep_ns)
+        .map_err(|fault| ReadError::image(path, format!(", {fault}")))
 }
 
 /// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear
@@ -257,17 +240,12 @@ mod tests {
             (&[10, 20, 15], 2),
             (&[10, 10], 1),
         ] {
-            let refused = ordered(counts);
-            assert!(
-                matches!(refused, Err(ReadError::AzimuthOrder { row, .. }) if row == at),
-                "{counts:?}"
-            );
+            let refused = ordered(counts).unwrap_err().to_string();
+            let expected = format!("row {at}: azimuth does not increase");
+            assert!(refused.contains(&expected), "{refused}");
         }
-        let refused = ordered(&[10, 5601]);
-        assert!(matches!(
-            refused,
-            Err(ReadError::EncoderCount { row: 1, .. })
-        ));
+        let refused = ordered(&[10, 5601]).unwrap_err().to_string();
+        assert!(refused.contains("row 1: encoder count 5601"), "{refused}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! OORD, Boreas, MulRan (Oxford format) and FoMo.
 
 use super::detect::Found;
-use super::eccentricity;
+use super::eccentricity::correct_eccentricity;
 use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
@@ -14,16 +14,15 @@ use super::navtech_notes::{note_encoder, observations};
 use super::navtech_png::{self, METADATA_BYTES};
 use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
-use super::row_order::{self, RowOrder};
+use super::row_order;
 use super::stamp;
 use super::{Dataset, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
 
 /// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
 /// metadata.
-#[derive(Debug)]
 pub(crate) struct NavtechScans {
     images: Images,
     format: Format,
@@ -57,27 +56,20 @@ impl NavtechScans {
         } = found;
         check_shape(&images, format)?;
         let mut first_image = FirstImage::read(&mut images)?;
-        let order = first_image
-            .as_ref()
-            .and_then(|image| row_order::order(&mut images, image));
+        let order = |image| row_order::order(&mut images, image);
         let mut starts_ns = None;
-        if let Some(RowOrder {
-            starts_ns: starts,
-            notes: sentences,
-        }) = order
-        {
+        if let Some(order) = first_image.as_ref().and_then(order) {
             first_image = FirstImage::read(&mut images)?;
-            starts_ns = Some(starts);
-            notes.extend(sentences);
+            starts_ns = Some(order.starts_ns);
+            notes.extend(order.notes);
         }
+        let named_by = first_image.as_ref().and_then(FirstImage::named_by);
         let mut scans = Self {
             profile: profile.with(format, first_image.as_ref(), options),
             format,
             period_ns: stamp::DEFAULT_TURN_NS,
             max_sweep_ns: MAX_SWEEP_NS,
-            named_by_time: first_image
-                .as_ref()
-                .is_some_and(|image| image.named_by().is_some()),
+            named_by_time: named_by.is_some(),
             starts_ns,
             images,
             notes,
@@ -89,30 +81,26 @@ impl NavtechScans {
             scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
         }
         if let Some(image) = &first_image {
-            match options.encoder_counts {
-                _ if !scans.has_encoder() => {}
-                Some(_) => scans.notes.extend(note_encoder(image, &scans.profile)),
-                None => scans.find_encoder(image, turn_ns),
+            if scans.has_encoder() {
+                scans.find_encoder(image, turn_ns, options.encoder_counts.is_some());
             }
-            scans
-                .notes
-                .extend(observations(image, scans.format, &scans.profile));
+            let notes = observations(image, scans.format, &scans.profile);
+            scans.notes.extend(notes);
         }
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one. If the
-    /// first image took less or more than a turn, the size is only reported.
-    fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
+    /// Takes the size of the encoder that the first images show, unless it is the usual one. If it
+    /// is configured, or the first image took less or more than a turn, the size is only reported.
+    fn find_encoder(&mut self, image: &FirstImage, turn_ns: Option<i64>, is_configured: bool) {
         let usual = self.profile.encoder_counts;
-        match encoder_counts(&[first_image.turn()], turn_ns, usual) {
-            None => self.notes.extend(note_encoder(first_image, &self.profile)),
-            Some(found) if found == usual => {}
-            Some(_) => self.take_encoder(turn_ns, usual),
+        let by_first = encoder_counts(&[image.turn()], turn_ns, usual);
+        if is_configured || by_first.is_none() {
+            return self.notes.extend(note_encoder(image, &self.profile));
         }
-    }
-
-    fn take_encoder(&mut self, turn_ns: Option<i64>, usual: u16) {
+        if by_first == Some(usual) {
+            return;
+        }
         let found = encoder_counts(&self.first_turns(), turn_ns, usual);
         if let Some(found) = found.filter(|found| *found != usual) {
             self.profile.encoder_counts = found;
@@ -122,12 +110,11 @@ impl NavtechScans {
         }
     }
 
-    /// The turns of the first images.
     fn first_turns(&mut self) -> Vec<EncoderTurn> {
         let rows = self.images.accepted_rows();
         let mut pixels = vec![0; self.images.size.width * rows.end()];
         let turn = |index| {
-            let decoded = self.images.decode_rows(index, rows.clone(), &mut pixels);
+            let decoded = self.images.decode(index, rows.clone(), &mut pixels);
             let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
             let counts = rows.iter().map(|row| row.count).collect();
             Some(EncoderTurn::new(counts, |row| {
@@ -164,26 +151,24 @@ impl NavtechScans {
     fn check_name(&self, index: usize, scan_ns: i64) -> Result<(), ReadError> {
         let named_ns = self.nominal_stamp_ns(index).filter(|_| self.named_by_time);
         let apart_ns = named_ns.map_or(0, |named_ns| scan_ns - named_ns);
-        match apart_ns.abs() <= MAX_INTERVAL_NS {
-            true => Ok(()),
-            false => Err(ReadError::NameTime {
-                path: self.images.file(index).to_owned(),
-                apart_s: apart_ns as f64 * 1e-9,
-            }),
+        if apart_ns.abs() <= MAX_INTERVAL_NS {
+            return Ok(());
         }
+        let apart_s = apart_ns as f64 * 1e-9;
+        let fault = format!(
+            ": stamps of its rows are {apart_s:.1} s from the time in its name, which other files agree with: the clock was set, or the file has another scan's name"
+        );
+        Err(ReadError::image(self.images.file(index), fault))
     }
 
     /// Time between the logged times of this file and the next, ns, if that can be one turn;
     /// otherwise the period.
     fn interval_ns(&self, index: usize) -> i64 {
-        let name = |i: usize| self.logged_stamp_ns(i);
-        let next = index
-            .checked_add(1)
-            .and_then(name)
-            .zip(name(index))
-            .map(|(b, a)| b - a);
-        next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
-            .unwrap_or(self.period_ns)
+        let stamp_ns = |index| self.logged_stamp_ns(index);
+        let next_ns = index.checked_add(1).and_then(stamp_ns);
+        let interval_ns = next_ns.zip(stamp_ns(index)).map(|(b, a)| b - a);
+        let is_turn = |ns: &i64| (ns - self.period_ns).abs() < self.period_ns / 5;
+        interval_ns.filter(is_turn).unwrap_or(self.period_ns)
     }
 }
 
@@ -196,12 +181,7 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     } else {
         return Ok(());
     };
-    Err(OpenError::WrongImage {
-        path: images.file(0).to_owned(),
-        actual: images.size,
-        format,
-        reason,
-    })
+    Err(images.wrong(format, &reason))
 }
 
 impl Dataset for NavtechScans {
@@ -225,7 +205,7 @@ impl Dataset for NavtechScans {
     }
 
     fn files(&self) -> &FileList {
-        self.images.files()
+        &self.images.files
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
@@ -267,22 +247,18 @@ impl Dataset for NavtechScans {
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         check_capacity(self.limits(), &slot)?;
-        let size = self
-            .images
-            .decode_rows(index, self.accepted_rows(), slot.bytes)?;
+        let rows = self.accepted_rows();
+        let size = self.images.decode(index, rows, slot.bytes)?;
         let (path, profile) = (self.images.file(index), &self.profile);
-        let (azimuth_rad, stamp_ns) = (
-            &mut slot.azimuth_rad[..size.height],
-            &mut slot.stamp_ns[..size.height],
-        );
-        navtech_png::fill_azimuths(
-            path,
-            slot.bytes,
-            size,
-            profile.azimuth_source,
-            profile.encoder_counts,
-            azimuth_rad,
-        )?;
+        let azimuth_rad = &mut slot.azimuth_rad[..size.height];
+        let stamp_ns = &mut slot.stamp_ns[..size.height];
+        match self.has_encoder() {
+            true => {
+                let counts = profile.encoder_counts;
+                navtech_png::fill_azimuths(path, slot.bytes, size, counts, azimuth_rad)?;
+            }
+            false => navtech_png::fill_uniform(azimuth_rad, 0.0),
+        }
         navtech_png::fill_stamps(path, slot.bytes, size, self.max_sweep_ns, stamp_ns)?;
         navtech_png::fill_flags(slot.bytes, size, profile.byte_ten, slot.flags);
         let scan_ns = self.scan_time_ns(stamp_ns);
@@ -290,17 +266,8 @@ impl Dataset for NavtechScans {
         if profile.smooth_stamps {
             navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
         }
-        eccentricity::correct_eccentricity(azimuth_rad, profile.azimuth_eccentricity_rad);
-        Ok(SweepGeometry {
-            azimuths: size.height,
-            bins: size.width - METADATA_BYTES,
-            stride: size.width,
-            first_byte: METADATA_BYTES,
-            range_resolution_m: profile.range_resolution_m,
-            range_offset_m: profile.range_offset_m,
-            doppler_s: profile.doppler_s,
-            sense: Sense::Clockwise,
-            stamp_ns: scan_ns,
-        })
+        correct_eccentricity(azimuth_rad, profile.azimuth_eccentricity_rad);
+        let bytes = [METADATA_BYTES, size.width - METADATA_BYTES];
+        Ok(profile.geometry(size.height, bytes, scan_ns))
     }
 }

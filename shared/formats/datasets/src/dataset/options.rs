@@ -1,7 +1,5 @@
 //! Options for reading a dataset.
 
-use std::fmt;
-
 use arrayvec::ArrayString;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +25,22 @@ pub enum LostAzimuthOption {
     /// Take each row for the azimuth that it would be if none was lost.
     Ignore,
 }
+
+/// Keys, and the reasons of their bounds.
+const BINS: [&str; 2] = [
+    "range_resolution_m",
+    "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
+];
+const OFFSET: [&str; 2] = ["range_offset_m", "the delays inside radars make -5 to 5 m"];
+const DOPPLER: [&str; 2] = ["doppler_s", "it must be from -1 to 1 s"];
+const ECCENTRICITY: [&str; 2] = [
+    "azimuth_eccentricity_rad",
+    "it must be from -0.1 to 0.1 rad",
+];
+const COUNTS: [&str; 2] = [
+    "encoder_counts",
+    "an encoder has at least 16 counts per turn",
+];
 
 /// The longest name of a topic, bytes.
 const TOPIC_BYTES: usize = 256;
@@ -81,42 +95,20 @@ pub struct DatasetOptions {
 impl DatasetOptions {
     /// Rejects values out of bounds.
     pub fn check(&self) -> Result<(), OpenError> {
-        let checks = [
-            (
-                "range_resolution_m",
-                self.range_resolution_m,
-                0.02..=1.5,
-                "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
-            ),
-            (
-                "range_offset_m",
-                self.range_offset_m,
-                -5.0..=5.0,
-                "the delays inside radars make -5 to 5 m",
-            ),
-            (
-                "doppler_s",
-                self.doppler_s,
-                -1.0..=1.0,
-                "it must be from -1 to 1 s",
-            ),
-            (
-                "azimuth_eccentricity_rad",
-                self.azimuth_eccentricity_rad,
-                -0.1..=0.1,
-                "it must be from -0.1 to 0.1 rad",
-            ),
-            (
-                "encoder_counts",
-                self.encoder_counts.map(f32::from),
-                16.0..=f32::INFINITY,
-                "an encoder has at least 16 counts per turn",
-            ),
-        ];
-        let mut checks = checks.into_iter();
+        let counts = self.encoder_counts.map(f32::from);
+        // Value, bounds, key and reason.
+        let mut checks = [
+            (self.range_resolution_m, 0.02..=1.5, BINS),
+            (self.range_offset_m, -5.0..=5.0, OFFSET),
+            (self.doppler_s, -1.0..=1.0, DOPPLER),
+            (self.azimuth_eccentricity_rad, -0.1..=0.1, ECCENTRICITY),
+            (counts, 16.0..=f32::INFINITY, COUNTS),
+        ]
+        .into_iter();
         let invalid =
-            checks.find(|(_, value, bounds, _)| value.is_some_and(|it| !bounds.contains(&it)));
-        invalid.map_or(Ok(()), |(key, value, _, reason)| {
+            checks.find(|(value, bounds, _)| value.is_some_and(|it| !bounds.contains(&it)));
+        invalid.map_or(Ok(()), |(value, _, [key, reason])| {
+            let value = value.map(|it| it.to_string()).unwrap_or_default();
             Err(Self::invalid(None, key, value, reason))
         })
     }
@@ -124,29 +116,22 @@ impl DatasetOptions {
     /// Returns these options; `other` supplies the ones that are not set.
     #[must_use]
     pub fn or(self, other: &Self) -> Self {
-        Self {
-            format: self.format.or(other.format),
-            range_resolution_m: self.range_resolution_m.or(other.range_resolution_m),
-            range_offset_m: self.range_offset_m.or(other.range_offset_m),
-            doppler_s: self.doppler_s.or(other.doppler_s),
-            azimuth_eccentricity_rad: self
-                .azimuth_eccentricity_rad
-                .or(other.azimuth_eccentricity_rad),
-            azimuth_source: self.azimuth_source.or(other.azimuth_source),
-            encoder_counts: self.encoder_counts.or(other.encoder_counts),
-            lost_azimuths: self.lost_azimuths.or(other.lost_azimuths),
-            topic: self.topic.or(other.topic),
+        macro_rules! or {
+            ($($option:ident)*) => { Self { $($option: self.$option.or(other.$option)),* } };
         }
+        or!(format range_resolution_m range_offset_m doppler_s azimuth_eccentricity_rad
+            azimuth_source encoder_counts lost_azimuths topic)
     }
 
     /// Rejects the option of bags, for images.
     pub(crate) fn check_without_topics(&self, format: Format) -> Result<(), OpenError> {
+        let reason = "images have no topics; leave the key out";
         match self.topic {
-            Some(_) => Err(Self::invalid(
+            Some(topic) => Err(Self::invalid(
                 Some(format),
                 "topic",
-                self.topic,
-                "images have no topics; leave the key out",
+                topic.to_string(),
+                reason,
             )),
             None => Ok(()),
         }
@@ -154,28 +139,24 @@ impl DatasetOptions {
 
     /// Rejects options that require an encoder, for images without encoder counts.
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
-        let refuse = |key, value: Option<String>| {
-            let reason = "its images have no encoder counts";
-            Err(Self::invalid(Some(format), key, value, reason))
+        let (key, value) = match (self.encoder_counts, self.azimuth_source) {
+            (Some(counts), _) => ("encoder_counts", counts.to_string()),
+            (_, Some(AzimuthSource::Encoder)) => ("azimuth_source", "encoder".to_owned()),
+            _ => return Ok(()),
         };
-        match (self.encoder_counts, self.azimuth_source) {
-            (Some(counts), _) => refuse("encoder_counts", Some(counts.to_string())),
-            (_, Some(AzimuthSource::Encoder)) => {
-                refuse("azimuth_source", Some("encoder".to_owned()))
-            }
-            _ => Ok(()),
-        }
+        let reason = "its images have no encoder counts";
+        Err(Self::invalid(Some(format), key, value, reason))
     }
 
     fn invalid(
         format: Option<Format>,
         key: &'static str,
-        value: Option<impl fmt::Display>,
+        value: String,
         reason: &'static str,
     ) -> OpenError {
         OpenError::BadOption {
             key,
-            value: value.map(|v| v.to_string()).unwrap_or_default(),
+            value,
             format,
             reason,
         }

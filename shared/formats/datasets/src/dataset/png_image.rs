@@ -15,20 +15,13 @@ const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
 /// Memory limit of the decoder beside the image: rows, tables, text chunks.
 const DECODER_BYTES: usize = 4 << 20;
 
-/// Reads the size of a PNG from its header.
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
-    let mut header = [0; HEADER_BYTES];
-    let mut file = gyre_storage::open(path).map_err(|e| io_error(path, e))?;
-    let mut filled = 0;
-    while filled < HEADER_BYTES {
-        match file.read(&mut header[filled..]) {
-            Ok(0) => break,
-            Ok(n) => filled += n,
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(io_error(path, e)),
-        }
-    }
-    parse_header(path, &header[..filled])
+    let mut header = Vec::with_capacity(HEADER_BYTES);
+    let file = gyre_storage::open(path).map_err(|e| ReadError::io(path, e))?;
+    file.take(HEADER_BYTES as u64)
+        .read_to_end(&mut header)
+        .map_err(|e| ReadError::io(path, e))?;
+    parse_header(path, &header)
 }
 
 /// Reads the first bytes of the first row of a PNG, and no more of the file than that needs; `None`
@@ -46,10 +39,8 @@ pub(crate) fn first_bytes<const N: usize>(path: &Path) -> Option<[u8; N]> {
 }
 
 fn decoder<R: BufRead + Seek>(file: R) -> png::Decoder<R> {
-    let limits = png::Limits {
-        bytes: DECODER_BYTES,
-    };
-    let mut decoder = png::Decoder::new_with_limits(file, limits);
+    let bytes = DECODER_BYTES;
+    let mut decoder = png::Decoder::new_with_limits(file, png::Limits { bytes });
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     decoder
@@ -58,35 +49,35 @@ fn decoder<R: BufRead + Seek>(file: R) -> png::Decoder<R> {
 /// Parses the header chunk. Rejects pixels other than 8-bit grey and images too large for a radar
 /// scan.
 fn parse_header(path: &Path, bytes: &[u8]) -> Result<ImageSize, ReadError> {
+    let not_png = || ReadError::image(path, " is not a PNG image");
     let shown = bytes.len().min(SIGNATURE.len());
     if bytes[..shown] != SIGNATURE[..shown] {
-        return Err(ReadError::NotPng {
-            path: path.to_owned(),
-        });
+        return Err(not_png());
     }
     let Some(header) = bytes.get(..HEADER_BYTES) else {
-        return Err(ReadError::Truncated {
-            path: path.to_owned(),
-            bytes: bytes.len(),
-        });
+        return Err(truncated(path, bytes.len()));
     };
     if &header[12..16] != b"IHDR" {
-        return Err(ReadError::NotPng {
-            path: path.to_owned(),
-        });
+        return Err(not_png());
     }
     let word = |at: usize| {
         u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
     };
     check_pixels(path, header[24], header[25])?;
-    check_size(path, u64::from(word(16)), u64::from(word(20)))
+    let (width, height) = (u64::from(word(16)), u64::from(word(20)));
+    match width.saturating_mul(height) {
+        0 => Err(damaged(path, "its header gives a size of zero")),
+        1..=MAX_IMAGE_BYTES => Ok(ImageSize {
+            width: width as usize,
+            height: height as usize,
+        }),
+        bytes => Err(too_large(path, bytes)),
+    }
 }
 
 fn check_pixels(path: &Path, bits: u8, colour: u8) -> Result<(), ReadError> {
-    if bits == 8 && colour == 0 {
-        return Ok(());
-    }
     let colour = match colour {
+        0 if bits == 8 => return Ok(()),
         0 => "grey",
         2 => "colour",
         3 => "palette",
@@ -94,35 +85,33 @@ fn check_pixels(path: &Path, bits: u8, colour: u8) -> Result<(), ReadError> {
         6 => "colour and alpha",
         _ => "unknown",
     };
-    Err(ReadError::WrongPixels {
-        path: path.to_owned(),
-        actual: format!("{bits}-bit {colour}"),
-    })
+    let fault = format!(
+        " has {bits}-bit {colour} pixels instead of 8-bit grey: it was converted from the original"
+    );
+    Err(ReadError::image(path, fault))
 }
 
-fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadError> {
-    let bytes = width.saturating_mul(height);
-    if bytes == 0 {
-        return Err(ReadError::Damaged {
-            path: path.to_owned(),
-            reason: "its header gives a size of zero".to_owned(),
-        });
+fn too_large(path: &Path, bytes: u64) -> ReadError {
+    let fault = format!(
+        " is too large for a radar scan: {bytes} bytes, at most {MAX_IMAGE_BYTES} are accepted"
+    );
+    ReadError::image(path, fault)
+}
+
+fn truncated(path: &Path, bytes: usize) -> ReadError {
+    let fault = format!(" is truncated after {bytes} bytes; copy or download it again");
+    ReadError::image(path, fault)
+}
+
+fn damaged(path: &Path, reason: &str) -> ReadError {
+    ReadError::Damaged {
+        path: path.to_owned(),
+        reason: reason.to_owned(),
     }
-    if bytes > MAX_IMAGE_BYTES {
-        return Err(ReadError::TooLarge {
-            path: path.to_owned(),
-            actual: bytes,
-            limit: MAX_IMAGE_BYTES,
-        });
-    }
-    Ok(ImageSize {
-        width: width as usize,
-        height: height as usize,
-    })
 }
 
 /// Decodes images, and reuses the memory for the bytes of the file.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct ImageReader {
     file: Vec<u8>,
 }
@@ -140,11 +129,15 @@ impl ImageReader {
         self.load(path)?;
         let actual = parse_header(path, &self.file[..self.file.len().min(HEADER_BYTES)])?;
         if actual.width != expected.width || !rows.contains(&actual.height) {
-            return Err(ReadError::WrongSize {
-                path: path.to_owned(),
-                actual,
-                expected,
-            });
+            let is_square = actual.width == actual.height;
+            let is_rotated = [actual.height, actual.width] == [expected.width, expected.height];
+            let rotated = match is_rotated && !is_square {
+                true => ": it is rotated by 90 degrees",
+                false => "",
+            };
+            let fault =
+                format!(" is {actual}, but most images of the dataset are {expected}{rotated}");
+            return Err(ReadError::image(path, fault));
         }
         self.inflate(&mut pixels[..actual.bytes()])
             .map_err(|e| self.decoding_error(path, e))?;
@@ -152,21 +145,17 @@ impl ImageReader {
     }
 
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
-        let file = gyre_storage::open(path).map_err(|e| io_error(path, e))?;
+        let file = gyre_storage::open(path).map_err(|e| ReadError::io(path, e))?;
         self.file.clear();
         // One byte more than accepted distinguishes a file of exactly the maximum size from a
         // larger one.
         file.take(MAX_IMAGE_BYTES + 1)
             .read_to_end(&mut self.file)
-            .map_err(|e| io_error(path, e))?;
-        if self.file.len() as u64 > MAX_IMAGE_BYTES {
-            return Err(ReadError::TooLarge {
-                path: path.to_owned(),
-                actual: self.file.len() as u64,
-                limit: MAX_IMAGE_BYTES,
-            });
+            .map_err(|e| ReadError::io(path, e))?;
+        match self.file.len() as u64 {
+            bytes if bytes > MAX_IMAGE_BYTES => Err(too_large(path, bytes)),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn inflate(&self, pixels: &mut [u8]) -> Result<(), png::DecodingError> {
@@ -177,15 +166,9 @@ impl ImageReader {
     fn decoding_error(&self, path: &Path, error: png::DecodingError) -> ReadError {
         match error {
             png::DecodingError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
-                ReadError::Truncated {
-                    path: path.to_owned(),
-                    bytes: self.file.len(),
-                }
+                truncated(path, self.file.len())
             }
-            other => ReadError::Damaged {
-                path: path.to_owned(),
-                reason: plain(&other.to_string()).to_owned(),
-            },
+            other => damaged(path, plain(&other.to_string())),
         }
     }
 }
@@ -196,11 +179,4 @@ fn plain(reason: &str) -> &str {
     let words = reason.split("ChunkType").next().unwrap_or(reason);
     let words = words.trim_end().trim_end_matches(':');
     words.trim_end_matches(" while decoding")
-}
-
-fn io_error(path: &Path, source: io::Error) -> ReadError {
-    ReadError::Io {
-        path: path.to_owned(),
-        source,
-    }
 }

@@ -20,8 +20,8 @@ use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp::SECOND_NS;
+use gyre_radar::scan::{Sense, SweepGeometry};
 
-/// The definition of the time of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScanTime {
     /// The mean of the first and last row's stamps.
@@ -31,7 +31,6 @@ pub(crate) enum ScanTime {
 }
 
 impl ScanTime {
-    /// The definition of the stamps where files are not named by them.
     pub(crate) fn of_rows(self) -> &'static str {
         match self {
             Self::Halfway => {
@@ -42,7 +41,6 @@ impl ScanTime {
     }
 }
 
-/// The parameters of a format with metadata columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Profile {
     pub(crate) range_resolution_m: f32,
@@ -63,8 +61,7 @@ pub(crate) struct Profile {
     pub(crate) chirps: bool,
 }
 
-/// A format: its folders relative to the root, and the parameters of its metadata columns.
-type Known = (Format, &'static [&'static str], Option<Profile>);
+pub(crate) type Known = (Format, &'static [&'static str], Option<Profile>);
 
 /// The development kit of Oxford gives 0.0432 m for a bin: then paths are 1.4 % shorter than the
 /// ground truth.
@@ -161,12 +158,40 @@ pub(crate) const KNOWN: [Known; 8] = [
 ];
 
 impl Profile {
+    /// The parameters of images without metadata columns.
+    pub(crate) fn without_rows(range_resolution_m: f32, options: &DatasetOptions) -> Self {
+        let profile = Self {
+            range_resolution_m,
+            ..OXFORD
+        };
+        profile.with(Format::Other, None, options)
+    }
+
+    /// The geometry of a sweep whose rows have these bytes: of metadata and of powers.
+    pub(crate) fn geometry(
+        &self,
+        azimuths: usize,
+        [first_byte, bins]: [usize; 2],
+        stamp_ns: i64,
+    ) -> SweepGeometry {
+        SweepGeometry {
+            azimuths,
+            bins,
+            stride: first_byte + bins,
+            first_byte,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
+            sense: Sense::Clockwise,
+            stamp_ns,
+        }
+    }
+
     /// Returns the parameters of a format; `None` if its images have no metadata columns.
     pub(crate) fn of(format: Format) -> Option<Self> {
         KNOWN.iter().find(|known| known.0 == format)?.2
     }
 
-    /// Applies the exception of Boreas by the date of the first image, and then the options.
     pub(crate) fn with(
         mut self,
         format: Format,
@@ -174,22 +199,15 @@ impl Profile {
         options: &DatasetOptions,
     ) -> Self {
         let (before_m, until_ns) = BOREAS_BEFORE;
-        let start_ns = first_image.and_then(FirstImage::start_ns);
+        let start_ns = first_image.and_then(|image| image.row_ns(0));
         if format == Format::Boreas && start_ns.is_some_and(|ns| ns < until_ns) {
             self.range_resolution_m = before_m;
         }
-        Self {
-            range_resolution_m: options
-                .range_resolution_m
-                .unwrap_or(self.range_resolution_m),
-            range_offset_m: options.range_offset_m.unwrap_or(self.range_offset_m),
-            doppler_s: options.doppler_s.unwrap_or(self.doppler_s),
-            azimuth_eccentricity_rad: options
-                .azimuth_eccentricity_rad
-                .unwrap_or(self.azimuth_eccentricity_rad),
-            encoder_counts: options.encoder_counts.unwrap_or(self.encoder_counts),
-            azimuth_source: options.azimuth_source.unwrap_or(self.azimuth_source),
-            ..self
+        macro_rules! take {
+            ($($option:ident)*) => { $(self.$option = options.$option.unwrap_or(self.$option);)* };
         }
+        take!(range_resolution_m range_offset_m doppler_s azimuth_eccentricity_rad);
+        take!(encoder_counts azimuth_source);
+        self
     }
 }

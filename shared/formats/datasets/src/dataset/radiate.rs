@@ -1,9 +1,8 @@
 //! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and
 //! `Navtech_Polar.txt` with times.
 //!
-//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the
-//! times of receipt at the host: after a stall they are late by up to 1.4 s while the antenna turns
-//! uniformly. The sensor clock is reconstructed.
+//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, of receipt at the
+//! host: after a stall they are late by up to 1.4 s. The sensor clock is reconstructed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
@@ -65,20 +64,20 @@ pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
 }
 
 fn read_list(list: &Path) -> Result<String, OpenError> {
-    let path = list.to_owned();
     gyre_storage::read_text(list, MAX_LIST_BYTES).map_err(|source| match source.kind() {
-        ErrorKind::NotFound => OpenError::NoTimes { path },
-        _ => OpenError::Io { path, source },
+        ErrorKind::NotFound => OpenError::Recording(format!(
+            "there is no {}: it lists the times of the images, which have none of their own; copy it from the dataset",
+            list.display()
+        )),
+        _ => OpenError::io(list, source),
     })
 }
 
 /// A frame number and a time of receipt, ns.
 type Receipt = (i64, i64);
 
-/// Frames between two breaks in time, whose times of receipt come from one uniform clock.
 #[derive(Debug, PartialEq)]
 struct Segment {
-    /// Number of the first frame.
     first: i64,
     receipts: Vec<Receipt>,
 }
@@ -102,7 +101,6 @@ fn segments(received: &[Receipt]) -> Vec<Segment> {
     segments
 }
 
-/// Returns whether the time between two receipts is about that between their frames.
 fn agree(earlier: Receipt, later: Receipt) -> bool {
     let frames = later.0.saturating_sub(earlier.0) as f64;
     let apart_ns = later.1.saturating_sub(earlier.1) as f64;
@@ -125,43 +123,31 @@ fn add_turns(
         let Some((clock, ignored)) = SensorClock::below_most(receipts, PERIOD_NS) else {
             continue;
         };
-        used.extend(
-            receipts
-                .iter()
-                .filter(|receipt| !ignored.contains(receipt))
-                .map(|r| r.0),
-        );
-        early.extend(
-            ignored
-                .into_iter()
-                .map(|receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9)),
-        );
+        let others = receipts.iter().filter(|receipt| !ignored.contains(receipt));
+        used.extend(others.map(|receipt| receipt.0));
+        let by_s = |receipt: Receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9);
+        early.extend(ignored.into_iter().map(by_s));
         clocks.push((*first, clock));
     }
     let turn = |&(frame, logged_ns): &Receipt| {
         let later = clocks.partition_point(|(first, _)| *first <= frame);
         let (_, clock) = clocks.get(later.checked_sub(1)?)?;
         let start_ns = clock.start_ns(frame);
+        let is_used = used.contains(&frame);
         Some(Turn {
             start_ns,
             period_ns: clock.period.round() as i64,
-            logged_ns: if used.contains(&frame) {
-                logged_ns
-            } else {
-                start_ns
-            },
+            logged_ns: if is_used { logged_ns } else { start_ns },
         })
     };
     scans.turns = received.iter().filter_map(turn).collect();
     scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
-    let far: Vec<String> = received
-        .iter()
-        .filter(|(frame, _)| !used.contains(frame) && early.iter().all(|(other, _)| other != frame))
-        .map(|(frame, _)| frame.to_string())
-        .collect();
-    scans
-        .notes
-        .extend(note_times(&far, &early, segments.len(), list));
+    let is_early = |frame: &i64| early.iter().any(|(other, _)| other == frame);
+    let far = received.iter().map(|(frame, _)| frame);
+    let far = far.filter(|frame| !used.contains(*frame) && !is_early(frame));
+    let far: Vec<String> = far.map(ToString::to_string).collect();
+    let notes = note_times(&far, &early, segments.len(), list);
+    scans.notes.extend(notes);
     Ok(())
 }
 
@@ -186,12 +172,10 @@ fn note_times(far: &[String], early: &[(i64, f64)], segments: usize, list: &Path
 }
 
 fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default()
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
-/// Returns the receipts of all images.
 fn receipts(
     images: &Images,
     stamps: &BTreeMap<i64, i64>,
@@ -203,32 +187,31 @@ fn receipts(
     };
     let found: Vec<Option<Receipt>> = (0..images.len()).map(receipt).collect();
     let missing = || (0..found.len()).filter(|index| found[*index].is_none());
-    match missing().next() {
-        Some(first) => Err(OpenError::MissingTimes {
-            path: list.to_owned(),
-            missing: missing().count(),
-            images: images.len(),
-            first: file_name(images.file(first)),
-        }),
-        None => Ok(found.into_iter().flatten().collect()),
-    }
+    let Some(first) = missing().next() else {
+        return Ok(found.into_iter().flatten().collect());
+    };
+    let (missing, all, first) = (
+        missing().count(),
+        images.len(),
+        file_name(images.file(first)),
+    );
+    let fault = format!(
+        "has no times of {missing} of {all} images, {first} first; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`: copy the whole list, or take these images away"
+    );
+    Err(OpenError::at(list, fault))
 }
 
-/// Returns times by frame number, and how many of them lack leading zeros.
 fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
     let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
-    for (line, content) in text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty())
-    {
-        let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
-            path: path.to_owned(),
-            line: line + 1,
-            reason: format!(
-                "{} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
+    let lines = text.lines().enumerate();
+    for (line, content) in lines.filter(|(_, content)| !content.trim().is_empty()) {
+        let (frame, ns, digits) = parse_line(content).ok_or_else(|| {
+            OpenError::Recording(format!(
+                "{}, line {}: {} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
+                path.display(),
+                line + 1,
                 quoted(content)
-            ),
+            ))
         })?;
         unpadded += usize::from(digits < 9);
         stamps.insert(frame, ns);
@@ -241,15 +224,10 @@ fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
     let mut words = line.split_whitespace();
     let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
     let (seconds, nanoseconds) = value.split_once('.')?;
-    let ns: i64 = nanoseconds
-        .parse()
-        .ok()
-        .filter(|ns| (0..SECOND_NS).contains(ns))?;
-    let stamp = seconds
-        .parse::<i64>()
-        .ok()?
-        .checked_mul(SECOND_NS)?
-        .checked_add(ns)?;
+    let ns = nanoseconds.parse::<i64>().ok();
+    let ns = ns.filter(|ns| (0..SECOND_NS).contains(ns))?;
+    let seconds: i64 = seconds.parse().ok()?;
+    let stamp = seconds.checked_mul(SECOND_NS)?.checked_add(ns)?;
     let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
     labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
 }
@@ -261,14 +239,10 @@ mod tests {
 
     #[test]
     fn nanoseconds_without_leading_zeros_are_integers() {
-        assert_eq!(
-            parse_line("Frame: 000243 Time: 1549986608.1533537"),
-            Some((243, 1_549_986_608_001_533_537, 7))
-        );
-        assert_eq!(
-            parse_line("Frame: 1 Time: 1549986608.0"),
-            Some((1, 1_549_986_608_000_000_000, 1))
-        );
+        let line = parse_line("Frame: 000243 Time: 1549986608.1533537");
+        assert_eq!(line, Some((243, 1_549_986_608_001_533_537, 7)));
+        let line = parse_line("Frame: 1 Time: 1549986608.0");
+        assert_eq!(line, Some((1, 1_549_986_608_000_000_000, 1)));
         for bad in [
             "Frame: 1 Time: 1549986608",
             "Frame: 1 Time: 1549986608.1234567890",
@@ -281,13 +255,8 @@ mod tests {
     }
 
     fn received(frames: std::ops::Range<i64>, offset_ns: i64) -> Vec<Receipt> {
-        let at = |frame| {
-            (
-                frame,
-                1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns,
-            )
-        };
-        frames.map(at).collect()
+        let ns = |frame| 1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns;
+        frames.map(|frame| (frame, ns(frame))).collect()
     }
 
     #[test]

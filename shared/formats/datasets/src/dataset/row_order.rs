@@ -15,8 +15,6 @@ const BY_TIME: &str = "The files are not named by times of their scans: they are
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \
                        since in the order of the times of their first rows scans would overlap: a clock was set.";
 
-/// The times of the first rows of images, and notes on them.
-#[derive(Debug)]
 pub(crate) struct RowOrder {
     /// ns since 1970, increasing unless a clock was set. The time of an unreadable image is
     /// estimated.
@@ -28,22 +26,20 @@ pub(crate) struct RowOrder {
 /// images with a repeated stamp. Does nothing and returns `None` if their names are times of the
 /// rows, or the rows have no times.
 pub(crate) fn order(images: &mut Images, first_image: &FirstImage) -> Option<RowOrder> {
-    let start_ns = first_image.has_stamps().then(|| first_image.start_ns())??;
+    let start_ns = first_image.row_ns(0).filter(|_| first_image.has_stamps())?;
     let is_named = |name_ns: i64| (name_ns - start_ns).abs() <= MAX_INTERVAL_NS;
     let all_named = (0..images.len()).all(|index| images.name_stamp_ns(index).is_some());
-    if all_named && first_image.name_ns().is_some_and(is_named) {
+    if all_named && first_image.name_ns.is_some_and(is_named) {
         return None;
     }
-    let stamps: Vec<Option<i64>> = (0..images.len())
-        .map(|index| {
-            let bytes = images.first_bytes::<METADATA_BYTES>(index)?;
-            stamp::to_ns(RowMetadata::parse(&bytes).stamp)
-        })
-        .collect();
-    let (by_time, by_name) = (by_time(&stamps), (0..stamps.len()).collect());
-    let is_mixed = is_mixed(&stamps, &by_time, first_image.turn().turn_ns());
-    let (order, sentence) = match is_mixed {
-        true => (by_name, BY_NAME),
+    let stamp_ns = |index| {
+        let bytes = images.first_bytes::<METADATA_BYTES>(index)?;
+        stamp::to_ns(RowMetadata::parse(&bytes).stamp)
+    };
+    let stamps: Vec<Option<i64>> = (0..images.len()).map(stamp_ns).collect();
+    let by_time = by_time(&stamps);
+    let (order, sentence) = match is_mixed(&stamps, &by_time, first_image.turn().turn_ns()) {
+        true => ((0..stamps.len()).collect(), BY_NAME),
         false => (by_time, BY_TIME),
     };
     let (indices, copies) = without_copies(&stamps, order);
@@ -52,13 +48,9 @@ pub(crate) fn order(images: &mut Images, first_image: &FirstImage) -> Option<Row
     let copies: Vec<OsString> = copies.iter().map(name).collect();
     let same = image_list::note(&copies, "with the times of other images in the rows");
     images.keep(&indices);
-    Some(RowOrder {
-        starts_ns,
-        notes: [Some(sentence.to_owned()), same]
-            .into_iter()
-            .flatten()
-            .collect(),
-    })
+    let notes = [Some(sentence.to_owned()), same].into_iter().flatten();
+    let notes = notes.collect();
+    Some(RowOrder { starts_ns, notes })
 }
 
 /// Returns the indices of images by their times. One without a time stays behind the one before it.

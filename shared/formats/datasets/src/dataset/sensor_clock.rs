@@ -24,7 +24,6 @@ pub(crate) struct SensorClock {
     origin_ns: i64,
     /// From `origin_ns`, ns.
     start: f64,
-    /// ns.
     pub(crate) period: f64,
 }
 
@@ -41,23 +40,17 @@ impl SensorClock {
         period: std::ops::RangeInclusive<f64>,
     ) -> Option<Self> {
         let &(first_number, origin_ns) = received.first()?;
-        let points: Vec<(f64, f64)> = received
-            .iter()
-            .map(|(number, ns)| {
-                (
-                    *number as f64 - first_number as f64,
-                    (ns - origin_ns) as f64,
-                )
-            })
-            .collect();
+        let point = |(number, ns): &Receipt| {
+            let number = *number as f64 - first_number as f64;
+            (number, (ns - origin_ns) as f64)
+        };
+        let points: Vec<(f64, f64)> = received.iter().map(point).collect();
         let mean = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
         let slope =
             slope_over(&lower_hull(&points), mean).unwrap_or((period.start() + period.end()) / 2.0);
         let slope = slope.clamp(*period.start(), *period.end());
-        let start = points
-            .iter()
-            .map(|(number, ns)| ns - slope * number)
-            .fold(f64::INFINITY, f64::min);
+        let starts = points.iter().map(|(number, ns)| ns - slope * number);
+        let start = starts.fold(f64::INFINITY, f64::min);
         Some(Self {
             origin_ns,
             start: start - slope * first_number as f64,
@@ -84,14 +77,10 @@ impl SensorClock {
             }
             (clock, rest) = (next, others);
         }
-        let (early, times): (Vec<_>, Vec<_>) = received
-            .iter()
-            .copied()
-            .partition(|time| clock.is_early(*time));
-        let prompt = times
-            .iter()
-            .filter(|time| clock.after_ns(**time) <= EARLY_NS)
-            .count();
+        let is_early = |time: &Receipt| clock.is_early(*time);
+        let (early, times): (Vec<_>, Vec<_>) = received.iter().copied().partition(is_early);
+        let is_prompt = |time: &&Receipt| clock.after_ns(**time) <= EARLY_NS;
+        let prompt = times.iter().filter(is_prompt).count();
         match prompt as f64 >= PROMPT_SHARE * times.len() as f64 && early.len() <= most {
             true => Some((Self::below(&times, period)?, early)),
             false => Some((all, Vec::new())),
@@ -111,10 +100,8 @@ impl SensorClock {
         }
         let of = |near: bool| {
             let times = times.iter().zip(&is_near);
-            times
-                .filter(|(_, is_near)| **is_near == near)
-                .map(|(time, _)| *time)
-                .collect()
+            let times = times.filter(|(_, is_near)| **is_near == near);
+            times.map(|(time, _)| *time).collect()
         };
         (of(true), of(false))
     }
@@ -167,16 +154,15 @@ mod tests {
     /// By brute force: the best start for each period of a grid.
     fn slack_of_grid(received: &[(i64, i64)]) -> f64 {
         let slack = |period: f64| {
-            let late: Vec<f64> = received
+            let late = received
                 .iter()
-                .map(|(k, ns)| *ns as f64 - period * *k as f64)
-                .collect();
+                .map(|(k, ns)| *ns as f64 - period * *k as f64);
+            let late: Vec<f64> = late.collect();
             let start = late.iter().copied().fold(f64::INFINITY, f64::min);
             late.iter().map(|l| l - start).sum::<f64>()
         };
-        (20_000..=30_000)
-            .map(|p| slack(f64::from(p) * 1e4))
-            .fold(f64::INFINITY, f64::min)
+        let slacks = (20_000..=30_000).map(|p| slack(f64::from(p) * 1e4));
+        slacks.fold(f64::INFINITY, f64::min)
     }
 
     proptest! {
@@ -200,30 +186,20 @@ mod tests {
 
     /// Times of 100 scans of a host that is 0 to 20 ms late, and stalls once.
     fn times() -> Vec<(i64, i64)> {
-        let late_ms = |k: i64| {
-            if (60..66).contains(&k) {
-                1_400 - (k - 60) * 230
-            } else {
-                k * 7 % 21
-            }
+        let late_ms = |k: i64| match k {
+            60..66 => 1_400 - (k - 60) * 230,
+            _ => k * 7 % 21,
         };
-        let time = |k| {
-            (
-                k,
-                1_549_986_607_000_000_000 + k * 250_020_000 + late_ms(k) * 1_000_000,
-            )
-        };
-        (0..100).map(time).collect()
+        let ns = |k| 1_549_986_607_000_000_000 + k * 250_020_000 + late_ms(k) * 1_000_000;
+        (0..100).map(|k| (k, ns(k))).collect()
     }
 
     #[test]
     fn times_that_are_early_bend_nothing_and_are_returned() {
         let (good, none) = SensorClock::below_most(&times(), BOUNDS).unwrap();
-        assert_eq!(
-            (good, none),
-            (SensorClock::below(&times(), BOUNDS).unwrap(), Vec::new())
-        );
-        let few = [
+        assert_eq!(Some(good), SensorClock::below(&times(), BOUNDS));
+        assert!(none.is_empty());
+        for early in [
             &[0][..],
             &[50],
             &[99],
@@ -231,23 +207,21 @@ mod tests {
             &[40, 41],
             &[63],
             &[9, 30, 31, 90],
-        ];
-        for early in few {
+        ] {
             for by_ms in [60, 700, 5_000] {
                 let mut received = times();
                 // Of a scan that is received late, a time that is early by so much.
-                early
-                    .iter()
-                    .for_each(|k| received[*k].1 = good.start_ns(*k as i64) - by_ms * 1_000_000);
+                for k in early {
+                    received[*k].1 = good.start_ns(*k as i64) - by_ms * 1_000_000;
+                }
                 let expected: Vec<_> = early.iter().map(|k| received[*k]).collect();
                 let (clock, found) = SensorClock::below_most(&received, BOUNDS).unwrap();
                 assert_eq!(found, expected, "{early:?} by {by_ms} ms");
-                let error = (0..100)
-                    .map(|k| (clock.start_ns(k) - good.start_ns(k)).abs())
-                    .max();
+                let errors = (0..100).map(|k| (clock.start_ns(k) - good.start_ns(k)).abs());
+                let error = errors.max();
                 assert!(
                     error < Some(2_000_000),
-                    "{early:?} by {by_ms} ms: {error:?} ns"
+                    "{early:?} by {by_ms} ms: {error:?}"
                 );
             }
         }
@@ -268,10 +242,9 @@ mod tests {
     #[test]
     fn a_host_that_is_late_most_of_the_time_makes_no_time_early() {
         let mut received = times();
-        received
-            .iter_mut()
-            .skip(20)
-            .for_each(|(k, ns)| *ns += 300_000_000 + *k * 37 % 11 * 50_000_000);
+        for (k, ns) in received.iter_mut().skip(20) {
+            *ns += 300_000_000 + *k * 37 % 11 * 50_000_000;
+        }
         let (_, early) = SensorClock::below_most(&received, BOUNDS).unwrap();
         assert!(early.is_empty(), "{early:?}");
     }

@@ -8,10 +8,8 @@ const STALE: f64 = 0.85;
 /// in each turn.
 const NEAR: f64 = 0.05;
 
-/// The image that was read last.
 #[derive(Debug, Default)]
 pub(crate) struct StaleRows {
-    /// Number of that image.
     of: Option<usize>,
     /// The rows of that image; empty if it cannot be read.
     rows: Vec<u8>,

@@ -8,7 +8,7 @@ pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 const YEARS_S: std::ops::Range<i64> = 1_420_070_400..2_240_611_200;
 
 /// Times are accepted up to 146 years from 1970, so that no difference overflows.
-const MAX_NS: i64 = i64::MAX / 2;
+pub(crate) const MAX_NS: i64 = i64::MAX / 2;
 /// Plausible durations of a turn, ns; others are gaps or errors.
 pub(crate) const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
 /// Default duration of a turn, ns: Navtech radars turn four times per second.
@@ -22,10 +22,9 @@ pub(crate) fn plausible(stamp_ns: i64) -> bool {
 /// Converts a stamp of unknown unit to ns: the years 2015 to 2040 do not overlap in s, ms, us and
 /// ns.
 pub fn to_ns(raw: i64) -> Option<i64> {
-    [1, 1_000, 1_000_000, SECOND_NS]
-        .into_iter()
-        .filter_map(|unit| raw.checked_mul(unit))
-        .find(|ns| plausible(*ns))
+    let units = [1, 1_000, 1_000_000, SECOND_NS].into_iter();
+    let mut times = units.filter_map(|unit| raw.checked_mul(unit));
+    times.find(|ns| plausible(*ns))
 }
 
 /// Parses decimal seconds to ns, exactly: `12.5` is 12,500,000,000. Values with an exponent are
@@ -40,11 +39,8 @@ pub fn parse_seconds(text: &str) -> Option<i64> {
     let sign = if whole.starts_with('-') { -1 } else { 1 };
     let seconds: i64 = unsigned.parse().ok()?;
     let nanoseconds = format!("{fraction:0<9}").get(..9)?.parse::<i64>().ok()?;
-    seconds
-        .checked_mul(SECOND_NS)?
-        .checked_add(nanoseconds)
-        .filter(|ns| *ns <= MAX_NS)
-        .map(|ns| sign * ns)
+    let ns = seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds)?;
+    (ns <= MAX_NS).then_some(sign * ns)
 }
 
 fn rounded_ns(seconds: f64) -> Option<i64> {
@@ -56,11 +52,8 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
 /// which are half as long again as the shortest tenth, or longer. `None` if no time can be a turn.
 pub fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     let stamps: Vec<i64> = stamps.collect();
-    let mut times: Vec<i64> = stamps
-        .windows(2)
-        .map(|w| w[1] - w[0])
-        .filter(|ns| TURN_NS.contains(ns))
-        .collect();
+    let times = stamps.windows(2).map(|w| w[1] - w[0]);
+    let mut times: Vec<i64> = times.filter(|ns| TURN_NS.contains(ns)).collect();
     times.sort_unstable();
     let short_ns = *times.get(times.len() / 10)?;
     let one_turn = times.iter().filter(|ns| **ns < short_ns * 3 / 2);
@@ -81,13 +74,9 @@ mod tests {
 
     #[test]
     fn the_unit_follows_from_the_size() {
-        for raw in [
-            1_547_131_046,
-            1_547_131_046_000,
-            1_547_131_046_000_000,
-            1_547_131_046_000_000_000,
-        ] {
-            assert_eq!(to_ns(raw), Some(1_547_131_046_000_000_000), "{raw}");
+        for unit in [1, 1_000, 1_000_000, SECOND_NS] {
+            let found = to_ns(1_547_131_046 * unit);
+            assert_eq!(found, Some(1_547_131_046 * SECOND_NS), "{unit}");
         }
         for raw in [0, -1, 586, 1_000_000_000, i64::MAX, i64::MIN] {
             assert_eq!(to_ns(raw), None, "{raw}");
@@ -108,34 +97,23 @@ mod tests {
         assert_eq!(turn_of(&[gap, turn, gap]), Some(turn));
         assert_eq!(turn_of(&[turn, turn - 9, turn + 9, gap]), Some(turn));
         // One time in thirty that is far too short is no turn.
-        assert_eq!(
-            turn_of(&[&[turn / 4][..], &[turn; 29]].concat()),
-            Some(turn)
-        );
+        let times = [&[turn / 4][..], &[turn; 29]].concat();
+        assert_eq!(turn_of(&times), Some(turn));
         assert_eq!(turn_of(&[]), None);
     }
 
     #[test]
     fn decimal_seconds_keep_every_nanosecond() {
-        assert_eq!(
-            parse_seconds("1549986606.800100001"),
-            Some(1_549_986_606_800_100_001)
-        );
-        assert_eq!(parse_seconds("0"), Some(0));
-        assert_eq!(parse_seconds("-1.5"), Some(-1_500_000_000));
-        assert_eq!(parse_seconds("1.5e3"), Some(1_500_000_000_000));
-        assert_eq!(parse_seconds("1.1234567899"), Some(1_123_456_789));
-        for bad in [
-            "",
-            "nan",
-            "inf",
-            "1.2.3",
-            "x",
-            "1e300",
-            "9999999999",
-            "-9999999999",
-            "1e10",
+        for (text, ns) in [
+            ("1549986606.800100001", 1_549_986_606_800_100_001),
+            ("0", 0),
+            ("-1.5", -1_500_000_000),
+            ("1.5e3", 1_500_000_000_000),
+            ("1.1234567899", 1_123_456_789),
         ] {
+            assert_eq!(parse_seconds(text), Some(ns), "{text}");
+        }
+        for bad in " nan inf 1.2.3 x 1e300 9999999999 -9999999999 1e10".split(' ') {
             assert_eq!(parse_seconds(bad), None, "{bad}");
         }
     }

@@ -2,7 +2,7 @@
 //! from straight ahead.
 
 use super::detect::Found;
-use super::eccentricity;
+use super::eccentricity::correct_eccentricity;
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
 use super::format::Format;
@@ -10,14 +10,14 @@ use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
+use super::profiles::Profile;
 use super::stale::StaleRows;
 use super::{Dataset, check_capacity};
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
 
-/// The sweep of a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     pub(crate) start_ns: i64,
@@ -26,34 +26,21 @@ pub(crate) struct Turn {
     pub(crate) logged_ns: i64,
 }
 
-/// The azimuth of the first column.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) enum FirstAzimuth {
-    /// Straight ahead.
-    #[default]
-    Ahead,
-    /// Half a step to the right.
-    HalfAStep,
-}
-
 /// The scans of a folder, with scratch memory for the transposition. Images that are wider than
 /// high are not transposed.
-#[derive(Debug)]
 pub(crate) struct TransposedScans {
     pub(crate) images: Images,
     /// One per image.
     pub(crate) turns: Vec<Turn>,
     /// Time of a turn, of those without gaps between, ns. The caller sets it with the turns.
     pub(crate) period_ns: i64,
-    /// The caller sets it if it is not the default.
-    pub(crate) first_azimuth: FirstAzimuth,
+    /// The azimuth of the first column, steps clockwise from ahead. The caller sets it if it is not
+    /// 0.
+    pub(crate) first_azimuth: f64,
     pub(crate) notes: Vec<String>,
     format: Format,
     stamp_meaning: &'static str,
-    range_resolution_m: f32,
-    range_offset_m: f32,
-    doppler_s: f32,
-    azimuth_eccentricity_rad: f32,
+    profile: Profile,
     scratch: Vec<u8>,
     /// Without angles, only stale rows show that the host has lost azimuths; `None`: they are
     /// ignored.
@@ -80,22 +67,17 @@ impl TransposedScans {
             images,
             turns: Vec::new(),
             period_ns: 0,
-            first_azimuth: FirstAzimuth::default(),
+            first_azimuth: 0.0,
             notes,
             format,
             stamp_meaning,
-            range_resolution_m: 0.0,
-            range_offset_m: options.range_offset_m.unwrap_or(0.0),
-            doppler_s: options.doppler_s.unwrap_or(0.0),
-            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
+            profile: Profile::without_rows(0.0, options),
             scratch: Vec::new(),
             stale: (options.lost_azimuths != Some(LostAzimuthOption::Ignore))
                 .then(StaleRows::default),
         };
         scans.check_shape()?;
-        scans.range_resolution_m = options
-            .range_resolution_m
-            .unwrap_or_else(|| metres_per_bin(scans.bins()));
+        scans.profile = Profile::without_rows(metres_per_bin(scans.bins()), options);
         if scans.is_transposed() {
             let size = scans.images.size;
             scans.scratch = vec![0; size.bytes()];
@@ -112,12 +94,7 @@ impl TransposedScans {
             return Ok(());
         }
         let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
-        Err(OpenError::WrongImage {
-            path: self.images.file(0).to_owned(),
-            actual: self.images.size,
-            format: self.format,
-            reason,
-        })
+        Err(self.images.wrong(self.format, &reason))
     }
 
     pub(crate) fn azimuths(&self) -> usize {
@@ -130,15 +107,15 @@ impl TransposedScans {
 
     /// Decodes an image, azimuth x range bin.
     fn decode(&mut self, index: usize, into: &mut [u8]) -> Result<(), ReadError> {
+        let rows = self.images.size.height;
         if !self.is_transposed() {
-            return self.images.decode(index, into);
+            return self.images.decode(index, rows..=rows, into).map(|_| ());
         }
-        self.images.decode(index, &mut self.scratch)?;
+        self.images.decode(index, rows..=rows, &mut self.scratch)?;
         transpose(&self.scratch, self.azimuths(), into);
         Ok(())
     }
 
-    /// Keeps an image, or that it cannot be read.
     fn remember(&mut self, index: usize, image: Option<&[u8]>) {
         if let Some(stale) = &mut self.stale {
             stale.remember(index, image.unwrap_or_default());
@@ -146,7 +123,8 @@ impl TransposedScans {
     }
 
     fn stamp_ns(&self, turn: &Turn) -> i64 {
-        turn.start_ns + mean_after_start_ns(turn.period_ns, self.azimuths())
+        let n = self.azimuths() as i64;
+        turn.start_ns + turn.period_ns * (n - 1) / (2 * n)
     }
 }
 
@@ -175,7 +153,7 @@ impl Dataset for TransposedScans {
     }
 
     fn files(&self) -> &FileList {
-        self.images.files()
+        &self.images.files
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
@@ -194,10 +172,6 @@ impl Dataset for TransposedScans {
         self.stamp_meaning
     }
 
-    fn encoder_counts(&self) -> Option<u16> {
-        None
-    }
-
     fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -209,11 +183,13 @@ impl Dataset for TransposedScans {
         })?;
         let (azimuths, bins) = (self.azimuths(), self.bins());
         check_capacity(self.limits(), &slot)?;
+        let bytes = &mut slot.bytes[..azimuths * bins];
+        // No image is before the first one.
+        let before = index.checked_sub(1);
         // Before the image, since it is decoded into the same scratch memory.
-        if let Some(before) = index.checked_sub(1)
+        if let Some(before) = before
             && self.stale.as_ref().is_some_and(|stale| !stale.has(before))
         {
-            let bytes = &mut slot.bytes[..azimuths * bins];
             match self.decode(before, bytes) {
                 Ok(()) => self.remember(before, Some(bytes)),
                 // The file may come back, as with this one.
@@ -221,52 +197,24 @@ impl Dataset for TransposedScans {
                 Err(_) => self.remember(before, None),
             }
         }
-        let bytes = &mut slot.bytes[..azimuths * bins];
         self.decode(index, bytes)?;
-        let before = index.checked_sub(1);
-        let lost = match &self.stale {
-            Some(stale) if before.is_some_and(|before| stale.has(before)) => {
-                stale.count(bytes, bins)
-            }
-            // No image is before the first one.
-            _ => 0,
-        };
+        let has_before = |stale: &&StaleRows| before.is_some_and(|before| stale.has(before));
+        let stale = self.stale.as_ref().filter(has_before);
+        let lost = stale.map_or(0, |stale| stale.count(bytes, bins));
         self.remember(index, Some(bytes));
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
-        let first = match self.first_azimuth {
-            FirstAzimuth::Ahead => 0.0,
-            FirstAzimuth::HalfAStep => 0.5,
-        };
-        fill_uniform(azimuth_rad, first);
-        eccentricity::correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
-        let assumed = match self.stale {
-            Some(_) => flag::ASSUMED,
-            None => 0,
-        };
+        fill_uniform(azimuth_rad, self.first_azimuth);
+        correct_eccentricity(azimuth_rad, self.profile.azimuth_eccentricity_rad);
+        let assumed = self.stale.as_ref().map_or(0, |_| flag::ASSUMED);
         let (measured, stale) = slot.flags[..azimuths].split_at_mut(azimuths - lost);
         measured.fill(flag::MEASURED | assumed);
         stale.fill(flag::STALE | assumed);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;
         }
-        Ok(SweepGeometry {
-            azimuths,
-            bins,
-            stride: bins,
-            first_byte: 0,
-            range_resolution_m: self.range_resolution_m,
-            range_offset_m: self.range_offset_m,
-            doppler_s: self.doppler_s,
-            sense: Sense::Clockwise,
-            stamp_ns: self.stamp_ns(&turn),
-        })
+        let scan_ns = self.stamp_ns(&turn);
+        Ok(self.profile.geometry(azimuths, [0, bins], scan_ns))
     }
-}
-
-/// Mean time of `azimuths` columns spread uniformly over a period, relative to the first, ns.
-fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
-    let n = azimuths as i64;
-    period_ns * (n - 1) / (2 * n)
 }
 
 /// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::LoggedFix;
 use crate::{
     stretches::{between, longest_chain},
-    table::Raw,
+    table::{Raw, leave_out},
 };
 
 /// No vehicle that carries a spinning radar is faster, m/s.
@@ -61,27 +61,25 @@ fn is_zero(count: &usize) -> bool {
 impl GnssFaults {
     /// Returns the number of rows that are not among the fixes.
     pub fn left_out(&self) -> usize {
-        self.unreadable
-            + self.without_fix
-            + self.not_a_number
-            + self.off_the_earth
-            + self.zero
-            + self.repeated
-            + self.frozen
-            + self.jumps
+        let used = self.out_of_order + self.of_unknown_status + self.too_certain;
+        let all = self.named().iter().map(|(count, _)| count).sum::<usize>();
+        all - used
     }
 
-    /// Returns the reason why none of so many entries is a usable fix.
     pub(super) fn without_usable(&self, all: usize) -> String {
-        let named = self.named().into_iter();
-        let named: Vec<String> = named
-            .map(|(count, what)| format!("{count} {what}"))
-            .collect();
-        let named = match named.is_empty() {
-            true => String::new(),
-            false => format!(" ({})", named.join(", ")),
+        let named = match self.listed() {
+            Some(listed) => format!(" ({listed})"),
+            None => String::new(),
         };
         format!("none of its {all} entries is a usable fix{named}")
+    }
+
+    /// Returns the counts that are not zero as a text; `None` without faults.
+    pub(crate) fn listed(&self) -> Option<String> {
+        let named = self.named().into_iter();
+        let named = named.map(|(count, what)| format!("{count} {what}"));
+        let listed = named.collect::<Vec<_>>().join(", ");
+        (!listed.is_empty()).then_some(listed)
     }
 
     /// Returns the counts that are not zero, with their names.
@@ -103,10 +101,8 @@ impl GnssFaults {
     }
 }
 
-/// The fixes that can be used, the plane that they are in, and the faults.
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
-/// Removes and sorts faulty fixes, and counts them.
 pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable.count,
@@ -141,13 +137,6 @@ pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
 
 fn finite_or_zero(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
-}
-
-/// Removes such rows, and counts them.
-fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize {
-    let before = rows.len();
-    rows.retain(|row| !is_bad(row));
-    before - rows.len()
 }
 
 /// Sorts fixes by their stamps. Of fixes with the same stamp only the first in the log is used.
@@ -189,7 +178,6 @@ fn without_jumps(fixes: &[LoggedFix]) -> Vec<usize> {
     chain.into_iter().flatten().collect()
 }
 
-/// Returns whether a vehicle can have driven from one fix to a later one.
 fn is_reachable(from: &LoggedFix, to: &LoggedFix) -> bool {
     let seconds = (to.stamp_ns.saturating_sub(from.stamp_ns)) as f64 * 1e-9;
     let [east, north] = [0, 1].map(|axis| to.east_north_m[axis] - from.east_north_m[axis]);

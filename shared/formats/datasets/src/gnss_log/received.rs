@@ -16,7 +16,6 @@ use crate::{
 /// The fixes that a live receiver has sent so far: each row of their log is read once.
 pub struct ReceivedFixes {
     path: PathBuf,
-    /// The end of the part that was read.
     end: u64,
     rows: Option<Rows<FixColumns>>,
 }
@@ -33,24 +32,14 @@ impl ReceivedFixes {
 
     /// Reads the rows that were appended since.
     pub fn read_on(&mut self) -> Result<(), LogError> {
-        let path = || self.path.clone();
         let bytes = self.appended();
-        let bytes = bytes.map_err(|source| LogError::Io {
-            of: OF,
-            path: path(),
-            source,
-        })?;
+        let bytes = bytes.map_err(|source| LogError::unreadable(OF, &self.path, source))?;
         let text = String::from_utf8_lossy(&bytes);
         match &mut self.rows {
             Some(rows) => rows.go_on(&text),
             None => {
                 let rows = Rows::of(&text);
-                let path = path();
-                self.rows = Some(rows.map_err(|reason| LogError::Unknown {
-                    of: OF,
-                    path,
-                    reason,
-                })?);
+                self.rows = Some(rows.map_err(|e| LogError::unknown(OF, &self.path, e))?);
             }
         }
         self.end += bytes.len() as u64;

@@ -45,7 +45,6 @@ const STATUS_UNKNOWN: &str = "-2";
 const TUM: &str = "a line has seconds, x and y, with spaces between";
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
 
-/// Where a table has what.
 #[derive(Clone)]
 pub(super) struct FixColumns {
     stamp: Stamp,
@@ -53,17 +52,10 @@ pub(super) struct FixColumns {
     signs: [Option<(usize, &'static Sign)>; 2],
     pub is_plane: bool,
     altitude: Option<usize>,
-    sigma: Sigma,
+    /// The uncertainty along both axes, whose mean square is used: variances, otherwise standard
+    /// deviations.
+    sigma: Option<(bool, [usize; 2])>,
     status: Option<usize>,
-}
-
-/// Where a row has the uncertainty.
-#[derive(Clone)]
-enum Sigma {
-    None,
-    /// Standard deviations; their mean square is used.
-    Deviations([usize; 2]),
-    Variances([usize; 2]),
 }
 
 pub(super) fn read(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
@@ -74,7 +66,6 @@ pub(super) fn read(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
     Ok((rows.raw, rows.columns.is_plane))
 }
 
-/// Reads the times and places of a trajectory: seconds, x, y and more.
 fn parse_tum(text: &str) -> Raw<RawFix> {
     let mut raw = Raw::of(Vec::new());
     for (number, line) in text.lines().enumerate() {
@@ -107,7 +98,7 @@ impl Columns for FixColumns {
                 signs: [None, None],
                 is_plane: false,
                 altitude: Some(3),
-                sigma: Sigma::Variances([4, 8]),
+                sigma: Some((true, [4, 8])),
                 status: None,
             }),
             _ => Err(format!(
@@ -119,29 +110,22 @@ impl Columns for FixColumns {
     fn by_names(header: &Header) -> Result<Self, String> {
         let on_earth = header.find(LATITUDE).zip(header.find(LONGITUDE));
         let in_plane = header.find(EAST).zip(header.find(NORTH));
-        let (a, b) = on_earth.or(in_plane).ok_or_else(|| {
-            let columns = header.listed();
-            format!("its columns {columns} have no positions: {REMEDY}")
-        })?;
+        let missing = |what| format!("its columns {} have no {what}: {REMEDY}", header.listed());
+        let (a, b) = on_earth.or(in_plane).ok_or_else(|| missing("positions"))?;
         let signs = [&NORTH_OR_SOUTH, &EAST_OR_WEST];
         let east = header.find(SIGMA_EAST);
         let sigma = header.find(SIGMA).or(east);
         Ok(Self {
-            stamp: header
-                .stamp()
-                .ok_or_else(|| format!("it has no column of stamps: {REMEDY}"))?,
+            stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             at: [a, b],
             signs: signs.map(|sign| header.sign(&[sign]).filter(|_| on_earth.is_some())),
             is_plane: on_earth.is_none(),
             altitude: header.find(ALTITUDE),
-            sigma: sigma.map_or(Sigma::None, |north| {
-                Sigma::Deviations([north, east.unwrap_or(north)])
-            }),
+            sigma: sigma.map(|north| (false, [north, east.unwrap_or(north)])),
             status: header.find(STATUS),
         })
     }
 
-    /// A row with a stamp and no place.
     fn is_unmeasured(&self, row: &StringRecord) -> bool {
         self.stamp.ns(row).is_some() && self.at.iter().all(|at| row.get(*at) == Some(""))
     }
@@ -165,12 +149,12 @@ impl Columns for FixColumns {
             at: [coordinate(0)?, coordinate(1)?],
             altitude_m: self.altitude.map_or(Some(0.0), known)?,
             sigma_m: match self.sigma {
-                Sigma::None => 0.0,
+                None => 0.0,
+                Some((true, [a, b])) => RawFix::sigma_of([known(a)?, known(b)?]),
                 // A negative one has a negative square.
-                Sigma::Deviations([a, b]) => {
+                Some((false, [a, b])) => {
                     RawFix::sigma_of([known(a)?, known(b)?].map(|it| it * it.abs()))
                 }
-                Sigma::Variances([a, b]) => RawFix::sigma_of([known(a)?, known(b)?]),
             },
             status_is_unknown: self.status.and_then(|it| row.get(it)) == Some(STATUS_UNKNOWN),
         })

@@ -13,30 +13,17 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut rows = lines(text);
     let header = rows.next().map(|(_, header)| header).unwrap_or_default();
     let time = TIMES.into_iter().find(|name| header.contains(name));
-    let names = [
-        time.unwrap_or(TIMES[0]),
-        "easting",
-        "northing",
-        "roll",
-        "pitch",
-        "heading",
-    ];
-    let [time, east, north, roll, pitch, heading] = columns(header, names)?;
+    let [time] = columns(header, [time.unwrap_or(TIMES[0])])?;
+    let [east, north] = columns(header, ["easting", "northing"])?;
+    let [roll, pitch, heading] = columns(header, ["roll", "pitch", "heading"])?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for (line, row) in rows {
         let stamp = stamp_field(line, row, time)?;
         check_increasing(line, &stamps, stamp)?;
-        let yaw = forward_heading(
-            number(line, row, roll)?,
-            number(line, row, pitch)?,
-            number(line, row, heading)?,
-        );
+        let number = |column| number(line, row, column);
+        let yaw = forward_heading(number(roll)?, number(pitch)?, number(heading)?);
         stamps.push(stamp);
-        poses.push(pose(
-            number(line, row, east)?,
-            number(line, row, north)?,
-            yaw,
-        ));
+        poses.push(pose(number(east)?, number(north)?, yaw));
     }
     Ok(Trajectory {
         stamp_ns: Some(stamps),

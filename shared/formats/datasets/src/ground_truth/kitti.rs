@@ -20,10 +20,8 @@ use gyre_radar::trajectory::Trajectory;
 const NEAR_IDENTITY: f64 = 0.1;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
-    let stamped = lines(text)
-        .next()
-        .and_then(|(_, row)| leading_stamp(row))
-        .is_some();
+    let first = lines(text).next();
+    let stamped = first.is_some_and(|(_, row)| leading_stamp(row).is_some());
     let mut stamps = stamped.then(Vec::new);
     let mut matrices = Vec::new();
     for (line, row) in lines(text) {
@@ -33,10 +31,8 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             matrices.push(matrix);
             continue;
         };
-        let stamp = leading_stamp(row).ok_or_else(|| LineError {
-            line,
-            reason: "the first column is not a time, as in the first line".to_owned(),
-        })?;
+        let missing = "the first column is not a time, as in the first line";
+        let stamp = leading_stamp(row).ok_or_else(|| LineError::new(line, missing))?;
         check_increasing(line, stamps, stamp)?;
         stamps.push(stamp);
         matrices.push(inverse(&matrix));
@@ -53,12 +49,11 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
 }
 
 fn projected(matrices: &[Matrix]) -> Result<Vec<Pose>, LineError> {
-    let plane = Plane::of(matrices).map_err(|reason| LineError { line: 1, reason })?;
+    let plane = Plane::of(matrices).map_err(|reason| LineError::new(1, reason))?;
     let project = |matrix| planar(plane.project(matrix));
     Ok(matrices.iter().map(project).collect())
 }
 
-/// Returns the inverse of a rigid motion.
 fn inverse(m: &Matrix) -> Matrix {
     let back = Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
     let t = back * Vector3::new(-m[3], -m[7], -m[11]);
@@ -75,10 +70,8 @@ fn is_near_identity(m: &Matrix) -> bool {
 
 fn leading_stamp(row: &str) -> Option<i64> {
     let mut words = row.split_whitespace();
-    let first = words.next()?;
-    (words.count() == 12)
-        .then(|| first.parse().ok().and_then(stamp::to_ns))
-        .flatten()
+    let first = words.next()?.parse::<i64>().ok()?;
+    stamp::to_ns(first).filter(|_| words.count() == 12)
 }
 
 /// Writes KITTI poses in the plane (z = 0).

@@ -6,7 +6,6 @@ use gyre_geometry::{Pose, mirrored, pose};
 use super::{LineError, columns, lines, number, stamp_field};
 use gyre_radar::trajectory::Trajectory;
 
-/// One row.
 struct Motion {
     line: usize,
     from_ns: i64,
@@ -20,12 +19,8 @@ struct Motion {
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut motions = parse_rows(text)?;
     motions.sort_by_key(|m| m.from_ns);
-    let Some(first) = motions.first() else {
-        return Err(LineError {
-            line: 1,
-            reason: "the file has a header but no motion".to_owned(),
-        });
-    };
+    let none = || LineError::new(1, "the file has a header but no motion");
+    let first = motions.first().ok_or_else(none)?;
     let (mut stamps, mut poses) = (vec![first.from_ns], vec![Pose::identity()]);
     let (mut now_ns, mut now) = (first.from_ns, Pose::identity());
     for m in &motions {
@@ -46,11 +41,8 @@ fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
     let names = ["source_timestamp", "destination_timestamp", "x", "y", "yaw"];
     let [source, destination, x, y, yaw] = columns(header, names)?;
     rows.map(|(line, row)| {
-        let motion = pose(
-            number(line, row, x)?,
-            number(line, row, y)?,
-            number(line, row, yaw)?,
-        );
+        let number = |column| number(line, row, column);
+        let motion = pose(number(x)?, number(y)?, number(yaw)?);
         Ok(Motion {
             line,
             from_ns: stamp_field(line, row, destination)?,
@@ -62,20 +54,16 @@ fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
 }
 
 fn check_chain(m: &Motion, now_ns: i64) -> Result<(), LineError> {
-    let error = |reason| {
-        Err(LineError {
-            line: m.line,
-            reason,
-        })
-    };
     if m.to_ns <= m.from_ns {
-        return error("the source scan must be later than the destination scan".to_owned());
+        let reason = "the source scan must be later than the destination scan";
+        return Err(LineError::new(m.line, reason));
     }
     if m.from_ns != now_ns {
         let gap_s = (m.from_ns - now_ns) as f64 * 1e-9;
-        return error(format!(
+        let reason = format!(
             "this motion starts {gap_s:.6} s after the end of the previous one: the motions have a gap or an overlap"
-        ));
+        );
+        return Err(LineError::new(m.line, reason));
     }
     Ok(())
 }

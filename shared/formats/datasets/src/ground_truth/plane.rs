@@ -3,7 +3,6 @@
 /// A row-major 3 x 4 pose of the sensor in the world. Its rotation may have any scale.
 pub(super) type Matrix = [f64; 12];
 
-/// The vertical axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vertical {
     /// x forward, y left or right.
@@ -12,7 +11,6 @@ enum Vertical {
     Y,
 }
 
-/// The frames of poses, which give their plane of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Plane {
     world: Vertical,
@@ -28,6 +26,8 @@ const STEP_SHARE: f64 = 0.05;
 const STANDING_M: f64 = 0.1;
 /// The least mean cosine between the vertical axes of sensor and world.
 const MIN_UPRIGHT: f64 = 0.7;
+const UNKNOWN: &str = "the poses are in no known frame: the sensor does not stay upright with x forward and z up (or down), nor as a camera with \
+     z forward and y down";
 /// No road climbs by more than this share of its length.
 const MAX_CLIMB: f64 = 0.3;
 
@@ -36,33 +36,24 @@ impl Plane {
     /// camera. Without headings the vertical axis is the one along which it moves least.
     pub fn of(poses: &[Matrix]) -> Result<Self, String> {
         let moved = Displacement::of(poses);
+        let vertical = |is_y: bool| if is_y { Vertical::Y } else { Vertical::Z };
         if poses.windows(2).all(|w| rotation(&w[0]) == rotation(&w[1])) {
             let [x, y, z] = moved.in_world;
-            let climbs = z > MAX_CLIMB * (x + y + z) && y < 0.5 * z;
-            let both = if climbs { Vertical::Y } else { Vertical::Z };
-            return Ok(Self {
-                world: both,
-                sensor: both,
-            });
+            let world = vertical(z > MAX_CLIMB * (x + y + z) && y < 0.5 * z);
+            let sensor = world;
+            return Ok(Self { world, sensor });
         }
         let [x, y, z] = moved.in_sensor;
         let is_camera = match x + y + z > 0.0 {
             true => z > x && z > y,
             false => upright(poses, 1, Vertical::Y) > upright(poses, 2, Vertical::Z),
         };
-        let sensor = if is_camera { Vertical::Y } else { Vertical::Z };
+        let sensor = vertical(is_camera);
         let upright = |axis| upright(poses, axis, sensor);
-        let world = match upright(1) > upright(2) {
-            true => Vertical::Y,
-            false => Vertical::Z,
-        };
+        let world = vertical(upright(1) > upright(2));
         match upright(1).max(upright(2)) > MIN_UPRIGHT {
             true => Ok(Self { world, sensor }),
-            false => Err(
-                "the poses are in no known frame: the sensor does not stay upright with x forward and z up (or down), nor as a camera with \
-                 z forward and y down"
-                    .to_owned(),
-            ),
+            false => Err(UNKNOWN.to_owned()),
         }
     }
 
@@ -115,7 +106,6 @@ impl Displacement {
     }
 }
 
-/// Returns the mean cosine between an axis of the world and the vertical axis of the sensor.
 fn upright(poses: &[Matrix], axis: usize, sensor: Vertical) -> f64 {
     let column = match sensor {
         Vertical::Z => 2,

@@ -16,23 +16,20 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let (mut stamps, mut matrices) = (Vec::new(), Vec::new());
     for (line, row) in lines(text) {
         let seconds = row.split_whitespace().next().unwrap_or_default();
-        let stamp = stamp::parse_seconds(seconds).ok_or_else(|| LineError {
-            line,
-            reason: format!("time {} is not a number of seconds", quoted(seconds)),
+        let stamp = stamp::parse_seconds(seconds).ok_or_else(|| {
+            let seconds = quoted(seconds);
+            LineError::new(line, format!("time {seconds} is not a number of seconds"))
         })?;
         check_increasing(line, &stamps, stamp)?;
         let [_, x, y, z, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
         let norm = qx * qx + qy * qy + qz * qz + qw * qw;
         if norm < 1e-12 {
-            return Err(LineError {
-                line,
-                reason: "the quaternion is zero".to_owned(),
-            });
+            return Err(LineError::new(line, "the quaternion is zero"));
         }
         stamps.push(stamp);
         matrices.push(matrix([x, y, z], [qx, qy, qz, qw]));
     }
-    let plane = Plane::of(&matrices).map_err(|reason| LineError { line: 1, reason })?;
+    let plane = Plane::of(&matrices).map_err(|reason| LineError::new(1, reason))?;
     // Direction ahead in the plane: correct for any roll and pitch, and for quaternions that are
     // not exactly normalised.
     let projected = matrices.iter().map(|matrix| {
@@ -69,12 +66,9 @@ fn matrix([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Matrix {
 /// A trajectory without times is `InvalidInput`.
 pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     let stamps = trajectory.stamp_ns.as_ref();
-    let stamps = stamps.ok_or_else(|| {
-        io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "a TUM file requires times, but the trajectory has none",
-        )
-    })?;
+    let missing = "a TUM file requires times, but the trajectory has none";
+    let missing = || io::Error::new(io::ErrorKind::InvalidInput, missing);
+    let stamps = stamps.ok_or_else(missing)?;
     let mut poses = stamps.iter().zip(&trajectory.poses);
     poses.try_for_each(|(ns, pose)| write_tum_pose(*ns, pose, out))
 }

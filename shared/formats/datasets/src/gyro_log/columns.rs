@@ -6,11 +6,10 @@ use csv::StringRecord;
 use gyre_samples::{Sample, SampleKind};
 
 use crate::{
-    header::{Header, Stamp},
+    header::{Header, Stamp, endings},
     table::Columns,
 };
 
-/// Where a table has what.
 pub(super) struct GyroColumns {
     stamp: Stamp,
     rates: [usize; 3],
@@ -25,28 +24,17 @@ pub(super) struct GyroColumns {
 const RATES: &str = "gyro_* gyr_* w* w_* omega_* angular_velocity_* angular_rate_* angvel_* \
     ang_vel_* rate_* angularvelocity* gyroscope_* gyro* g* g_* w_rs_s_*";
 /// Units at the end of a rate's name.
-const RATE_UNITS: [(&str, f64); 11] = [
-    ("_rad_s^-1", 1.0),
-    ("_°_s", PI / 180.0),
-    ("_radps", 1.0),
-    ("_rad_s", 1.0),
-    ("_rad_per_s", 1.0),
-    ("_rps", 1.0),
-    ("_degps", PI / 180.0),
-    ("_deg_s", PI / 180.0),
-    ("_deg_per_s", PI / 180.0),
-    ("_dps", PI / 180.0),
+const RATE_UNITS: [(&str, f64); 3] = [
+    ("_rad_s^-1 _radps _rad_s _rad_per_s _rps", 1.0),
+    ("_°_s _degps _deg_s _deg_per_s _dps", PI / 180.0),
     ("_mdps", PI / 180e3),
 ];
 
 const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
     lin_acc_* a_rs_s_*";
 /// Units at the end of an acceleration's name.
-const ACCELERATION_UNITS: [(&str, f64); 6] = [
-    ("_m_s^-2", 1.0),
-    ("_mps2", 1.0),
-    ("_m_s2", 1.0),
-    ("_m_per_s2", 1.0),
+const ACCELERATION_UNITS: [(&str, f64); 3] = [
+    ("_m_s^-2 _mps2 _m_s2 _m_per_s2", 1.0),
     ("_g", 9.80665),
     ("_mg", 9.80665e-3),
 ];
@@ -69,18 +57,25 @@ const MULRAN_WITHOUT_RATES: usize = 8;
 
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
+impl GyroColumns {
+    /// Columns in rad/s and m/s².
+    fn known(stamp: Stamp, rates: [usize; 3], accelerations: [usize; 3]) -> Self {
+        Self {
+            stamp,
+            rates,
+            rate_unit: 1.0,
+            unit_is_assumed: false,
+            accelerations: Some((accelerations, 1.0)),
+        }
+    }
+}
+
 impl Columns for GyroColumns {
     type Entry = Sample;
 
     fn by_number(columns: usize) -> Result<Self, String> {
         match columns {
-            MULRAN => Ok(Self {
-                stamp: Stamp::first(false),
-                rates: [8, 9, 10],
-                rate_unit: 1.0,
-                unit_is_assumed: false,
-                accelerations: Some(([11, 12, 13], 1.0)),
-            }),
+            MULRAN => Ok(Self::known(Stamp::first(false), [8, 9, 10], [11, 12, 13])),
             MULRAN_WITHOUT_RATES => Err(format!(
                 "as the first version of MulRan's xsens_imu.csv it has orientations and no angular rates, but {MULRAN} columns have them: download the recording anew"
             )),
@@ -92,29 +87,20 @@ impl Columns for GyroColumns {
 
     fn by_names(header: &Header) -> Result<Self, String> {
         let names = header.names();
+        let missing =
+            |what, hint| format!("its columns {} have no {what}: {hint}", header.listed());
         if names == FOMO {
-            return Ok(Self {
-                stamp: Stamp::first(true),
-                rates: [1, 2, 3],
-                rate_unit: 1.0,
-                unit_is_assumed: false,
-                accelerations: Some(([4, 5, 6], 1.0)),
-            });
+            return Ok(Self::known(Stamp::first(true), [1, 2, 3], [4, 5, 6]));
         }
         let Some((rates, unit)) = vector(header, RATES, &RATE_UNITS) else {
             let hint = match header.find("ins_status") {
                 Some(_) => "the INS logs of Oxford and OORD have positions and attitudes alone",
                 None => REMEDY,
             };
-            return Err(format!(
-                "its columns {} have no angular rates about three axes: {hint}",
-                header.listed()
-            ));
+            return Err(missing("angular rates about three axes", hint));
         };
         Ok(Self {
-            stamp: header
-                .stamp()
-                .ok_or_else(|| format!("it has no column of stamps: {REMEDY}"))?,
+            stamp: header.stamp().ok_or_else(|| missing("stamps", REMEDY))?,
             rates,
             rate_unit: unit.unwrap_or(1.0),
             unit_is_assumed: unit.is_none() && !KNOWN.iter().any(|known| names == *known),
@@ -134,12 +120,13 @@ impl Columns for GyroColumns {
         let stamp_ns = self.stamp.ns(row)?;
         let rates = read(self.rates, self.rate_unit)?;
         let accelerations = self.accelerations.and_then(|(at, factor)| read(at, factor));
-        Some(sample(stamp_ns, rates, accelerations.unwrap_or_default()))
+        let accelerations = accelerations.unwrap_or_default();
+        Some(sample(stamp_ns, [rates, accelerations]))
     }
 }
 
 /// A sample of rates and accelerations, which are zero if one of them is not finite.
-pub(super) fn sample(stamp_ns: i64, rates: [f64; 3], accelerations: [f64; 3]) -> Sample {
+pub(super) fn sample(stamp_ns: i64, [rates, accelerations]: [[f64; 3]; 2]) -> Sample {
     let are_finite = accelerations.iter().all(|value| value.is_finite());
     let [x, y, z] = rates;
     let [ax, ay, az] = if are_finite { accelerations } else { [0.0; 3] };
@@ -154,9 +141,9 @@ pub(super) fn sample(stamp_ns: i64, rates: [f64; 3], accelerations: [f64; 3]) ->
 /// The columns of a vector, and its unit if the names have one.
 type Vector = ([usize; 3], Option<f64>);
 
-/// Finds a vector whose three names follow one pattern and end with one unit.
-fn vector(header: &Header, patterns: &str, units: &[(&str, f64)]) -> Option<Vector> {
-    let units = units.iter().map(|(name, factor)| (*name, Some(*factor)));
+fn vector(header: &Header, patterns: &str, units: &[(&'static str, f64)]) -> Option<Vector> {
+    let units = endings(units).into_iter();
+    let units = units.map(|(name, factor)| (name, Some(factor)));
     let units = units.chain([("", None)]);
     let patterns = patterns.split(' ');
     let mut forms = patterns.flat_map(|pattern| units.clone().map(move |unit| (pattern, unit)));

@@ -9,7 +9,10 @@ use std::path::Path;
 use gyre_radar::median;
 use serde::Serialize;
 
-use crate::{LogError, table::Raw};
+use crate::{
+    LogError,
+    table::{Raw, leave_out},
+};
 use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
@@ -18,6 +21,9 @@ const ABSURD_RADPS: f64 = 10.0;
 pub(crate) const ABSURD_SHARE: f64 = 0.01;
 /// Longest time between two samples that is no gap, median periods, whatever stamps round to.
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
+
+const SPREAD: &str = "samples come in bursts of one stamp: spread evenly back to the burst before.";
+const MEASURED_TWICE: &str = "samples are of times over which the clock was set back, and which have two measurements: left out.";
 
 /// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
 const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
@@ -75,21 +81,13 @@ impl LogFaults {
             + self.by_clock_steps
     }
 
-    /// Returns the longest time without samples, s; 0 if there are no gaps.
-    pub fn longest_gap_s(&self) -> f64 {
-        self.gaps.iter().map(|gap| gap.seconds).fold(0.0, f64::max)
-    }
-
     /// Returns how the clock steps, and where first: without a full stop.
     pub fn clock_steps(&self) -> String {
         let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
         let steps = self.clock_steps_s.iter().take(5);
         let steps: Vec<String> = steps.map(|step| format!("{step:+.6} s")).collect();
-        let wraps = |step: &f64| {
-            OVERFLOWS_S
-                .iter()
-                .any(|it| (step.abs() - it).abs() < 1e-3 * it)
-        };
+        let is_near = |step: f64, it: &f64| (step.abs() - it).abs() < 1e-3 * it;
+        let wraps = |step: &f64| OVERFLOWS_S.iter().any(|it| is_near(*step, it));
         let counter = match self.clock_steps_s.iter().any(wraps) {
             true => ", as a counter of 32 bits that overflows: write stamps of 64 bits",
             false => "",
@@ -112,32 +110,24 @@ impl LogFaults {
                 "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
             ],
         };
+        let line = self.first_unreadable;
+        let table = format!("rows are not of its table, the first in line {line}: left out.");
+        let numbers = format!("samples have no {values}, or some that are not finite: left out.");
+        let absurd = format!("samples have {absurd}: left out.");
         let counted = [
-            (
-                self.unreadable,
-                format!("rows are not of its table, the first in line {}: left out.", self.first_unreadable),
-            ),
-            (
-                self.not_a_number,
-                format!("samples have no {values}, or some that are not finite: left out."),
-            ),
-            (self.absurd, format!("samples have {absurd}: left out.")),
-            (
-                self.spread,
-                "samples come in bursts of one stamp: spread evenly back to the burst before.".to_owned(),
-            ),
+            (self.unreadable, table.as_str()),
+            (self.not_a_number, numbers.as_str()),
+            (self.absurd, absurd.as_str()),
+            (self.spread, SPREAD),
             (
                 self.repeated,
-                "samples have the stamp of another one: left out.".to_owned(),
+                "samples have the stamp of another one: left out.",
             ),
             (
                 self.out_of_order,
-                "samples come later than their stamps say: sorted.".to_owned(),
+                "samples come later than their stamps say: sorted.",
             ),
-            (
-                self.measured_twice,
-                "samples are of times over which the clock was set back, and which have two measurements: left out.".to_owned(),
-            ),
+            (self.measured_twice, MEASURED_TWICE),
         ];
         let counted = counted.into_iter().filter(|(count, _)| *count > 0);
         let counted = counted.map(|(count, sentence)| format!("{count} {sentence}"));
@@ -147,26 +137,21 @@ impl LogFaults {
         });
         let longest = self.gaps.iter().copied();
         let longest = longest.max_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        let gaps = longest.map(|gap| {
-            let (places, seconds, after_s) = (self.gaps.len(), gap.seconds, gap.after_s);
-            format!(
-                "Samples are missing in {places} places, for up to {seconds:.2} s ({after_s:.1} s after the first)."
-            )
+        let gaps = longest.map(|LogGap { after_s, seconds }| {
+            let places = self.gaps.len();
+            format!("Samples are missing in {places} places, for up to {seconds:.2} s ({after_s:.1} s after the first).")
         });
-        let bridged = (self.bridged > 0).then(|| {
-            let count = self.bridged;
-            format!(
-                "{count} samples are missing one or two at a time: interpolated where `max_gap_s` allows it."
-            )
+        let count = self.bridged;
+        let bridged = (count > 0).then(|| {
+            format!("{count} samples are missing one or two at a time: interpolated where `max_gap_s` allows it.")
         });
-        let unit = self.unit_is_assumed;
-        let unit = unit.then(|| format!("The header names no unit {unit_of}."));
+        let unit = format!("The header names no unit {unit_of}.");
+        let unit = self.unit_is_assumed.then_some(unit);
         let others = [steps, gaps, bridged, unit].into_iter().flatten();
         counted.chain(others).collect()
     }
 }
 
-/// The values that a sensor can measure on a vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plausible {
     /// The sensor.
@@ -187,18 +172,13 @@ pub(super) const RATES: Plausible = Plausible {
     beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
 };
 
-/// Removes and sorts faulty samples, and counts them.
 pub(crate) fn examine(
     raw: Raw<Sample>,
     unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
-    let unusable = |reason: String| LogError::Unusable {
-        of: plausible.of.section(),
-        path: path.to_owned(),
-        reason,
-    };
+    let unusable = |reason: String| LogError::unusable(plausible.of.section(), path, reason);
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
@@ -209,19 +189,15 @@ pub(crate) fn examine(
         return Err(unusable(reason));
     }
     let mut samples = raw.entries;
-    let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
-        let before = samples.len();
-        let is_bad = |sample: &Sample| {
-            sample.values[..plausible.values]
-                .iter()
-                .any(|it| is_bad(*it))
-        };
-        samples.retain(|sample| !is_bad(sample));
-        (before, before - samples.len())
-    };
-    (_, faults.not_a_number) = leave_out(&|value| !value.is_finite());
-    faults.not_a_number += raw.unmeasured;
-    let (finite, absurd) = leave_out(&|value| value.abs() > plausible.most);
+    let values = |sample: &Sample| sample.values.into_iter().take(plausible.values);
+    let left_out = leave_out(&mut samples, |it| {
+        values(it).any(|value| !value.is_finite())
+    });
+    faults.not_a_number = left_out + raw.unmeasured;
+    let (finite, most) = (samples.len(), plausible.most);
+    let absurd = leave_out(&mut samples, |it| {
+        values(it).any(|value| value.abs() > most)
+    });
     faults.absurd = absurd;
     if absurd as f64 > ABSURD_SHARE * finite as f64 {
         let beyond = plausible.beyond;

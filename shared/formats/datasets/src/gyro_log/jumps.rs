@@ -20,7 +20,6 @@ const UNUSUAL: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Jumps {
-    /// Samples between a jump and the one back: left out.
     left_out: usize,
     /// Jumps without one back: their samples stay.
     alone: usize,
@@ -47,16 +46,16 @@ impl Jumps {
 /// Leaves out samples of a kind, in the order of their stamps, that jump away from those before and
 /// back to those after them.
 pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
-    let value = match kind {
-        SampleKind::Gyro => 2,
-        SampleKind::Wheels => 0,
+    let (value, per_s) = match kind {
+        SampleKind::Gyro => (2, YAW_RADPS2),
+        SampleKind::Wheels => (0, SPEED_MPS2),
     };
     let all: &[Sample] = samples;
-    let limits = Limits::of(all, kind, value);
+    let at_least = at_least(all, per_s, value);
     let step = |from: usize, to: usize| {
         let change = all[to].values[value] - all[from].values[value];
-        let is_jump = limits.is_jump(change, seconds(all, from, to));
-        is_jump.then_some(change)
+        let most = at_least.max(per_s * seconds(all, from, to));
+        (change.abs() > most).then_some(change)
     };
     let mut jumps = Jumps::default();
     let mut is_left_out = vec![false; all.len()];
@@ -84,34 +83,16 @@ pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
     jumps
 }
 
-/// The fastest change of a value.
-struct Limits {
-    per_s: f64,
-    /// Whatever the time between two samples, which are closer together where stamps jitter.
-    at_least: f64,
-}
-
-impl Limits {
-    fn of(samples: &[Sample], kind: SampleKind, value: usize) -> Self {
-        let per_s = match kind {
-            SampleKind::Gyro => YAW_RADPS2,
-            SampleKind::Wheels => SPEED_MPS2,
-        };
-        let pairs = || 1..samples.len();
-        let period_s = median(pairs().map(|k| seconds(samples, k - 1, k))).unwrap_or_default();
-        let change = |k: usize| (samples[k].values[value] - samples[k - 1].values[value]).abs();
-        let mut changes: Vec<f64> = pairs().map(change).collect();
-        changes.sort_unstable_by(f64::total_cmp);
-        let usual = changes.get((USUAL_SHARE * changes.len() as f64) as usize);
-        Self {
-            per_s,
-            at_least: (per_s * period_s).max(UNUSUAL * usual.copied().unwrap_or_default()),
-        }
-    }
-
-    fn is_jump(&self, change: f64, time_s: f64) -> bool {
-        change.abs() > self.at_least.max(self.per_s * time_s)
-    }
+/// The change of a value that is no jump, whatever the time between two samples, which are closer
+/// together where stamps jitter.
+fn at_least(samples: &[Sample], per_s: f64, value: usize) -> f64 {
+    let pairs = || 1..samples.len();
+    let period_s = median(pairs().map(|k| seconds(samples, k - 1, k))).unwrap_or_default();
+    let change = |k: usize| (samples[k].values[value] - samples[k - 1].values[value]).abs();
+    let mut changes: Vec<f64> = pairs().map(change).collect();
+    changes.sort_unstable_by(f64::total_cmp);
+    let usual = changes.get((USUAL_SHARE * changes.len() as f64) as usize);
+    (per_s * period_s).max(UNUSUAL * usual.copied().unwrap_or_default())
 }
 
 fn seconds(samples: &[Sample], from: usize, to: usize) -> f64 {
@@ -162,13 +143,7 @@ mod tests {
         assert_eq!(samples, track(0));
         samples[300..].iter_mut().for_each(|it| it.values[2] += 1.0);
         let jumps = leave_out(&mut samples, SampleKind::Gyro);
-        assert_eq!(
-            jumps,
-            Jumps {
-                left_out: 0,
-                alone: 1
-            }
-        );
+        assert_eq!((jumps.left_out, jumps.alone), (0, 1));
         assert_eq!(samples.len(), 500);
         let sentence = "The values change 1 times faster than a vehicle can.";
         assert_eq!(jumps.sentence().as_deref(), Some(sentence));
@@ -179,20 +154,13 @@ mod tests {
     fn wheels_that_brake_have_none_and_stamps_that_jitter_make_none() {
         let speed = |k: i64| (20.0 - 0.2 * k as f64).max(0.0);
         let stamp_ns = |k: i64| 2 * k * PERIOD_NS - if k % 7 == 3 { 19_000_000 } else { 0 };
-        let samples: Vec<Sample> = (0..200)
-            .map(|k| Sample::speed(stamp_ns(k), speed(k)))
-            .collect();
+        let samples = (0..200).map(|k| Sample::speed(stamp_ns(k), speed(k)));
+        let samples: Vec<Sample> = samples.collect();
         let mut kept = samples.clone();
         assert_eq!(leave_out(&mut kept, SampleKind::Wheels), Jumps::default());
         assert_eq!(kept, samples);
         kept[50].values[0] = 0.0;
         let jumps = leave_out(&mut kept, SampleKind::Wheels);
-        assert_eq!(
-            jumps,
-            Jumps {
-                left_out: 1,
-                alone: 0
-            }
-        );
+        assert_eq!((jumps.left_out, jumps.alone), (1, 0));
     }
 }

@@ -18,16 +18,15 @@ const MARGIN_NS: i64 = 20_000_000;
 /// A trajectory with a shorter path stands, m.
 const STANDING_M: f64 = 0.1;
 
-/// Examines the ground truth at the usual path and all TUM files in the root, by name.
 pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Option<&Trajectory>) {
     let entries = std::fs::read_dir(&report.root).into_iter().flatten();
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    let is_hidden = |path: &Path| {
+    let is_shown = |path: &Path| {
         let name = path.file_name().unwrap_or_default();
-        name.as_encoded_bytes().starts_with(b".")
+        !name.as_encoded_bytes().starts_with(b".")
     };
-    let is_tum = |path: &Path| path.extension().is_some_and(|e| e == "tum") && path.is_file();
-    files.retain(|path| is_tum(path) && !is_hidden(path));
+    files.retain(|path| path.extension().is_some_and(|e| e == "tum") && path.is_file());
+    files.retain(|path| is_shown(path));
     files.extend(find_ground_truth(&report.root));
     files.sort();
     files.dedup();
@@ -39,14 +38,13 @@ pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Op
     }
     let stamps = (0..dataset.len()).filter_map(|i| dataset.nominal_stamp_ns(i));
     let stamps: Vec<i64> = stamps.collect();
-    let examined = files
-        .iter()
-        .map(|file| examine_file(report, file, &stamps, trajectory));
-    let figures: Vec<Value> = examined.collect();
+    let mut figures = Vec::new();
+    for file in &files {
+        figures.push(examine_file(report, file, &stamps, trajectory));
+    }
     report.figure("ground_truths", figures);
 }
 
-/// Adds the lines and the findings of a file, and returns its figures.
 fn examine_file(
     report: &mut Report,
     file: &Path,
@@ -88,10 +86,8 @@ fn examine_file(
         "ground truth",
         format!("{name}: {poses} poses, {path_m:.1} m, {span}{covers}{nearest}{of_clock}"),
     );
-    let (name, scans) = (
-        file.file_name().unwrap_or_default().to_string_lossy(),
-        report.scans,
-    );
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let scans = report.scans;
     if !truth.has_heading() && poses > 1 {
         report.find(format!("{name} has positions only, no headings."));
     }
@@ -146,16 +142,10 @@ fn nearest_pose_s(truth: &Trajectory, scans_ns: &[i64]) -> Option<f64> {
     let stamps = truth.stamp_ns.as_ref()?;
     let nearest = |scan: &i64| {
         let after = stamps.partition_point(|s| s < scan);
-        let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        around
-            .filter_map(|i| stamps.get(i))
-            .map(|s| (s - scan).abs())
-            .min()
+        let around = stamps.get(after.saturating_sub(1)..).unwrap_or_default();
+        let around = around.iter().take(2);
+        around.map(|s| (s - scan).abs()).min()
     };
-    median(
-        scans_ns
-            .iter()
-            .filter_map(nearest)
-            .map(|ns| ns as f64 * 1e-9),
-    )
+    let nearest = scans_ns.iter().filter_map(nearest);
+    median(nearest.map(|ns| ns as f64 * 1e-9))
 }

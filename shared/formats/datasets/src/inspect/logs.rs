@@ -4,6 +4,7 @@ use std::path::Path;
 
 use gyre_radar::median;
 use gyre_samples::{Sample, SampleKind};
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{InspectedLogs, Report, timing::Timing};
@@ -14,7 +15,6 @@ const QUIET_S: f64 = 5.0;
 /// Share of the samples that such a time has at least.
 const QUIET_SHARE: f64 = 0.9;
 
-/// Examines the logs beside the scans, and in a bag the fixes of GNSS.
 pub(super) fn examine(
     report: &mut Report,
     dataset: &mut dyn Dataset,
@@ -30,36 +30,32 @@ pub(super) fn examine(
 }
 
 fn gyro(report: &mut Report, timing: Option<&Timing>) {
-    let (file, log) = match GyroLog::find(&report.root) {
-        Ok(file) => {
-            let log = GyroLog::read(&file).map_err(|error| error.to_string());
-            (file, log)
-        }
+    let words = ["gyro", "a gyro"];
+    let file = match GyroLog::find(&report.root) {
+        Ok(file) => file,
         Err(LogError::InTruth { path }) => {
             let why =
                 "the ground truth was computed of it: name it in gyro.file to use it all the same";
-            (path, Err(why.to_owned()))
+            return unusable(report, words, &path, why);
         }
         Err(_) => return,
     };
-    let name = report.name_of(&file);
-    let log = match log {
+    let log = match GyroLog::read(&file) {
         Ok(log) => log,
-        Err(error) => return unusable(report, ["gyro", "a gyro", &name], &file, error),
+        Err(error) => return unusable(report, words, &file, &error.to_string()),
     };
-    let times = Times::of(&stamps(&log.samples), timing);
+    let times = Times::of(log.samples.iter().map(|it| it.stamp_ns), timing);
     let quiet = quiet(&log.samples, times.period_s);
-    times.lines(report, "gyro", &format!("{name}: "), "samples");
+    let what = format!("{}: ", report.name_of(&file));
+    times.lines(report, "gyro", &what, "samples");
     if let Some(quiet) = &quiet {
-        let [mean, sigma] = [quiet.mean_degps, quiet.sigma_degps]
-            .map(|[x, y, z]| format!("{x:.3}, {y:.3}, {z:.3}"));
+        let text = |[x, y, z]: [f64; 3]| format!("{x:.3}, {y:.3}, {z:.3}");
+        let (mean, sigma) = (text(quiet.mean_degps), text(quiet.sigma_degps));
         let after_s = quiet.after_s;
-        report.line(
-            "gyro quietest",
-            format!(
-                "{mean} deg/s about x, y, z, deviation {sigma}, in the 5 s from {after_s:.1} s on: bias and noise, if it stood"
-            ),
+        let quiet = format!(
+            "{mean} deg/s about x, y, z, deviation {sigma}, in the 5 s from {after_s:.1} s on: bias and noise, if it stood"
         );
+        report.line("gyro quietest", quiet);
     }
     for sentence in log.faults.sentences(SampleKind::Gyro) {
         report.find(format!("Gyro: {sentence}"));
@@ -73,13 +69,6 @@ fn gyro(report: &mut Report, timing: Option<&Timing>) {
     report.find(format!(
         "The log of a gyro, {lies} beside the scans: `gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\" uses it."
     ));
-    let quiet = quiet.map(|quiet| {
-        json!({
-            "after_s": quiet.after_s,
-            "mean_degps": quiet.mean_degps,
-            "sigma_degps": quiet.sigma_degps,
-        })
-    });
     let more = json!({"quiet": quiet, "up_by_gravity": up, "faults": log.faults});
     report.figure("gyro", times.figures(&file, more));
 }
@@ -92,11 +81,10 @@ fn wheels(report: &mut Report, m_per_tick: Option<f64>, timing: Option<&Timing>)
     let log = match WheelLog::read(&file, m_per_tick) {
         Ok(log) => log,
         Err(error) => {
-            let words = ["wheels", "the wheels", &name];
-            return unusable(report, words, &file, error.to_string());
+            return unusable(report, ["wheels", "the wheels"], &file, &error.to_string());
         }
     };
-    let times = Times::of(&stamps(&log.samples), timing);
+    let times = Times::of(log.samples.iter().map(|it| it.stamp_ns), timing);
     let speeds = log.samples.iter().map(|sample| sample.values[0].abs());
     let fastest_mps = speeds.fold(0.0, f64::max);
     let steps = log.samples.windows(2).map(|pair| {
@@ -125,27 +113,20 @@ fn gnss(
     let root = report.root.clone();
     let (file, log) = match dataset.fixes(topic) {
         Ok(None) => match GnssLog::find(&root) {
-            Ok(file) => {
-                let log = GnssLog::read(&file).map_err(|error| error.to_string());
-                (file, log)
-            }
+            Ok(file) => (file.clone(), GnssLog::read(&file)),
             Err(_) => return,
         },
-        Ok(Some(fixes)) => {
-            let log = GnssLog::of(fixes, &root).map_err(|error| error.to_string());
-            (root, log)
-        }
-        Err(error) => (root, Err(error.to_string())),
+        Ok(Some(fixes)) => (root.clone(), GnssLog::of(fixes, &root)),
+        Err(error) => (root, Err(error.into())),
     };
     let log = match log {
         Ok(log) => log,
         Err(error) => {
-            let name = report.name_of(&file);
-            return unusable(report, ["gnss", "a GNSS receiver", &name], &file, error);
+            let words = ["gnss", "a GNSS receiver"];
+            return unusable(report, words, &file, &error.to_string());
         }
     };
-    let stamps: Vec<i64> = log.fixes.iter().map(|fix| fix.stamp_ns).collect();
-    let times = Times::of(&stamps, timing);
+    let times = Times::of(log.fixes.iter().map(|fix| fix.stamp_ns), timing);
     let first = log.fixes.first().map_or([0.0; 2], |fix| fix.east_north_m);
     let from_first = log.fixes.iter().map(|fix| {
         let [east, north] = [0, 1].map(|axis| fix.east_north_m[axis] - first[axis]);
@@ -159,15 +140,9 @@ fn gnss(
     let name = log.topic.clone().unwrap_or_else(|| report.name_of(&file));
     let what = format!("{name}: up to {reach_m:.0} m from the first, {sigma}, ");
     times.lines(report, "gnss", &what, "fixes");
-    let faults = log.faults.named().into_iter();
-    let faults: Vec<String> = faults
-        .map(|(count, what)| format!("{count} {what}"))
-        .collect();
-    if !faults.is_empty() {
-        report.find(format!(
-            "GNSS: entries of its log that are left out, or sorted: {}.",
-            faults.join(", ")
-        ));
+    if let Some(faults) = log.faults.listed() {
+        let sentence = format!("GNSS: entries of its log that are left out, or sorted: {faults}.");
+        report.find(sentence);
     }
     let lies = match &log.topic {
         Some(topic) => format!("{topic}{}, is in the bag", times.of_clocks()),
@@ -192,20 +167,14 @@ fn gnss(
     report.figure("gnss", times.figures(&file, more));
 }
 
-/// Adds a log that cannot be used: its section, its sensor in words and its name.
-fn unusable(report: &mut Report, words: [&str; 3], file: &Path, error: String) {
-    let [section, of, name] = words;
+fn unusable(report: &mut Report, [section, of]: [&str; 2], file: &Path, error: &str) {
+    let name = report.name_of(file);
     report.line(section, format!("{name}: cannot be used"));
     let name = file.file_name().unwrap_or_default().display();
     report.find(format!("The log of {of}, {name}, cannot be used: {error}."));
     report.figure(section, json!({"file": file, "error": error}));
 }
 
-fn stamps(samples: &[Sample]) -> Vec<i64> {
-    samples.iter().map(|sample| sample.stamp_ns).collect()
-}
-
-/// The stamps of a log.
 struct Times {
     samples: usize,
     /// Median time between samples, s.
@@ -222,7 +191,8 @@ struct Times {
 
 impl Times {
     /// Examines stamps, ns, in their order.
-    fn of(stamps: &[i64], timing: Option<&Timing>) -> Self {
+    fn of(stamps: impl Iterator<Item = i64>, timing: Option<&Timing>) -> Self {
+        let stamps: Vec<i64> = stamps.collect();
         let steps = stamps.windows(2).map(|pair| apart_s(pair[1], pair[0]));
         let steps_s: Vec<f64> = steps.collect();
         let period_s = median(steps_s.iter().copied()).unwrap_or_default();
@@ -230,21 +200,19 @@ impl Times {
         let regular: Vec<f64> = regular.filter(|apart_s| *apart_s < period_s).collect();
         let squares: f64 = regular.iter().map(|apart_s| apart_s * apart_s).sum();
         let span = stamps.first().copied().zip(stamps.last().copied());
-        let slots = span.map_or(0.0, |(first, last)| {
-            apart_s(last, first) / period_s.max(1e-9) + 1.0
-        });
+        let seconds = |(first, last)| apart_s(last, first);
+        let slots = span.map_or(0.0, |span| seconds(span) / period_s.max(1e-9) + 1.0);
+        let after = |((first, last), timing): (_, &Timing)| {
+            let begins_s = apart_s(first, timing.first_ns);
+            [begins_s, apart_s(last, timing.last_ns)]
+        };
         Self {
             samples: stamps.len(),
             period_s,
             jitter_s: (squares / regular.len().max(1) as f64).sqrt(),
             span_ns: span.map(Into::into),
             missing: (1.0 - stamps.len() as f64 / slots.max(1.0)).max(0.0),
-            after_scans_s: span.zip(timing).map(|((first, last), timing)| {
-                [
-                    apart_s(first, timing.first_ns),
-                    apart_s(last, timing.last_ns),
-                ]
-            }),
+            after_scans_s: span.zip(timing).map(after),
         }
     }
 
@@ -255,21 +223,16 @@ impl Times {
         }
     }
 
-    /// Adds the lines about the content, the rate and the span of a log.
     fn lines(&self, report: &mut Report, section: &str, what: &str, samples: &str) {
         let (count, rate_hz, missing) = (self.samples, self.rate_hz(), self.missing * 100.0);
-        report.line(
-            section,
-            format!("{what}{count} {samples} of {rate_hz:.1} Hz, {missing:.1} % missing"),
-        );
+        let content = format!("{what}{count} {samples} of {rate_hz:.1} Hz, {missing:.1} % missing");
+        report.line(section, content);
         if let (Some([first, last]), Some([before, after])) = (self.span_ns, self.after_scans_s) {
             let (seconds, jitter_ms) = ((last - first) as f64 * 1e-9, self.jitter_s * 1e3);
-            report.line(
-                format!("{section} stamps"),
-                format!(
-                    "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
-                ),
+            let span = format!(
+                "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
             );
+            report.line(format!("{section} stamps"), span);
         }
     }
 
@@ -287,7 +250,6 @@ impl Times {
         }
     }
 
-    /// Returns the figures of a log.
     fn figures(&self, file: &Path, mut more: Value) -> Value {
         for (name, value) in [
             ("file", json!(file)),
@@ -310,6 +272,7 @@ fn apart_s(stamp_ns: i64, from_ns: i64) -> f64 {
 }
 
 /// The rates of a quiet time: its start, s since the first sample, means and standard deviations.
+#[derive(Serialize)]
 struct Quiet {
     after_s: f64,
     mean_degps: [f64; 3],

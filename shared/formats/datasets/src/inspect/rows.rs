@@ -17,21 +17,16 @@ const RINGING_VARIATION: f64 = 0.3;
 /// Number of consecutive bins without ringing that end it.
 const QUIET_BINS: usize = 3;
 
-/// Summary of the rows of the scans read.
 #[derive(Default)]
 pub(super) struct Survey {
     scans: usize,
-    /// Scans with known directions of the chirps.
     with_chirps: usize,
     rows: u64,
-    /// Minimum and maximum number of rows in a scan.
     in_scan: Option<(usize, usize)>,
-    /// Rows that were interpolated from their neighbours.
     not_measured: u64,
     /// Rows at the end of a scan that still hold the scan before: see [`gyre_radar::lost`].
     stale: u64,
     stale_scans: usize,
-    /// Missing rows, where the azimuth makes more than one step.
     lost: u64,
     /// The median step between azimuths of each scan.
     steps_rad: Vec<f64>,
@@ -68,10 +63,8 @@ impl Survey {
         self.first_rad = Some((min.min(first), max.max(first)));
         let steps: Vec<f64> = steps_rad(scan).collect();
         let median_rad = median(steps.iter().copied()).unwrap_or(0.0);
-        self.lost += steps
-            .iter()
-            .map(|s| ((s / median_rad).round() as u64).saturating_sub(1))
-            .sum::<u64>();
+        let lost = |step: &f64| ((step / median_rad).round() as u64).saturating_sub(1);
+        self.lost += steps.iter().map(lost).sum::<u64>();
         self.steps_rad.push(median_rad);
     }
 
@@ -88,12 +81,10 @@ impl Survey {
         }
     }
 
-    /// Returns the rows of the scan with most of them.
     pub(super) fn most_rows(&self) -> usize {
         self.in_scan.unwrap_or_default().1
     }
 
-    /// Adds the figures and the printed lines.
     pub(super) fn lines(&self, report: &mut Report, encoder_counts: Option<u16>) {
         let source = encoder_counts.map_or("uniform".to_owned(), |counts| {
             format!("encoder of {counts} counts per turn")
@@ -106,10 +97,8 @@ impl Survey {
             true => format!("{min:.2}"),
             false => format!("{min:.2} to {max:.2}"),
         };
-        report.line(
-            "azimuths",
-            format!("{source}, step {step_deg:.3} deg, first at {first} deg"),
-        );
+        let azimuths = format!("{source}, step {step_deg:.3} deg, first at {first} deg");
+        report.line("azimuths", azimuths);
         report.figure("encoder_counts", encoder_counts);
         let (chirps, words) = match self.with_chirps {
             0 => ("unknown", "unknown"),
@@ -117,10 +106,8 @@ impl Survey {
             _ => ("mixed", "known in some scans"),
         };
         let (rows, not_measured, lost) = (self.rows, self.not_measured, self.lost);
-        report.line(
-            "rows",
-            format!("{rows}, {not_measured} not measured, {lost} lost; chirps {words}"),
-        );
+        let text = format!("{rows}, {not_measured} not measured, {lost} lost; chirps {words}");
+        report.line("rows", text);
         let figures = json!({
             "rows": rows,
             "in_scan": self.in_scan.unwrap_or_default(),
@@ -136,7 +123,6 @@ impl Survey {
         report.figure("rows", figures);
     }
 
-    /// Adds the findings.
     pub(super) fn findings(
         &self,
         report: &mut Report,
@@ -187,10 +173,8 @@ impl Survey {
             let deviation = (*squares as f64 / rows - mean * mean).max(0.0).sqrt();
             mean > RINGING_BRIGHTNESS * overall && deviation <= RINGING_VARIATION * mean
         };
-        let quiet = self
-            .power
-            .windows(QUIET_BINS)
-            .position(|bins| !bins.iter().any(rings));
+        let mut windows = self.power.windows(QUIET_BINS);
+        let quiet = windows.position(|bins| !bins.iter().any(rings));
         quiet.unwrap_or(0)
     }
 }

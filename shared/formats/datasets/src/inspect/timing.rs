@@ -15,7 +15,6 @@ const CATCH_UP_PERIODS: f64 = 0.97;
 /// Number of scans after a long interval that distinguish a gap from a stall.
 const AFTERWARDS: usize = 5;
 
-/// Times of the scans. Indices are from 0.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Timing {
     /// Time of the first scan, ns since 1970.
@@ -29,15 +28,12 @@ pub(super) struct Timing {
     /// Maximum and minimum logged interval, s.
     logged_interval_s: (f64, f64),
     missing_scans: usize,
-    /// Missing scans.
     gaps: Vec<Gap>,
-    /// Stalls of the host: stamps were logged late, but no scan is missing.
     stalls: Vec<Stall>,
     /// Scans whose logged stamp is before the stamp of the previous scan.
     backwards: Vec<usize>,
 }
 
-/// Missing scans.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Gap {
     /// The first scan after the gap.
@@ -47,49 +43,35 @@ pub(super) struct Gap {
     seconds: f64,
 }
 
-/// A stall of the host.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Stall {
-    /// The first late scan.
     scan: usize,
     /// Delay of its stamp, s.
     delay_s: f64,
 }
 
 impl Timing {
-    /// Adds the printed lines and the findings.
     pub(super) fn add_to(&self, report: &mut Report) {
-        let (start, seconds) = (
-            self.first_ns as f64 * 1e-9,
-            (self.last_ns - self.first_ns) as f64 * 1e-9,
-        );
-        report.line(
-            "time",
-            format!("{start:.3} s since 1970, for {seconds:.3} s"),
-        );
+        let start = self.first_ns as f64 * 1e-9;
+        let seconds = (self.last_ns - self.first_ns) as f64 * 1e-9;
+        let time = format!("{start:.3} s since 1970, for {seconds:.3} s");
+        report.line("time", time);
         let (stalls, gaps) = (self.stalls.len(), self.gaps.len());
         let missing = self.missing_scans;
         if self.period_s > 0.0 {
             let ((max, min), period) = (self.logged_interval_s, self.period_s);
             let jitter = self.jitter_s * 1e3;
-            report.line(
-                "period",
-                format!(
-                    "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
-                ),
+            let period = format!(
+                "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
             );
-            report.line(
-                "gaps",
-                format!("{missing} scans missing in {gaps} places; {stalls} host stalls"),
-            );
+            report.line("period", period);
+            let gaps = format!("{missing} scans missing in {gaps} places; {stalls} host stalls");
+            report.line("gaps", gaps);
         }
         if stalls > 0 {
             let worst = self.stalls.iter().map(|s| s.delay_s).fold(0.0, f64::max);
-            let places = self
-                .stalls
-                .iter()
-                .map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s));
-            let places = some(places);
+            let places = self.stalls.iter();
+            let places = some(places.map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s)));
             let times = match stalls {
                 1 => "once".to_owned(),
                 n => format!("{n} times"),
@@ -99,18 +81,10 @@ impl Timing {
             ));
         }
         if gaps > 0 {
-            let places = self
-                .gaps
-                .iter()
-                .map(|g| format!("{} ({} missing)", g.scan, g.missing));
-            let scans = match missing {
-                1 => "scan is",
-                _ => "scans are",
-            };
-            report.find(format!(
-                "{missing} {scans} missing, before scans {}.",
-                some(places)
-            ));
+            let places = self.gaps.iter();
+            let places = some(places.map(|g| format!("{} ({} missing)", g.scan, g.missing)));
+            let scans = if missing == 1 { "scan is" } else { "scans are" };
+            report.find(format!("{missing} {scans} missing, before scans {places}."));
         }
         if !self.backwards.is_empty() {
             let places = some(self.backwards.iter().map(ToString::to_string));
@@ -121,15 +95,10 @@ impl Timing {
 
 /// Examines the times of all scans; `None` if a scan has no time.
 pub(super) fn examine(dataset: &dyn Dataset) -> Option<Timing> {
-    let all = 0..dataset.len();
-    let used: Vec<i64> = all
-        .clone()
-        .map(|i| dataset.nominal_stamp_ns(i))
-        .collect::<Option<_>>()?;
-    let logged: Vec<i64> = all
-        .map(|i| dataset.logged_stamp_ns(i))
-        .collect::<Option<_>>()?;
-    times(&used, &logged)
+    let all = || 0..dataset.len();
+    let used: Option<Vec<i64>> = all().map(|i| dataset.nominal_stamp_ns(i)).collect();
+    let logged: Option<Vec<i64>> = all().map(|i| dataset.logged_stamp_ns(i)).collect();
+    times(&used?, &logged?)
 }
 
 /// `used` are the times that the scans are read with, `logged` those recorded by the host.
@@ -138,17 +107,9 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
     let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
     let delay_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, (on_clock, on_host)) in used_s
-        .iter()
-        .copied()
-        .zip(logged_s.iter().copied())
-        .enumerate()
-    {
-        let scan = i + 1;
-        if period_s > 0.0
-            && on_clock > GAP_PERIODS * period_s
-            && !catches_up(&logged_s[scan..], period_s)
-        {
+    for (scan, (&on_clock, &on_host)) in (1..).zip(used_s.iter().zip(&logged_s)) {
+        let is_long = period_s > 0.0 && on_clock > GAP_PERIODS * period_s;
+        if is_long && !catches_up(&logged_s[scan..], period_s) {
             let missing = ((on_clock / period_s).round() as u32 - 1) as usize;
             gaps.push(Gap {
                 scan,
@@ -178,13 +139,10 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
 }
 
 fn intervals_s(stamps: &[i64]) -> Vec<f64> {
-    stamps
-        .windows(2)
-        .map(|w| (w[1] - w[0]) as f64 * 1e-9)
-        .collect()
+    let steps = stamps.windows(2);
+    steps.map(|w| (w[1] - w[0]) as f64 * 1e-9).collect()
 }
 
-/// Delay of each logged stamp relative to the most prompt one.
 fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
     let late: Vec<i64> = logged.iter().zip(used).map(|(l, u)| l - u).collect();
     let prompt = late.iter().copied().min().unwrap_or(0);
@@ -193,33 +151,23 @@ fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
 
 /// Returns whether the scans after a long interval arrive faster than the sensor period.
 fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
-    let next = afterwards
-        .iter()
-        .copied()
-        .take(AFTERWARDS)
-        .take_while(|s| *s < STALL_PERIODS * period_s);
+    let next = afterwards.iter().copied().take(AFTERWARDS);
+    let next = next.take_while(|s| *s < STALL_PERIODS * period_s);
     median(next).is_some_and(|s| s < CATCH_UP_PERIODS * period_s)
 }
 
 fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
-    let regular = || {
-        logged_s
-            .iter()
-            .map(|s| s - period_s)
-            .filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s)
-    };
-    let count = regular().count().max(1);
-    (regular().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
+    let apart = logged_s.iter().map(|s| s - period_s);
+    let regular = apart.filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s);
+    let regular: Vec<f64> = regular.collect();
+    let squares = regular.iter().map(|d| d * d).sum::<f64>();
+    (squares / regular.len().max(1) as f64).sqrt()
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {
-    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
-    if values.is_empty() {
-        (0.0, 0.0)
-    } else {
-        (max, min)
-    }
+    let max = values.iter().copied().reduce(f64::max);
+    let min = values.iter().copied().reduce(f64::min);
+    (max.unwrap_or(0.0), min.unwrap_or(0.0))
 }
 
 #[cfg(test)]
@@ -230,9 +178,8 @@ mod tests {
     const MS: i64 = 1_000_000;
 
     fn uniform(n: i64) -> Vec<i64> {
-        (0..n)
-            .map(|k| 1_549_986_607_000 * MS + k * 250 * MS)
-            .collect()
+        let stamps = (0..n).map(|k| 1_549_986_607_000 * MS + k * 250 * MS);
+        stamps.collect()
     }
 
     #[test]
@@ -240,14 +187,10 @@ mod tests {
         let mut stamps = uniform(20);
         stamps.drain(7..10);
         let report = times(&stamps, &stamps).unwrap();
-        assert_eq!(
-            report.gaps,
-            [Gap {
-                scan: 7,
-                missing: 3,
-                seconds: 1.0
-            }]
-        );
+        let [gap] = &report.gaps[..] else {
+            panic!("{report:?}");
+        };
+        assert_eq!((gap.scan, gap.missing, gap.seconds), (7, 3, 1.0));
         assert_eq!((report.missing_scans, report.stalls.len()), (3, 0));
         assert!((report.period_s - 0.25).abs() < 1e-9 && report.jitter_s < 1e-9);
     }
@@ -263,25 +206,14 @@ mod tests {
             assert_eq!(report.missing_scans, 0, "{:?}", report.gaps);
             assert_eq!(report.stalls.len(), 1);
             assert_eq!(report.stalls[0].scan, 10);
-            assert!(
-                (report.stalls[0].delay_s - 0.9).abs() < 1e-9,
-                "{}",
-                report.stalls[0].delay_s
-            );
+            assert!((report.stalls[0].delay_s - 0.9).abs() < 1e-9, "{report:?}");
         }
     }
 
     #[test]
-    fn one_scan_has_no_period() {
+    fn one_scan_has_no_period_and_time_that_runs_backwards_is_detected() {
         let report = times(&uniform(1), &uniform(1)).unwrap();
-        assert_eq!(
-            (report.period_s, report.jitter_s, report.missing_scans),
-            (0.0, 0.0, 0)
-        );
-    }
-
-    #[test]
-    fn time_that_runs_backwards_is_detected() {
+        assert_eq!([report.period_s, report.jitter_s], [0.0; 2]);
         let mut logged = uniform(9);
         logged[4] -= 400 * MS;
         assert_eq!(times(&uniform(9), &logged).unwrap().backwards, [4]);

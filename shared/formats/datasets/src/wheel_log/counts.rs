@@ -35,10 +35,8 @@ const COUNTS: Plausible = Plausible {
     beyond: "",
 };
 
-/// The columns of counts. A sample contains the counts of both wheels, or of one wheel twice.
 pub(super) struct CountColumns {
     stamp: Stamp,
-    /// One, or one of each wheel.
     counts: Vec<usize>,
     is_in_ticks: bool,
 }
@@ -82,18 +80,11 @@ pub(super) fn speeds(
     path: &Path,
     m_per_tick: Option<f64>,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
-    let unusable = |reason: String| LogError::Unusable {
-        of: OF,
-        path: path.to_owned(),
-        reason,
-    };
+    let unusable = |reason: &str| LogError::unusable(OF, path, reason);
     let is_in_ticks = rows.columns.is_in_ticks;
+    let missing = "it counts ticks: give the distance of one, in metres, as wheels.m_per_tick";
     let m_per_count = match is_in_ticks {
-        true => m_per_tick.ok_or_else(|| {
-            let missing =
-                "it counts ticks: give the distance of one, in metres, as wheels.m_per_tick";
-            unusable(missing.to_owned())
-        })?,
+        true => m_per_tick.ok_or_else(|| unusable(missing))?,
         false => 1.0,
     };
     let (mut counts, mut faults) = examine(rows.raw, false, path, &COUNTS)?;
@@ -112,7 +103,7 @@ pub(super) fn speeds(
     }
     let before = speeds.len();
     if before == 0 {
-        return Err(unusable("it is shorter than 0.09 s".to_owned()));
+        return Err(unusable("it is shorter than 0.09 s"));
     }
     speeds.retain(|speed| speed.values[0].abs() <= SPEEDS.most);
     let absurd = before - speeds.len();
@@ -121,9 +112,8 @@ pub(super) fn speeds(
             true => "is wheels.m_per_tick in metres?",
             false => "is the distance in metres?",
         };
-        return Err(unusable(format!(
-            "{absurd} of its {before} speeds are beyond 100 m/s: {remedy}"
-        )));
+        let reason = format!("{absurd} of its {before} speeds are beyond 100 m/s: {remedy}");
+        return Err(unusable(&reason));
     }
     faults.absurd += absurd;
     Ok((speeds, faults))

@@ -3,6 +3,7 @@
 use gyre_datasets::{GnssLog, ReceivedFixes};
 
 use super::{START_NS, read};
+use crate::common::written;
 
 /// A log at 10 m/s to the east with a fix each second; `row` may return other rows.
 fn drive(row: impl Fn(usize, i64, f64) -> Option<String>) -> GnssLog {
@@ -39,17 +40,13 @@ fn each_fault_is_counted_under_its_name_and_left_out() {
         ("jump faster than a vehicle", 0..1, "40.0,"),
     ] {
         let log = drive(|k, ns, longitude| {
-            let stamp_ns = if name == "repeated" {
-                ns - 1_000_000_000
-            } else {
-                ns
-            };
+            let back_ns = if name == "repeated" { 1_000_000_000 } else { 0 };
             let longitude = match name.starts_with("jump") {
                 true => longitude.to_string(),
                 false => String::new(),
             };
-            rows.contains(&k)
-                .then(|| format!("{stamp_ns},{place}{longitude}"))
+            let row = format!("{},{place}{longitude}", ns - back_ns);
+            rows.contains(&k).then_some(row)
         });
         let count = rows.len();
         assert_eq!(log.faults.named(), [(count, name)]);
@@ -74,10 +71,7 @@ fn fixes_that_come_out_of_order_are_sorted_and_counted() {
     });
     assert_eq!((log.fixes.len(), log.faults.out_of_order), (60, 1));
     assert!(log.fixes.is_sorted_by_key(|fix| fix.stamp_ns));
-    assert!(
-        log.fixes
-            .is_sorted_by(|a, b| a.east_north_m[0] < b.east_north_m[0])
-    );
+    assert!(log.fixes.is_sorted_by_key(|fix| fix.east_north_m[0]));
 }
 
 #[test]
@@ -90,21 +84,19 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
         (&format!("{header}17,,,0\n"), "1 without a fix"),
         (&format!("{header}unreadable\n"), "none of its 1 entries"),
     ] {
-        let path = super::written(&folder, "gnss.csv", text);
+        let path = written(&folder, "gnss.csv", text);
         let log = GnssLog::received(&path);
         let unusable = log.unusable.unwrap();
-        assert!(
-            log.fixes.is_empty() && unusable.contains(reason),
-            "{unusable}"
-        );
+        assert!(log.fixes.is_empty());
+        assert!(unusable.contains(reason), "{unusable}");
     }
     let text = format!("{header}{START_NS},51.7,-1.2,0\nunreadable\n17,51.8,-1.2,0.5\n");
-    let log = GnssLog::received(&super::written(&folder, "gnss.csv", &text));
+    let log = GnssLog::received(&written(&folder, "gnss.csv", &text));
     assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
     assert_eq!(log.faults.out_of_order, 1);
     assert_eq!(log.fixes.len(), 2);
     let noisy = format!("{text}unreadable\nunreadable,1\n");
-    let log = GnssLog::received(&super::written(&folder, "gnss.csv", &noisy));
+    let log = GnssLog::received(&written(&folder, "gnss.csv", &noisy));
     assert_eq!((log.fixes.len(), log.faults.unreadable), (2, 3));
     let missing = GnssLog::received(&folder.path().join("none.csv"));
     assert!(missing.unusable.unwrap().contains("none.csv"));
@@ -119,15 +111,11 @@ fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
     for rows in [100, 0, 1, 1, 2] {
         for _ in 0..rows {
             let k = text.lines().count() as i64;
-            let line = match k % 20 {
+            let (ns, longitude) = (START_NS + k * 10_000_000, 1e-8 * k as f64);
+            text += &match k % 20 {
                 0 => "unreadable,3\n".to_owned(),
-                _ => format!(
-                    "{},51.7,{:.8},0.5\n",
-                    START_NS + k * 10_000_000,
-                    1e-8 * k as f64
-                ),
+                _ => format!("{ns},51.7,{longitude:.8},0.5\n"),
             };
-            text += &line;
         }
         std::fs::write(&path, &text).unwrap();
         received.read_on().unwrap();
@@ -144,10 +132,10 @@ fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
 #[test]
 fn a_recording_has_the_log_of_its_own_name_before_one_of_the_folder() {
     let folder = tempfile::tempdir().unwrap();
-    let recording = super::written(&folder, "drive.mcap", "");
-    let of_folder = super::written(&folder, "gnss.csv", "");
+    let recording = written(&folder, "drive.mcap", "");
+    let of_folder = written(&folder, "gnss.csv", "");
     assert_eq!(GnssLog::find(&recording).unwrap(), of_folder);
-    let own = super::written(&folder, "drive.gnss.csv", "");
+    let own = written(&folder, "drive.gnss.csv", "");
     assert_eq!(GnssLog::of_recording(&recording), own);
     assert_eq!(GnssLog::find(&recording).unwrap(), own);
     assert_eq!(GnssLog::find(folder.path()).unwrap(), of_folder);

@@ -4,29 +4,23 @@ use gyre_datasets::GnssLog;
 use gyre_samples::GnssConfig;
 use tempfile::TempDir;
 
-use super::{START_NS, read, written};
+use super::{START_NS, read};
+use crate::common::{assert_refused, written};
 
 /// Two fixes a second apart, the second 11.13 m north of the first, with these deviations.
 fn assert_two(log: &GnssLog, sigma_m: Option<f64>, what: &str) {
     let [first, second] = &log.fixes[..] else {
         panic!("{what}: {log:?}");
     };
-    assert_eq!(
-        [first.stamp_ns, second.stamp_ns],
-        [START_NS, START_NS + 1_000_000_000],
-        "{what}"
-    );
+    let stamps = [first.stamp_ns, second.stamp_ns];
+    assert_eq!(stamps, [START_NS, START_NS + 1_000_000_000], "{what}");
     assert_eq!(first.east_north_m, [0.0, 0.0], "{what}");
     let [east, north] = second.east_north_m;
-    assert!(
-        east.abs() < 1e-6 && (north - 11.134).abs() < 0.001,
-        "{what}: {east} {north}"
-    );
+    let is_north = east.abs() < 1e-6 && (north - 11.134).abs() < 0.001;
+    assert!(is_north, "{what}: {east} {north}");
     for fix in [first, second] {
-        match (fix.sigma_m, sigma_m) {
-            (Some(found), Some(expected)) => assert!((found - expected).abs() < 1e-9, "{what}"),
-            (found, expected) => assert_eq!(found, expected, "{what}"),
-        }
+        let off_m = fix.sigma_m.unwrap_or(-1.0) - sigma_m.unwrap_or(-1.0);
+        assert!(off_m.abs() < 1e-9, "{what}: {off_m}");
     }
     let origin = log.plane.unwrap().origin();
     assert_eq!([origin.latitude_deg, origin.longitude_deg], [55.9, -3.2]);
@@ -43,75 +37,32 @@ fn assert_two(log: &GnssLog, sigma_m: Option<f64>, what: &str) {
 
 #[test]
 fn tables_are_read_by_their_headers_or_by_their_number_of_columns() {
-    let us = START_NS / 1000;
-    let ns = START_NS;
-    let (next_us, next_ns) = (us + 1_000_000, ns + 1_000_000_000);
-    let cases = [
-        (
-            "gnss.csv",
-            format!(
-                "stamp_ns,latitude_deg,longitude_deg\n{ns},55.9,-3.2\n{next_ns},55.9001,-3.2\n"
-            ),
-            None,
-        ),
-        (
-            "gnss.csv",
-            format!("lon;lat;timestamp;sigma_m\n-3.2;55.9;{us};0.3\n-3.2;55.9001;{next_us};0.3\n"),
-            Some(0.3),
-        ),
-        (
-            "gps/gps.csv",
-            format!(
-                "timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone\n\
-                 {us},8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n{next_us},8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n"
-            ),
-            Some(12.5f64.sqrt()),
-        ),
+    // The file, the deviation, the text.
+    for case in [
+        "gnss.csv||stamp_ns,latitude_deg,longitude_deg\n1760456485551626000,55.9,-3.2\n1760456486551626000,55.9001,-3.2\n",
+        "gnss.csv|0.3|lon;lat;timestamp;sigma_m\n-3.2;55.9;1760456485551626;0.3\n-3.2;55.9001;1760456486551626;0.3\n",
+        "gps/gps.csv|3.5355339059|timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone\n\
+         1760456485551626,8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n1760456486551626,8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n",
         // Hemispheres, a stamp in two parts; an altitude and an accuracy that are not known.
-        (
-            "gnss.csv",
-            format!(
-                "header.stamp.sec,header.stamp.nanosec,lat,N/S,lon,E/W,alt,sigma_m\n\
-                 {0},551626000,55.9,N,3.2,W,,\n{1},551626000,55.9001,n,3.2,West,20.0,-1\n",
-                ns / 1_000_000_000,
-                next_ns / 1_000_000_000
-            ),
-            None,
-        ),
+        "gnss.csv||header.stamp.sec,header.stamp.nanosec,lat,N/S,lon,E/W,alt,sigma_m\n\
+         1760456485,551626000,55.9,N,3.2,W,,\n1760456486,551626000,55.9001,n,3.2,West,20.0,-1\n",
         // As stated by a simulation, and as of no receiver.
-        (
-            "gnss.csv",
-            format!(
-                "stamp_ns,latitude_deg,longitude_deg,sigma_m,status.status\n{ns},55.9,-3.2,0.0000127,-2\n{next_ns},55.9001,-3.2,0.01,2\n1,0,0,0,-1\n"
-            ),
-            Some(0.01),
-        ),
-        (
-            "sensor_data/gps.csv",
-            format!(
-                "{ns},55.9,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n{next_ns},55.9001,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n"
-            ),
-            Some(10f64.sqrt()),
-        ),
-        (
-            "sensor_data/gps.csv",
-            format!(
-                "{ns},55.9,-3.2,60.0,0,0,0,0,0,0,0,0,0\n{next_ns},55.9001,-3.2,60.0,0,0,0,0,0,0,0,0,0\n"
-            ),
-            None,
-        ),
-    ];
-    for (name, text, sigma_m) in cases {
-        assert_two(&read(name, &text).unwrap(), sigma_m, &text);
+        "gnss.csv|0.01|stamp_ns,latitude_deg,longitude_deg,sigma_m,status.status\n1760456485551626000,55.9,-3.2,0.0000127,-2\n1760456486551626000,55.9001,-3.2,0.01,2\n1,0,0,0,-1\n",
+        "sensor_data/gps.csv|3.1622776602|1760456485551626000,55.9,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n1760456486551626000,55.9001,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n",
+        "sensor_data/gps.csv||1760456485551626000,55.9,-3.2,60.0,0,0,0,0,0,0,0,0,0\n1760456486551626000,55.9001,-3.2,60.0,0,0,0,0,0,0,0,0,0\n",
+    ] {
+        let parts: Vec<&str> = case.split('|').collect();
+        let log = read(parts[0], parts[2]).unwrap();
+        assert_two(&log, parts[1].parse().ok(), case);
     }
 }
 
 #[test]
 fn a_folder_of_radiate_is_read_with_its_list_of_times() {
     let folder = TempDir::new().unwrap();
-    let list =
-        "Frame: 000001 Time: 1760456485.551626000\nFrame: 000002 Time: 1760456486.551626000\n";
-    written(&folder, "GPS_IMU_Twist.txt", list);
+    let line = |frame, s| format!("Frame: {frame:06} Time: {s}.551626000\n");
+    let list = line(1, 1_760_456_485) + &line(2, 1_760_456_486);
+    written(&folder, "GPS_IMU_Twist.txt", &list);
     let rest = "0,0,0,1\n".to_owned() + &" 0,0,0\n".repeat(12);
     for (number, latitude) in [(1, "55.9"), (2, "55.9001")] {
         let text = format!("{latitude},-3.2,80.0\n 0.04,0,0\n 0,0.14,0\n 0,0,1\n{rest}");
@@ -124,17 +75,15 @@ fn a_folder_of_radiate_is_read_with_its_list_of_times() {
 
 #[test]
 fn coordinates_in_a_plane_have_no_place_on_the_earth() {
+    let table = format!("stamp_ns,east_m,north_m\n{START_NS},3.0,4.0\n");
     for (name, text) in [
-        (
-            "gnss.csv",
-            format!("stamp_ns,east_m,north_m\n{START_NS},3.0,4.0\n"),
-        ),
+        ("gnss.csv", table.as_str()),
         (
             "gnss_as_logged.tum",
-            "1760456485.551626000 3.0 4.0 1.0 0 0 0 1\n".to_owned(),
+            "1760456485.551626000 3.0 4.0 1.0 0 0 0 1\n",
         ),
     ] {
-        let log = read(name, &text).unwrap();
+        let log = read(name, text).unwrap();
         assert_eq!(log.fixes[0].stamp_ns, START_NS, "{name}");
         assert_eq!(log.fixes[0].east_north_m, [3.0, 4.0], "{name}");
         assert!(log.plane.is_none(), "{name}");
@@ -159,37 +108,19 @@ fn fixes_on_the_radars_clock_have_the_delay_taken_off_and_the_uncertainty_that_i
 
 #[test]
 fn what_is_no_log_is_refused_with_what_to_do() {
-    for (text, expected) in [
-        ("", "it is empty"),
-        ("1,2,3\n", "3 columns have no names"),
-        ("stamp_ns,x,y\n", "have no positions"),
-        ("latitude,longitude\n", "no column of stamps"),
-        (
-            "stamp_ns,latitude,longitude\n",
-            "none of its 0 entries is a usable fix",
-        ),
-        (
-            "stamp_ns,latitude,longitude\na,b,c\n1,2\n5,1,1\n",
-            "2 of its 3 rows cannot be read, the first in line 2",
-        ),
-        (
-            "stamp_ns,latitude,longitude\n5,50.0S,1.0E\n",
-            "\"50.0S\" has a letter: write degrees to the south and to the west with a minus",
-        ),
+    for case in [
+        "1,2,3\n|3 columns have no names",
+        "stamp_ns,x,y\n|have no positions",
+        "latitude,longitude\n|have no stamps",
+        "stamp_ns,latitude,longitude\n|none of its 0 entries is a usable fix",
+        "stamp_ns,latitude,longitude\na,b,c\n1,2\n5,1,1\n|2 of its 3 rows cannot be read, the first in line 2",
+        "stamp_ns,latitude,longitude\n5,50.0S,1.0E\n|\"50.0S\" has a letter: write degrees to the south and to the west with a minus",
         // A contradiction, and a word that is of no hemisphere.
-        (
-            "stamp_ns,lat,n_s,lon\n5,-50.0,N,1.0\n6,50.0,?,1.0\n",
-            "2 of its 2 rows",
-        ),
-        (
-            "stamp_ns,lat,lon,lat\n5,50.0,1.0,2.0\n",
-            "two of its columns are named \"lat\"",
-        ),
+        "stamp_ns,lat,n_s,lon\n5,-50.0,N,1.0\n6,50.0,?,1.0\n|2 of its 2 rows",
     ] {
-        let refused = read("gnss.csv", text).unwrap_err().to_string();
-        assert!(refused.contains(expected), "{text}: {refused}");
+        let (text, expected) = case.split_once('|').unwrap();
+        assert_refused(read("gnss.csv", text), expected);
     }
     let folder = TempDir::new().unwrap();
-    let refused = GnssLog::find(folder.path()).unwrap_err().to_string();
-    assert!(refused.contains("gnss.kind = \"none\""), "{refused}");
+    assert_refused(GnssLog::find(folder.path()), "gnss.kind = \"none\"");
 }

@@ -1,12 +1,11 @@
 //! Formats.
 
-use std::{env, path::PathBuf};
-
 use gyre_datasets::{Format, GyroLog};
 use gyre_samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
-use super::{START_NS, read, written};
+use super::{START_NS, read};
+use crate::common::{assert_refused, written};
 
 /// The rates and accelerations of the only sample.
 fn values(log: &GyroLog) -> [f64; 6] {
@@ -18,12 +17,9 @@ fn values(log: &GyroLog) -> [f64; 6] {
 }
 
 fn assert_close(found: [f64; 6], expected: [f64; 6], what: &str) {
-    for (found, expected) in found.into_iter().zip(expected) {
-        assert!(
-            (found - expected).abs() < 1e-9,
-            "{what}: {found} {expected}"
-        );
-    }
+    let mut pairs = found.iter().zip(expected);
+    let is_close = pairs.all(|(found, expected)| (found - expected).abs() < 1e-9);
+    assert!(is_close, "{what}: {found:?} {expected:?}");
 }
 
 /// Rates about x, y, z of 1, 2, 3 and accelerations of 4, 5, 6, whatever the order of columns.
@@ -31,38 +27,17 @@ const ALL: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 
 #[test]
 fn tables_of_datasets_are_read_by_their_headers() {
-    let ns = START_NS;
-    let us = START_NS / 1000;
-    for (name, text) in [
-        (
-            "imu_as_logged.csv",
-            format!(
-                "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n{ns},1,2,3,4,5,6\n"
-            ),
-        ),
-        (
-            "dmu_imu.csv",
-            format!("time,wx,wy,wz,ax,ay,az\n{ns},1,2,3,4,5,6\n"),
-        ),
-        (
-            "aeva_imu.csv",
-            format!("time,wx,wy,wz,ax,ay,az\n{us},1,2,3,4,5,6\n"),
-        ),
-        (
-            "applanix/imu.csv",
-            format!("GPSTime,angvel_z,angvel_y,angvel_x,accelz,accely,accelx\n{us},3,2,1,6,5,4\n"),
-        ),
+    for case in [
+        "imu_as_logged.csv|stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n1760456485551626000,1,2,3,4,5,6\n",
+        "dmu_imu.csv|time,wx,wy,wz,ax,ay,az\n1760456485551626000,1,2,3,4,5,6\n",
+        "aeva_imu.csv|time,wx,wy,wz,ax,ay,az\n1760456485551626,1,2,3,4,5,6\n",
+        "applanix/imu.csv|GPSTime,angvel_z,angvel_y,angvel_x,accelz,accely,accelx\n1760456485551626,3,2,1,6,5,4\n",
         // In FoMo's files `a` are the angular rates.
-        (
-            "vectornav.csv",
-            format!("t,ax,ay,az,lx,ly,lz\n{us},1,2,3,4,5,6\n"),
-        ),
-        (
-            "xsens_imu.csv",
-            format!("{ns},0,0,0,1,7,7,7,1,2,3,4,5,6,8,8,8\n"),
-        ),
+        "vectornav.csv|t,ax,ay,az,lx,ly,lz\n1760456485551626,1,2,3,4,5,6\n",
+        "xsens_imu.csv|1760456485551626000,0,0,0,1,7,7,7,1,2,3,4,5,6,8,8,8\n",
     ] {
-        let log = read(name, &text).unwrap();
+        let (name, text) = case.split_once('|').unwrap();
+        let log = read(name, text).unwrap();
         assert_close(values(&log), ALL, name);
         assert_eq!(log.faults.sentences(SampleKind::Gyro), [""; 0], "{name}");
     }
@@ -70,80 +45,31 @@ fn tables_of_datasets_are_read_by_their_headers() {
 
 #[test]
 fn tables_of_ones_own_are_read_by_names_and_units() {
-    let deg = 1f64.to_degrees();
-    let rows = [
-        (
-            "timestamp_ms;wx_dps;wy_dps;wz_dps;acc_x_g;acc_y_g;acc_z_g",
-            format!("1760456485551;{};{};{};1;0;0", deg, 2.0 * deg, 3.0 * deg),
-            [1.0, 2.0, 3.0, 9.80665, 0.0, 0.0],
-            1_760_456_485_551_000_000,
-        ),
-        (
-            "stamp_s,Angular Velocity.x [rad/s],Angular Velocity.y [rad/s],Angular Velocity.z [rad/s]",
-            "12.5,1,2,3".to_owned(),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            12_500_000_000,
-        ),
+    // The stamp, rates and accelerations, the text.
+    for case in [
+        "1760456485551000000|1,2,3,9.80665,0,0|timestamp_ms;wx_dps;wy_dps;wz_dps;acc_x_g;acc_y_g;acc_z_g\n1760456485551;57.29577951308232;114.59155902616465;171.88733853924697;1;0;0",
+        "12500000000|1,2,3,0,0,0|stamp_s,Angular Velocity.x [rad/s],Angular Velocity.y [rad/s],Angular Velocity.z [rad/s]\n12.5,1,2,3",
         // As rostopic writes it.
-        (
-            "%time,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z",
-            "1760456485551626000,1,2,3,4,5,6".to_owned(),
-            ALL,
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,4,5,6|%time,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z\n1760456485551626000,1,2,3,4,5,6",
         // As ROS 2 and ROS 1 write the two parts of a stamp.
-        (
-            "header.stamp.sec,header.stamp.nanosec,gx,gy,gz",
-            "1760456485,551626000,1,2,3".to_owned(),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            START_NS,
-        ),
-        (
-            "gx (deg/s),gy (deg/s),gz (deg/s),nsecs,secs",
-            format!(
-                "{},{},{},551626000.0,1760456485.0",
-                deg,
-                2.0 * deg,
-                3.0 * deg
-            ),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            START_NS,
-        ),
-        (
-            "timestamp,usec,gyro_x,gyro_y,gyro_z",
-            "1760456485,551626,1,2,3".to_owned(),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,0,0,0|header.stamp.sec,header.stamp.nanosec,gx,gy,gz\n1760456485,551626000,1,2,3",
+        "1760456485551626000|1,2,3,0,0,0|gx (deg/s),gy (deg/s),gz (deg/s),nsecs,secs\n57.29577951308232,114.59155902616465,171.88733853924697,551626000.0,1760456485.0",
+        "1760456485551626000|1,2,3,0,0,0|timestamp,usec,gyro_x,gyro_y,gyro_z\n1760456485,551626,1,2,3",
         // Two whole stamps.
-        (
-            "stamp_s,stamp_ns,gyro_x,gyro_y,gyro_z",
-            "1760456485,1760456485551626000,1,2,3".to_owned(),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            START_NS,
-        ),
+        "1760456485551626000|1,2,3,0,0,0|stamp_s,stamp_ns,gyro_x,gyro_y,gyro_z\n1760456485,1760456485551626000,1,2,3",
         // EuRoC.
-        (
-            "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
-            "1760456485551626000,1,2,3,4,5,6".to_owned(),
-            ALL,
-            START_NS,
-        ),
-        (
-            "x,stamp_us,omega_z,omega_x,omega_y",
-            "0,1000,3,1,2".to_owned(),
-            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
-            1_000_000,
-        ),
-    ];
-    for (header, row, expected, stamp_ns) in rows {
-        let log = read("own.csv", &format!("{header}\n{row}\n")).unwrap();
-        assert_close(log.samples[0].values, expected, header);
-        assert_eq!(log.samples[0].stamp_ns, stamp_ns, "{header}");
-        let names_unit = ["dps", "rad/s", "deg/s", "rad s"]
-            .iter()
-            .any(|it| header.contains(it));
-        assert_eq!(log.faults.unit_is_assumed, !names_unit, "{header}");
+        "1760456485551626000|1,2,3,4,5,6|#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n1760456485551626000,1,2,3,4,5,6",
+        "1000000|1,2,3,0,0,0|x,stamp_us,omega_z,omega_x,omega_y\n0,1000,3,1,2",
+    ] {
+        let parts: Vec<&str> = case.split('|').collect();
+        let expected = parts[1].split(',').map(|it| it.parse::<f64>().unwrap());
+        let expected: Vec<f64> = expected.collect();
+        let log = read("own.csv", parts[2]).unwrap();
+        assert_close(log.samples[0].values, expected.try_into().unwrap(), case);
+        assert_eq!(log.samples[0].stamp_ns.to_string(), parts[0], "{case}");
+        let units = ["dps", "rad/s", "deg/s", "rad s"];
+        let names_unit = units.iter().any(|it| case.contains(it));
+        assert_eq!(log.faults.unit_is_assumed, !names_unit, "{case}");
     }
 }
 
@@ -151,8 +77,11 @@ fn tables_of_ones_own_are_read_by_names_and_units() {
 fn samples_of_radiate_are_files() {
     let folder = TempDir::new().unwrap();
     // The nanoseconds have no leading zeros.
-    let list = "Frame: 000001 Time: 1549986608.1153537\nFrame: 000002 Time: 1549986608.53153537\nFrame: 000003 Time: 1549986608.103153537\n";
-    written(&folder, "GPS_IMU_Twist.txt", list);
+    let line = |(frame, ns)| format!("Frame: {frame:06} Time: 1549986608.{ns}\n");
+    let list = [(1, 1153537), (2, 53153537), (3, 103153537)]
+        .map(line)
+        .concat();
+    written(&folder, "GPS_IMU_Twist.txt", &list);
     let zeros = "0,0,0 \n 0,0,0 \n 0,0,0 \n";
     for (number, yaw) in [(1, 0.03532), (2, -0.5)] {
         let text = format!(
@@ -164,14 +93,10 @@ fn samples_of_radiate_are_files() {
     assert_eq!(found, folder.path().join("GPS_IMU_Twist"));
     let log = GyroLog::read(&found).unwrap();
     let stamps: Vec<i64> = log.samples.iter().map(|sample| sample.stamp_ns).collect();
-    assert_eq!(
-        stamps,
-        [1_549_986_608_001_153_537, 1_549_986_608_053_153_537]
-    );
-    assert_eq!(
-        log.samples[0].values,
-        [0.00151, -0.00572, 0.03532, -0.58829, 0.53698, 0.04222]
-    );
+    let expected = [1_153_537, 53_153_537].map(|ns| 1_549_986_608_000_000_000 + ns);
+    assert_eq!(stamps, expected);
+    let expected = [0.00151, -0.00572, 0.03532, -0.58829, 0.53698, 0.04222];
+    assert_eq!(log.samples[0].values, expected);
     // The third has a time and no file.
     assert_eq!((log.faults.unreadable, log.faults.first_unreadable), (1, 3));
 }
@@ -206,126 +131,46 @@ fn logs_lie_at_the_places_of_the_datasets() {
     ] {
         let folder = TempDir::new().unwrap();
         let path = written(&folder, place, "");
-        assert_eq!(
-            GyroLog::beside(folder.path()),
-            Some(path.clone()),
-            "{place}"
-        );
+        let beside = |name: &str| GyroLog::find(&folder.path().join(name)).ok();
+        assert_eq!(beside(""), Some(path.clone()), "{place}");
         // The folder of the images may be given for the dataset.
-        assert_eq!(
-            GyroLog::beside(&folder.path().join("radar")),
-            Some(path),
-            "{place}"
-        );
-        assert_eq!(
-            GyroLog::beside(&folder.path().join("other")),
-            None,
-            "{place}"
-        );
+        assert_eq!(beside("radar"), Some(path), "{place}");
+        assert_eq!(beside("other"), None, "{place}");
     }
 }
 
 #[test]
 fn the_log_of_the_truth_is_used_only_if_it_is_named() {
     let folder = TempDir::new().unwrap();
-    let text = format!(
-        "GPSTime,angvel_z,angvel_y,angvel_x,accelz,accely,accelx\n{START_NS},3,2,1,6,5,4\n"
-    );
-    let path = written(&folder, "applanix/imu.csv", &text);
-    let refused = GyroLog::find(folder.path()).unwrap_err().to_string();
-    assert!(
-        refused.contains("of which the ground truth was computed"),
-        "{refused}"
-    );
-    assert_eq!(GyroLog::beside(folder.path()), None);
-    assert_close(values(&GyroLog::read(&path).unwrap()), ALL, "named");
+    written(&folder, "applanix/imu.csv", "");
+    let reason = "of which the ground truth was computed";
+    assert_refused(GyroLog::find(folder.path()), reason);
 }
 
 #[test]
 fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
-    let oxford = "timestamp,ins_status,latitude,longitude,altitude,northing,easting,down,utm_zone,velocity_north,velocity_east,velocity_down,roll,pitch,yaw\n1547131046260961,INS_SOLUTION_GOOD,51.7,-1.2,109.9,5735853.8,620013.9,-109.9,30U,1,2,3,0.1,0.2,0.3\n";
-    for (text, reason) in [
-        (
-            oxford,
-            "the INS logs of Oxford and OORD have positions and attitudes alone",
-        ),
-        ("", "it is empty"),
-        ("a,b,c\n1,2,3\n", "no angular rates about three axes"),
-        (
-            "stamp_ns,gyro_x,gyro_z\n1,2,3\n",
-            "no angular rates about three axes",
-        ),
-        ("gyro_x,gyro_y,gyro_z\n1,2,3\n", "no column of stamps"),
-        (
-            "stamp_ns,gyro_x,gyro_y,gyro_z,gyro_z\n1,2,3,4,4\n",
-            "two of its columns are named \"gyro_z\"",
-        ),
-        ("1,2,3,4,5,6,7\n", "its 7 columns have no names"),
-        (
-            "1,2,3,4,5,6,7,8\n",
-            "first version of MulRan's xsens_imu.csv",
-        ),
-        ("stamp_ns,gyro_x,gyro_y,gyro_z\n", "it has no samples"),
-        (
-            "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n",
-            "the first in line 2: \"0,1\" has a decimal comma: write decimal points",
-        ),
-        (
-            "stamp_ns,gyro_x,gyro_y,gyro_z\n1;0.1;0.2;0.3\n",
-            "it has 1 fields in place of 4: do all rows have the mark",
-        ),
-        (
-            "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n",
-            "\"2025-10-14T15:41:25.551Z\" is a date or a time of day: write stamps as",
-        ),
-        (
-            &"x,".repeat(200_000),
-            "its first row has 200001 columns, and at most 1000",
-        ),
+    for case in [
+        "timestamp,ins_status,latitude\n1547131046260961,INS_SOLUTION_GOOD,51.7\n|the INS logs of Oxford and OORD have positions and attitudes alone",
+        "|it is empty",
+        "stamp_ns,gyro_x,gyro_z\n1,2,3\n|no angular rates about three axes",
+        "gyro_x,gyro_y,gyro_z\n1,2,3\n|have no stamps",
+        "stamp_ns,gyro_x,gyro_y,gyro_z,gyro_z\n1,2,3,4,4\n|two of its columns are named \"gyro_z\"",
+        "1,2,3,4,5,6,7\n|its 7 columns have no names",
+        "1,2,3,4,5,6,7,8\n|first version of MulRan's xsens_imu.csv",
+        "stamp_ns,gyro_x,gyro_y,gyro_z\n|it has no samples",
+        "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n|the first in line 2: \"0,1\" has a decimal comma: write decimal points",
+        "stamp_ns,gyro_x,gyro_y,gyro_z\n1;0.1;0.2;0.3\n|it has 1 fields in place of 4: do all rows have the mark",
+        "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n|\"2025-10-14T15:41:25.551Z\" is a date or a time of day: write stamps as",
     ] {
-        let refused = read("imu.csv", text).unwrap_err().to_string();
-        assert!(refused.contains(reason), "{refused}");
-        assert!(refused.contains("imu.csv"), "{refused}");
+        let (text, reason) = case.split_once('|').unwrap();
+        assert_refused(read("imu.csv", text), reason);
     }
+    let wide = read("imu.csv", &"x,".repeat(200_000));
+    assert_refused(wide, "its first row has 200001 columns, and at most 1000");
     let stated =
         "stamp_ns,gyro_x,gyro_y,gyro_z,angular_velocity_covariance_0\n1,0,0,0,-1\n3,0,0,0,0\n";
     let log = read("imu.csv", stated).unwrap();
     assert_eq!((log.samples.len(), log.faults.not_a_number), (1, 1));
-    let missing = GyroLog::read(&PathBuf::from("/no/imu.csv")).unwrap_err();
-    assert!(
-        missing
-            .to_string()
-            .contains("cannot read the log of the gyro /no/imu.csv")
-    );
-}
-
-/// The counts were found by other means: rows, stamps and steps of the files.
-#[test]
-fn the_real_logs_are_read_with_their_faults() {
-    let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
-        println!("skipped: GYRE_DATA is not set");
-        return;
-    };
-    for (name, samples, gaps, longest_s) in [
-        ("radiate-2019-02-12", 2293, 13, 0.799702),
-        ("radiate-2019-02-12-b", 1386, 19, 5.749749),
-        ("radiate-2019-02-12-standing", 632, 0, 0.0),
-    ] {
-        let path = GyroLog::beside(&data.join(name)).unwrap();
-        let log = GyroLog::read(&path).unwrap();
-        assert_eq!(log.samples.len(), samples, "{name}");
-        assert_eq!(log.faults.left_out(), 0, "{name}");
-        assert_eq!(log.faults.gaps.len(), gaps, "{name}");
-        assert!(
-            (log.faults.longest_gap_s() - longest_s).abs() < 1e-6,
-            "{name}"
-        );
-    }
-    // Ten of its stamps in a row are 0.36 s early.
-    let fog = GyroLog::read(&data.join("radiate-tiny_foggy/imu_as_logged.csv")).unwrap();
-    assert_eq!(fog.samples.len() + fog.faults.measured_twice, 124);
-    assert_eq!(
-        (fog.faults.out_of_order, fog.faults.measured_twice),
-        (7, 14)
-    );
+    let missing = GyroLog::read("/no/imu.csv".as_ref());
+    assert_refused(missing, "cannot read the log of the gyro /no/imu.csv");
 }

@@ -5,10 +5,10 @@ mod faults;
 mod formats;
 mod wheels;
 
-use std::{fs, path::PathBuf};
-
 use gyre_datasets::{GyroLog, LogError};
 use tempfile::TempDir;
+
+use crate::common::written;
 
 /// 2025-10-14, ns.
 const START_NS: i64 = 1_760_456_485_551_626_000;
@@ -18,11 +18,4 @@ fn read(name: &str, text: &str) -> Result<GyroLog, LogError> {
     let folder = TempDir::new().unwrap();
     let path = written(&folder, name, text);
     GyroLog::read(&path)
-}
-
-fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    fs::write(&path, text).unwrap();
-    path
 }

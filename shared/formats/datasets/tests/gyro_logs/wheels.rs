@@ -1,10 +1,10 @@
 //! Logs of the wheels' speed.
 
 use gyre_datasets::{LogError, WheelLog};
-use proptest::prelude::*;
 use tempfile::TempDir;
 
-use super::{START_NS, written};
+use super::START_NS;
+use crate::common::{assert_refused, written};
 
 const MS: i64 = 1_000_000;
 
@@ -15,11 +15,9 @@ fn read(text: &str) -> Result<WheelLog, LogError> {
 
 /// Rows of 20 Hz, each with a speed.
 fn rows(header: &str, speeds: &[&str]) -> String {
-    let stamp = |k: i64| START_NS + 50 * MS * k;
-    let rows = (0..)
-        .zip(speeds)
-        .map(|(k, speed)| format!("{},{speed}\n", stamp(k)));
-    format!("{header}\n{}", rows.collect::<String>())
+    let row = |(k, speed): (i64, &&str)| format!("{},{speed}\n", START_NS + 50 * MS * k);
+    let rows: String = (0..).zip(speeds).map(row).collect();
+    format!("{header}\n{rows}")
 }
 
 fn speeds(log: &WheelLog) -> Vec<f64> {
@@ -43,17 +41,14 @@ fn columns_are_found_by_their_names_and_units() {
             _ => ["9.0", "-9.0"],
         };
         let text = rows(header, &signed);
-        let text = if header.contains(';') {
-            text.replace(',', ";")
-        } else {
-            text
+        let text = match header.contains(';') {
+            true => text.replace(',', ";"),
+            false => text,
         };
         let log = read(&text).unwrap_or_else(|error| panic!("{header}: {error}"));
         let found = speeds(&log);
-        assert!(
-            (found[0] - expected).abs() < 1e-12 && found[1] == -found[0],
-            "{header} {found:?}"
-        );
+        assert!((found[0] - expected).abs() < 1e-12, "{header} {found:?}");
+        assert_eq!(found[1], -found[0], "{header}");
         assert_eq!(log.faults.unit_is_assumed, assumed, "{header}");
         assert_eq!(log.samples[1].stamp_ns, START_NS + 50 * MS);
     }
@@ -65,21 +60,14 @@ fn what_is_no_log_of_wheels_is_refused_with_the_remedy() {
         (rows("stamp_ns,gyro_z_radps", &["0.1"]), "have no speed"),
         (rows("number,speed_m_s", &["1"]), "have no stamps"),
         (rows("1,2", &["1"]), "columns have no names"),
-        (String::new(), "it is empty"),
-        (rows("stamp_ns,speed,speed", &["1,1"]), "two of its columns"),
+        (
+            rows("stamp_ns,speed", &["120", "121"]),
+            "if they are in km/h",
+        ),
+        (rows("stamp_ns,speed_m_s", &[]), "it has no samples"),
     ] {
-        let refused = read(&text).unwrap_err().to_string();
-        assert!(
-            refused.contains("is no log of the wheels") && refused.contains(words),
-            "{refused}"
-        );
+        assert_refused(read(&text), words);
     }
-    let fast = read(&rows("stamp_ns,speed", &["120", "121"]))
-        .unwrap_err()
-        .to_string();
-    assert!(fast.contains("if they are in km/h"), "{fast}");
-    let empty = read("stamp_ns,speed_m_s\n").unwrap_err().to_string();
-    assert!(empty.contains("it has no samples"), "{empty}");
 }
 
 /// Counts of 100 Hz, of a vehicle that drives now faster, now slower.
@@ -133,10 +121,8 @@ fn counts_become_speeds_whose_way_is_that_of_the_counts() {
         assert!(off_m.abs() < 2.0 * m_per_tick, "{header}: {off_m} m");
         for sample in &log.samples {
             let off_mps = sample.values[0] - (8.0 + 3.0 * at(sample).cos());
-            assert!(
-                off_mps.abs() < m_per_tick / 0.09 + 0.05,
-                "{header}: {off_mps} m/s"
-            );
+            let most_mps = m_per_tick / 0.09 + 0.05;
+            assert!(off_mps.abs() < most_mps, "{header}: {off_mps} m/s");
         }
     }
 }
@@ -178,60 +164,26 @@ fn a_counter_that_starts_anew_costs_one_speed() {
 #[test]
 fn ticks_need_their_length() {
     let text = ticks("stamp_ns,ticks", 0.05, |_, count| format!("{count}"));
-    let missing = read_ticks(&text, None).unwrap_err().to_string();
-    assert!(missing.contains("wheels.m_per_tick"), "{missing}");
     let short: String = text.lines().take(9).map(|row| format!("{row}\n")).collect();
-    let short = read_ticks(&short, Some(0.05)).unwrap_err().to_string();
-    assert!(short.contains("it is shorter than 0.09 s"), "{short}");
-    let wrong = read_ticks(&text, Some(1.0)).unwrap_err().to_string();
-    assert!(wrong.contains("is wheels.m_per_tick in metres"), "{wrong}");
+    for (text, m_per_tick, words) in [
+        (
+            &text,
+            None,
+            "give the distance of one, in metres, as wheels.m_per_tick",
+        ),
+        (&short, Some(0.05), "it is shorter than 0.09 s"),
+        (&text, Some(1.0), "is wheels.m_per_tick in metres"),
+    ] {
+        assert_refused(read_ticks(text, m_per_tick), words);
+    }
 }
 
 #[test]
 fn the_log_lies_beside_the_scans() {
     let folder = TempDir::new().unwrap();
-    let missing = WheelLog::find(folder.path()).unwrap_err().to_string();
-    assert!(
-        missing.contains("no log of the wheels lies beside the scans"),
-        "{missing}"
-    );
+    let expected = "no log of the wheels lies beside the scans";
+    assert_refused(WheelLog::find(folder.path()), expected);
     let path = written(&folder, "wheels.csv", "");
     assert_eq!(WheelLog::find(&folder.path().join("radar")).unwrap(), path);
     assert_eq!(WheelLog::find(folder.path()).unwrap(), path);
-}
-
-proptest! {
-    /// Rows that are no numbers, repeated stamps and absurd speeds are left out and counted, and
-    /// the others stay, in the order of their stamps.
-    #[test]
-    fn faults_are_counted_and_leave_the_other_samples_alone(
-        faults in prop::collection::vec(0usize..40, 200..400),
-    ) {
-        let mut text = "stamp_ns,speed_m_s\n".to_owned();
-        let (mut kept, mut left_out) = (Vec::new(), 0);
-        for (k, fault) in (0..).zip(&faults) {
-            let (stamp, speed) = (START_NS + 50 * MS * k, k as f64 * 0.01);
-            let row = match fault {
-                0 => format!("{stamp},nan"),
-                1 => format!("{stamp}"),
-                2 => format!("{stamp},inf"),
-                3 => format!("{stamp},speed"),
-                _ => {
-                    kept.push(speed);
-                    format!("{stamp},{speed}")
-                }
-            };
-            left_out += usize::from(*fault < 4);
-            text += &row;
-            text += "\n";
-            if *fault == 4 {
-                left_out += 1;
-                text += &row;
-                text += "\n";
-            }
-        }
-        let log = read(&text).unwrap();
-        prop_assert_eq!(speeds(&log), kept);
-        prop_assert_eq!(log.faults.left_out(), left_out);
-    }
 }

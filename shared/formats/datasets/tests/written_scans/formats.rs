@@ -6,8 +6,8 @@ use std::path::Path;
 
 use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
-use super::{first_scan_with, folder, opened, options, rejected};
-use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
+use super::{assert_rejected, first_scan_with, folder, opened, options};
+use crate::common::{PERIOD_US, START_US, Sweep, assert_refused, read, write_png, write_radiate};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
 /// units of the stamps.
@@ -36,17 +36,10 @@ fn boreas_resolution_depends_on_the_date_and_its_time_is_the_middle_row() {
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), Format::Boreas);
         let scan = read(dataset.as_mut(), 1).unwrap();
-        assert_eq!(
-            (
-                scan.geometry.range_resolution_m,
-                scan.geometry.range_offset_m
-            ),
-            (resolution, -0.31)
-        );
-        assert_eq!(
-            (scan.geometry.stamp_ns, dataset.nominal_stamp_ns(1)),
-            (scan.stamp_ns[19], Some(scan.stamp_ns[19]))
-        );
+        assert_eq!(scan.geometry.range_resolution_m, resolution);
+        assert_eq!(scan.geometry.range_offset_m, -0.31);
+        assert_eq!(scan.geometry.stamp_ns, scan.stamp_ns[19]);
+        assert_eq!(dataset.nominal_stamp_ns(1), Some(scan.stamp_ns[19]));
     }
 }
 
@@ -66,24 +59,14 @@ fn formats_are_detected_from_layouts_and_first_images() {
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format, "{name:?}: {:?}", dataset.notes());
         let scan = read(dataset.as_mut(), 1).unwrap();
-        let error = (dataset.nominal_stamp_ns(1).unwrap() - scan.geometry.stamp_ns).abs();
-        assert!(
-            error < 5_000_000,
-            "{name:?}: nominal time is off by {error} ns"
-        );
+        let off_ns = dataset.nominal_stamp_ns(1).unwrap() - scan.geometry.stamp_ns;
+        assert!(off_ns.abs() < 5_000_000, "{name:?}: {off_ns} ns");
     }
-}
-
-#[test]
-fn an_ambiguous_format_is_reported_with_its_alternative() {
     let root = folder();
     write_named(root.path(), 60, START_US, 0, 1);
-    let dataset = opened(root.path());
-    let note = dataset.notes().join(" ");
-    assert!(
-        note.contains("read as oxford") && note.contains("`format = \"fomo\"`"),
-        "{note}"
-    );
+    let note = opened(root.path()).notes().join(" ");
+    let is_ambiguous = note.contains("read as oxford") && note.contains("`format = \"fomo\"`");
+    assert!(is_ambiguous, "{note}");
 }
 
 #[test]
@@ -91,28 +74,18 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
     let root = folder();
     let end = |k: i64| (START_US + k * PERIOD_US) * 1000;
     for k in 0..3 {
-        write_png(
-            &root
-                .path()
-                .join(format!("sensor_data/radar/polar/{}.png", end(k))),
-            40,
-            60,
-            &[9; 2400],
-        );
+        let name = format!("sensor_data/radar/polar/{}.png", end(k));
+        write_png(&root.path().join(name), 40, 60, &[9; 2400]);
     }
     let mut dataset = opened(root.path());
-    assert_eq!(
-        (dataset.format(), dataset.is_transposed()),
-        (Format::Mulran, true)
-    );
+    assert_eq!(dataset.format(), Format::Mulran);
+    assert!(dataset.is_transposed());
     let scan = read(dataset.as_mut(), 2).unwrap();
     // The name is the time of the last of 40 columns; the first column is at half a step.
     assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
     assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
-    assert!(
-        scan.geometry.stamp_ns < end(2)
-            && dataset.nominal_stamp_ns(2) == Some(scan.geometry.stamp_ns)
-    );
+    assert!(scan.geometry.stamp_ns < end(2));
+    assert_eq!(dataset.nominal_stamp_ns(2), Some(scan.geometry.stamp_ns));
     assert!((scan.geometry.range_resolution_m - 0.0595238).abs() < 1e-6);
 }
 
@@ -141,16 +114,11 @@ fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with
             let stamp = sweep.start + 20 * sweep.row_interval + off;
             row.copy_from_slice(&stamp.to_le_bytes());
             let name = sweep.start + named * sweep.row_interval;
-            write_png(
-                &root.path().join(format!("{name}.png")),
-                sweep.width(),
-                40,
-                &pixels,
-            );
+            let path = root.path().join(format!("{name}.png"));
+            write_png(&path, sweep.width(), 40, &pixels);
             let options = options(|o| o.format = Some(format));
             let mut dataset = open(root.path(), &options).unwrap();
-            let error = read(dataset.as_mut(), 1).unwrap_err().to_string();
-            assert!(error.contains("row 20: stamp is 3153"), "{format}: {error}");
+            assert_refused(read(dataset.as_mut(), 1), "row 20: stamp is 3153");
             assert!(read(dataset.as_mut(), 0).is_ok() && read(dataset.as_mut(), 2).is_ok());
         }
     }
@@ -159,30 +127,31 @@ fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with
 #[test]
 fn folders_without_a_dataset_are_rejected() {
     let root = folder();
-    assert!(matches!(
-        rejected(&root.path().join("nothing")),
-        OpenError::Missing { .. }
-    ));
-    assert!(matches!(rejected(root.path()), OpenError::NoImages { .. }));
-    fs::write(root.path().join("notes.txt"), "hello").unwrap();
-    let error = rejected(root.path()).to_string();
-    assert!(
-        error.contains("Navtech_Polar") && error.contains("`format`"),
-        "{error}"
-    );
-    assert!(matches!(
-        rejected(&root.path().join("notes.txt")),
-        OpenError::NotAFolder { .. }
-    ));
+    let refused = |name: &str, words: &[&str]| {
+        let path = root.path().join(name);
+        let each = words.iter();
+        each.for_each(|words| assert_rejected(&path, words));
+    };
+    refused("nothing", &["no such folder"]);
+    refused("", &["holds no PNG images"]);
+    fs::write(root.path().join("points.las"), "LASF").unwrap();
+    refused("", &["Navtech_Polar", "set its `format`", "bags of ROS 2"]);
+    refused("", &Format::ALL.map(Format::name));
+    refused("points.las", &["is a file: give the folder"]);
+    let configured = options(|o| o.format = Some(Format::Oxford));
+    for expected in [
+        "says `format = \"oxford\"`, but it holds neither PNG images nor the folder radar;",
+        ": is it another folder?",
+    ] {
+        assert_refused(open(root.path(), &configured), expected);
+    }
     fs::create_dir(root.path().join("radar")).unwrap();
-    assert!(
-        matches!(rejected(root.path()), OpenError::NoImages { path } if path.ends_with("radar"))
-    );
+    refused("", &["radar holds no PNG images"]);
     write_png(&root.path().join("radar/holiday.png"), 30, 20, &[0; 600]);
-    assert!(matches!(
-        rejected(root.path()),
-        OpenError::UnknownLayout { .. }
-    ));
+    refused(
+        "",
+        &["is not a known dataset: its images (30 columns x 20 rows)"],
+    );
 }
 
 #[test]
@@ -213,33 +182,22 @@ fn options_out_of_bounds_are_rejected() {
         o.range_offset_m = Some(-0.5);
         o.doppler_s = Some(0.04);
     });
-    assert_eq!(
-        (
-            scan.geometry.range_resolution_m,
-            scan.geometry.range_offset_m
-        ),
-        (1.5, -0.5)
-    );
-    assert_eq!(scan.geometry.doppler_s, 0.04);
+    let geometry = scan.geometry;
+    assert_eq!(geometry.range_resolution_m, 1.5);
+    assert_eq!([geometry.range_offset_m, geometry.doppler_s], [-0.5, 0.04]);
 }
 
 #[test]
 fn options_are_kebab_case_and_unknown_keys_are_rejected() {
     let options: DatasetOptions =
         serde_json::from_str(r#"{"format": "boreas-rt", "azimuth_source": "uniform"}"#).unwrap();
-    assert_eq!(
-        (options.format, options.azimuth_source),
-        (Some(Format::BoreasRt), Some(AzimuthSource::Uniform))
-    );
-    assert_eq!(
-        serde_json::to_string(&DatasetOptions::default()).unwrap(),
-        "{}"
-    );
+    assert_eq!(options.format, Some(Format::BoreasRt));
+    assert_eq!(options.azimuth_source, Some(AzimuthSource::Uniform));
+    let none = serde_json::to_string(&DatasetOptions::default());
+    assert_eq!(none.unwrap(), "{}");
     assert!(serde_json::from_str::<DatasetOptions>(r#"{"fromat": "oxford"}"#).is_err());
     for format in Format::ALL {
-        assert_eq!(
-            serde_json::to_string(&format).unwrap(),
-            format!("\"{format}\"")
-        );
+        let written = serde_json::to_string(&format).unwrap();
+        assert_eq!(written, format!("\"{format}\""));
     }
 }

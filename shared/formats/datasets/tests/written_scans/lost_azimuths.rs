@@ -76,31 +76,3 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
         assert!(scan.flags.iter().all(|flags| *flags == flag::MEASURED));
     }
 }
-
-/// If rows carry times, a stale row has a time of the turn before.
-#[test]
-fn a_stale_row_with_a_time_makes_no_scan() {
-    for name in ["Navtech_CTS350-X_Radar", "radar"] {
-        let root = folder();
-        let mut before = Vec::new();
-        for scan in 0..3 {
-            let start = START_US + scan * PERIOD_US;
-            let sweep = Sweep {
-                start,
-                ..Sweep::default()
-            };
-            let mut pixels = sweep.pixels();
-            if scan == 1 {
-                let measured = (sweep.rows - 2) * sweep.width();
-                pixels[measured..].copy_from_slice(&before[measured..]);
-            }
-            let path = root.path().join(name).join(format!("{start}.png"));
-            write_png(&path, sweep.width(), sweep.rows, &pixels);
-            before = pixels;
-        }
-        let mut dataset = opened(root.path());
-        assert!(read(dataset.as_mut(), 0).is_ok() && read(dataset.as_mut(), 2).is_ok());
-        let error = read(dataset.as_mut(), 1).unwrap_err().to_string();
-        assert!(error.contains("row 38"), "{error}");
-    }
-}

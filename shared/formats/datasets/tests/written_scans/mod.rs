@@ -12,8 +12,8 @@ mod series;
 
 use std::path::Path;
 
-use crate::common::read;
-use gyre_datasets::{Dataset, DatasetOptions, OpenError, ReadError, open};
+use crate::common::{assert_refused, read};
+use gyre_datasets::{Dataset, DatasetOptions, ReadError, open};
 use gyre_radar::OwnedScan;
 use tempfile::TempDir;
 
@@ -25,8 +25,9 @@ fn opened(root: &Path) -> Box<dyn Dataset> {
     open(root, &DatasetOptions::default()).unwrap()
 }
 
-fn rejected(root: &Path) -> OpenError {
-    open(root, &DatasetOptions::default()).err().unwrap()
+#[track_caller]
+fn assert_rejected(root: &Path, words: &str) {
+    assert_refused(open(root, &DatasetOptions::default()), words);
 }
 
 fn first_scan(root: &Path) -> Result<OwnedScan, ReadError> {

@@ -5,30 +5,21 @@ use std::path::Path;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
 
-use super::{folder, opened, options, rejected};
-use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_radiate};
+use super::{assert_rejected, folder, opened, options};
+use crate::common::{
+    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate,
+};
 
 /// Writes a scan of the turn `k`.
 fn write(path: &Path, k: i64) {
-    let start = START_US + k * PERIOD_US;
-    Sweep {
-        start,
-        ..Sweep::default()
-    }
-    .write(path);
+    Sweep::at(START_US + k * PERIOD_US).write(path);
 }
 
 fn names(dataset: &dyn Dataset) -> Vec<String> {
-    let name = |index| {
-        dataset
-            .file(index)
-            .file_name()
-            .unwrap()
-            .to_str()
-            .unwrap()
-            .to_owned()
-    };
-    (0..dataset.len()).map(name).collect()
+    let name = |index| dataset.file(index).file_name().unwrap().to_str().unwrap();
+    (0..dataset.len())
+        .map(|index| name(index).to_owned())
+        .collect()
 }
 
 #[test]
@@ -53,16 +44,12 @@ fn images_that_are_not_named_by_times_are_in_the_order_of_their_rows_times() {
             let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
             for index in 0..5 {
                 let stamp_ns = read(dataset.as_mut(), index).unwrap().geometry.stamp_ns;
-                let start_ns = (START_US + index as i64 * PERIOD_US) * 1000;
-                assert!(
-                    (stamp_ns - start_ns - 122_000_000).abs() < 4_000_000,
-                    "{format} {index}"
-                );
+                let middle_ns = (START_US + index as i64 * PERIOD_US + 122_000) * 1000;
                 let nominal_ns = dataset.nominal_stamp_ns(index).unwrap();
-                assert!(
-                    (nominal_ns - stamp_ns).abs() < 4_000_000,
-                    "{format} {index}"
-                );
+                for expected_ns in [middle_ns, nominal_ns] {
+                    let off_ns = stamp_ns - expected_ns;
+                    assert!(off_ns.abs() < 4_000_000, "{format} {index}: {off_ns}");
+                }
                 assert_eq!(again.nominal_stamp_ns(index), Some(nominal_ns));
                 assert_eq!(again.file(index), dataset.file(index));
             }
@@ -76,11 +63,7 @@ fn a_clock_that_is_set_back_breaks_the_time_of_numbered_images_once() {
     let images = root.path().join("radar");
     for k in 0..40 {
         let back_us = if k < 20 { 0 } else { 3_100_000 };
-        let start = START_US + k * PERIOD_US - back_us;
-        let sweep = Sweep {
-            start,
-            ..Sweep::default()
-        };
+        let sweep = Sweep::at(START_US + k * PERIOD_US - back_us);
         sweep.write(&images.join(format!("scan{}.png", k + 1)));
     }
     let expected: Vec<_> = (1..=40).map(|k| format!("scan{k}.png")).collect();
@@ -117,16 +100,12 @@ fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
     // The damaged image takes the place of one of the two that are missing.
     assert_eq!(timing["missing_scans"], 1);
     assert_eq!(timing["gaps"][0]["scan"], 4);
-    assert!(
-        findings.contains("ordered by the times of their first rows"),
-        "{findings}"
-    );
-    assert!(
-        findings.contains(
-            "1 image is left out, with the times of other images in the rows: `scan2 (1).png`"
-        ),
-        "{findings}"
-    );
+    for sentence in [
+        "ordered by the times of their first rows",
+        "1 image is left out, with the times of other images in the rows: `scan2 (1).png`",
+    ] {
+        assert!(findings.contains(sentence), "{findings}");
+    }
     let meaning = &report.figures["stamp_meaning"];
     assert!(!meaning.as_str().unwrap().contains("named"), "{meaning}");
 }
@@ -145,10 +124,8 @@ fn copies_and_hidden_files_are_no_scans_and_are_named() {
         }
         fs::copy(&files[0], files[0].with_file_name("overview.png")).unwrap();
         let dataset = opened(root.path());
-        let listed: Vec<_> = (0..dataset.len())
-            .map(|index| dataset.file(index))
-            .collect();
-        assert_eq!(listed, files);
+        let listed = (0..dataset.len()).map(|index| dataset.file(index));
+        assert!(listed.eq(files.iter()));
         let notes = dataset.notes().join(" ");
         let first = files[0].file_stem().unwrap().to_str().unwrap();
         let sentence = "10 images are left out, not of the series by name: `._";
@@ -156,11 +133,7 @@ fn copies_and_hidden_files_are_no_scans_and_are_named() {
     }
     let root = folder();
     fs::write(root.path().join("._1547131046353776.png"), "Mac OS X").unwrap();
-    assert!(
-        rejected(root.path())
-            .to_string()
-            .contains("is not a known dataset")
-    );
+    assert_rejected(root.path(), "is not a known dataset");
 }
 
 #[test]
@@ -175,16 +148,13 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
             let start = START_US + k * PERIOD_US;
             let sweep = Sweep {
                 rows: rows_of(k),
-                start,
-                ..Sweep::default()
+                ..Sweep::at(start)
             };
             sweep.write(&root.path().join(name).join(format!("{start}.png")));
         }
         let mut dataset = opened(root.path());
-        assert_eq!(
-            (dataset.format(), dataset.image_size().height),
-            (format, 40)
-        );
+        assert_eq!(dataset.format(), format);
+        assert_eq!(dataset.image_size().height, 40);
         for k in 0..6 {
             let scan = read(dataset.as_mut(), k).unwrap();
             let rows = rows_of(k as i64);
@@ -194,21 +164,15 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
                 Format::Oord => turn / rows as f32,
                 _ => turn * (13.0 + 140.0) / 5600.0,
             };
-            assert!(
-                (scan.azimuth_rad[1] - expected).abs() < 1e-6,
-                "{format}, scan {k}"
-            );
+            let off = scan.azimuth_rad[1] - expected;
+            assert!(off.abs() < 1e-6, "{format}, scan {k}");
             assert_eq!(scan.view().row(rows - 1)[5], Sweep::power(rows - 1, 5));
         }
         let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
         assert_eq!(report.figures["azimuths"], 40);
         assert_eq!(report.figures["rows"]["in_scan"][0], 38);
-        assert!(
-            report
-                .findings
-                .join(" ")
-                .contains("Scans have 38 to 40 rows")
-        );
+        let findings = report.findings.join(" ");
+        assert!(findings.contains("Scans have 38 to 40 rows"), "{findings}");
     }
 }
 
@@ -217,20 +181,15 @@ fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
     let root = folder();
     for k in 0..4 {
         let start = START_US + k * PERIOD_US;
-        let rows = if k == 0 { 20 } else { 40 };
         let sweep = Sweep {
-            rows,
-            start,
-            ..Sweep::default()
+            rows: if k == 0 { 20 } else { 40 },
+            ..Sweep::at(start)
         };
         let name = format!("Navtech_CTS350-X_Radar/{start}.png");
         sweep.write(&root.path().join(name));
     }
     let mut dataset = opened(root.path());
-    let error = read(dataset.as_mut(), 0).unwrap_err().to_string();
-    assert!(
-        error.contains("most images of the dataset are 71 columns x 40 rows"),
-        "{error}"
-    );
+    let expected = "most images of the dataset are 71 columns x 40 rows";
+    assert_refused(read(dataset.as_mut(), 0), expected);
     assert!((1..4).all(|index| read(dataset.as_mut(), index).is_ok()));
 }

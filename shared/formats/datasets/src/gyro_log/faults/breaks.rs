@@ -47,7 +47,6 @@ fn step_ns(samples: &[Sample], k: usize) -> i64 {
     samples[k].stamp_ns - samples[k - 1].stamp_ns
 }
 
-/// Stretches that follow one another in time and have the most samples.
 fn most(stretches: &[Range<usize>], samples: &[Sample]) -> Vec<Range<usize>> {
     let span = |stretch: &Range<usize>| {
         let stamps = samples[stretch.clone()].iter().map(|it| it.stamp_ns);

@@ -27,10 +27,8 @@ pub(super) fn spread(samples: &mut [Sample], faults: &mut LogFaults) {
     let steps = bursts().map(|burst| {
         let since_ns = before_ns.map(|ns| burst[0].stamp_ns.saturating_sub(ns));
         before_ns = Some(burst[0].stamp_ns);
-        (
-            burst.len(),
-            since_ns.unwrap_or_default() as f64 / burst.len() as f64,
-        )
+        let step_ns = since_ns.unwrap_or_default() as f64 / burst.len() as f64;
+        (burst.len(), step_ns)
     });
     let steps: Vec<(usize, f64)> = steps.collect();
     let forward = steps.iter().map(|(_, step_ns)| *step_ns);

@@ -51,14 +51,11 @@ pub(super) fn sort(samples: &[Sample], faults: &mut LogFaults) -> Vec<Sample> {
 /// For each place in the order the latest stamp that was written before, if that is later.
 fn late(samples: &[Sample], order: &[usize]) -> Vec<Option<i64>> {
     let mut latest_ns = i64::MIN;
-    let before: Vec<i64> = samples
-        .iter()
-        .map(|sample| {
-            let before = latest_ns;
-            latest_ns = latest_ns.max(sample.stamp_ns);
-            before
-        })
-        .collect();
+    let mut before = Vec::with_capacity(samples.len());
+    for sample in samples {
+        before.push(latest_ns);
+        latest_ns = latest_ns.max(sample.stamp_ns);
+    }
     let of = |k: &usize| (samples[*k].stamp_ns < before[*k]).then_some(before[*k]);
     order.iter().map(of).collect()
 }
