@@ -18,45 +18,25 @@ pub struct ByteBlock([u8; 64]);
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct FloatBlock([f32; 16]);
 
-impl ByteBlock {
-    /// Bytes per block.
-    pub const LEN: usize = 64;
+/// Implements an element of as many values as `LEN`.
+macro_rules! block {
+    ($block:ty, $len:literal, $type_name:literal) => {
+        impl $block {
+            pub const LEN: usize = $len;
 
-    /// Returns the number of blocks that hold this many bytes.
-    pub fn count(bytes: usize) -> usize {
-        bytes.div_ceil(Self::LEN)
-    }
+            /// Returns the number of blocks that hold so many values.
+            pub fn count(values: usize) -> usize {
+                values.div_ceil(Self::LEN)
+            }
+        }
+
+        impl Element for $block {
+            const TYPE_NAME: &'static str = $type_name;
+        }
+
+        const _: () = assert!(size_of::<$block>() == 64 && align_of::<$block>() == 64);
+    };
 }
 
-impl FloatBlock {
-    /// Values per block.
-    pub const LEN: usize = 16;
-
-    /// Returns the number of blocks that hold this many values.
-    pub fn count(values: usize) -> usize {
-        values.div_ceil(Self::LEN)
-    }
-}
-
-impl Element for ByteBlock {
-    const TYPE_NAME: &'static str = "gyre_byte_block_v1";
-}
-
-impl Element for FloatBlock {
-    const TYPE_NAME: &'static str = "gyre_float_block_v1";
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn blocks_are_one_cache_line() {
-        assert_eq!((size_of::<ByteBlock>(), align_of::<ByteBlock>()), (64, 64));
-        assert_eq!(
-            (size_of::<FloatBlock>(), align_of::<FloatBlock>()),
-            (64, 64)
-        );
-        assert_eq!((ByteBlock::count(64), ByteBlock::count(65)), (1, 2));
-    }
-}
+block!(ByteBlock, 64, "gyre_byte_block_v1");
+block!(FloatBlock, 16, "gyre_float_block_v1");

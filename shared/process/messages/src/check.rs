@@ -33,21 +33,45 @@ pub(crate) fn within(
     value: f64,
     bounds: RangeInclusive<f64>,
 ) -> Result<(), Violation> {
-    match bounds.contains(&value) {
-        true => Ok(()),
-        false => require(
-            false,
-            field,
-            value,
-            format_args!("from {} to {}", bounds.start(), bounds.end()),
-        ),
-    }
+    let (first, last) = bounds.clone().into_inner();
+    let expected = format_args!("from {first} to {last}");
+    require(bounds.contains(&value), field, value, expected)
 }
+
+/// Requires a code from 0 to `last`.
+pub(crate) fn code(
+    field: &str,
+    value: impl Into<u64>,
+    last: impl Into<u64>,
+) -> Result<(), Violation> {
+    let (value, last) = (value.into(), last.into());
+    require(value <= last, field, value, format_args!("0 to {last}"))
+}
+
+/// Numbers with the names of their fields.
+macro_rules! fields {
+    ($of:expr; $($field:ident)+) => {
+        [$((stringify!($field), $of.$field)),+]
+    };
+}
+pub(crate) use fields;
 
 pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
     fields
         .into_iter()
         .try_for_each(|(field, value)| require(value.is_finite(), field, value, "finite"))
+}
+
+pub(crate) fn not_negative<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
+    let holds = |value: f64| value >= 0.0 && value.is_finite();
+    fields
+        .into_iter()
+        .try_for_each(|(field, value)| require(holds(value), field, value, "finite, 0 or more"))
+}
+
+/// Names the part of a message whose field is wrong.
+pub(crate) fn of(part: &str, checked: Result<(), Violation>) -> Result<(), Violation> {
+    checked.map_err(|Violation(text)| Violation(format!("{part}{text}")))
 }
 
 /// Requires x and y (m) within `reach_m` and yaw (rad) within half a turn.
@@ -87,6 +111,12 @@ mod tests {
         samples: 2,
     };
 
+    fn is_refused<M: Message>(header: &M::Header, payload: &[M::Element], start: &str) {
+        let violation = M::check(header, payload, &LIMITS).map_err(|it| it.to_string());
+        let is_it = violation.as_ref().is_err_and(|it| it.starts_with(start));
+        assert!(is_it, "{start}: {violation:?}");
+    }
+
     /// The start of the sentence that refuses a header, and how to make it such.
     type Change<'a, H> = (&'a str, &'a dyn Fn(&mut H));
 
@@ -103,13 +133,7 @@ mod tests {
         for (field, change) in changes {
             let mut changed = header;
             change(&mut changed);
-            let violation = M::check(&changed, payload, &LIMITS).map_err(|v| v.to_string());
-            assert!(
-                violation
-                    .as_ref()
-                    .is_err_and(|text| text.starts_with(field)),
-                "{field}: {violation:?}"
-            );
+            is_refused::<M>(&changed, payload, field);
             *crate::Header::item_mut(&mut changed) = Item {
                 flags: flag::END,
                 ..Item::default()
@@ -124,13 +148,9 @@ mod tests {
             RotationHeader::default(),
             &[],
             &[
-                ("flags is 16", &|header| header.item.flags = 16),
-                ("previous_scan is 3", &|header| {
-                    header.item.previous_scan = 3
-                }),
-                ("numbered_from is 2", &|header| {
-                    header.item.numbered_from = 2
-                }),
+                ("flags is 16", &|it| it.item.flags = 16),
+                ("previous_scan is 3", &|it| it.item.previous_scan = 3),
+                ("numbered_from is 2", &|it| it.item.numbered_from = 2),
             ],
         );
     }
@@ -141,18 +161,12 @@ mod tests {
             RotationHeader::default(),
             &[],
             &[
-                ("angle_rad is NaN", &|header| {
-                    header.rotation.angle_rad = f64::NAN
+                ("angle_rad is NaN", &|it| it.rotation.angle_rad = f64::NAN),
+                ("angle_rad is -3.5", &|it| it.rotation.angle_rad = -3.5),
+                ("variance_rad2 is -1", &|it| {
+                    it.rotation.variance_rad2 = -1.0
                 }),
-                ("angle_rad is -3.5", &|header| {
-                    header.rotation.angle_rad = -3.5
-                }),
-                ("variance_rad2 is -1", &|header| {
-                    header.rotation.variance_rad2 = -1.0
-                }),
-                ("score is inf", &|header| {
-                    header.rotation.score = f64::INFINITY
-                }),
+                ("score is inf", &|it| it.rotation.score = f64::INFINITY),
             ],
         );
     }
@@ -163,25 +177,17 @@ mod tests {
             MotionHeader::default(),
             &[],
             &[
-                ("x_m is NaN", &|header| header.motion.x_m = f64::NAN),
-                ("y_m is -61", &|header| header.motion.y_m = -61.0),
-                ("yaw_rad is 3.2", &|header| header.motion.yaw_rad = 3.2),
-                ("searched[0] is 6.5", &|header| {
-                    header.motion.searched[0] = 6.5
-                }),
-                ("covariance", &|header| header.motion.covariance[1] = 1.0),
-                ("interval_ns is -1", &|header| {
-                    header.motion.interval_ns = -1
-                }),
-                ("score is NaN", &|header| header.motion.score = f64::NAN),
-                ("angle_rad is 9", &|header| {
-                    header.motion.rotation.angle_rad = 9.0
-                }),
-                ("outcome is 4", &|header| {
-                    header.motion.refinement.outcome = 4
-                }),
-                ("overlap is NaN", &|header| {
-                    header.motion.refinement.overlap = f64::NAN
+                ("x_m is NaN", &|it| it.motion.x_m = f64::NAN),
+                ("y_m is -61", &|it| it.motion.y_m = -61.0),
+                ("yaw_rad is 3.2", &|it| it.motion.yaw_rad = 3.2),
+                ("searched[0] is 6.5", &|it| it.motion.searched[0] = 6.5),
+                ("covariance", &|it| it.motion.covariance[1] = 1.0),
+                ("interval_ns is -1", &|it| it.motion.interval_ns = -1),
+                ("score is NaN", &|it| it.motion.score = f64::NAN),
+                ("angle_rad is 9", &|it| it.motion.rotation.angle_rad = 9.0),
+                ("outcome is 4", &|it| it.motion.refinement.outcome = 4),
+                ("overlap is NaN", &|it| {
+                    it.motion.refinement.overlap = f64::NAN
                 }),
             ],
         );
@@ -193,10 +199,10 @@ mod tests {
             PoseHeader::default(),
             &[],
             &[
-                ("x_m is NaN", &|header| header.x_m = f64::NAN),
-                ("y_m is 1000000000", &|header| header.y_m = 1e9),
-                ("covariance", &|header| header.covariance[0] = -1.0),
-                ("x_m is inf", &|header| header.motion.x_m = f64::INFINITY),
+                ("x_m is NaN", &|it| it.x_m = f64::NAN),
+                ("y_m is 1000000000", &|it| it.y_m = 1e9),
+                ("covariance", &|it| it.covariance[0] = -1.0),
+                ("x_m is inf", &|it| it.motion.x_m = f64::INFINITY),
             ],
         );
     }
@@ -213,12 +219,12 @@ mod tests {
             header,
             &[],
             &[
-                ("earlier_seq is 9", &|header| header.earlier_seq = 9),
-                ("x_m is 6.5", &|header| header.x_m = 6.5),
-                ("yaw_rad is NaN", &|header| header.yaw_rad = f64::NAN),
-                ("covariance", &|header| header.covariance[0] = -1.0),
-                ("correlation is 1.5", &|header| header.correlation = 1.5),
-                ("loops is 0", &|header| header.loops = 0),
+                ("earlier_seq is 9", &|it| it.earlier_seq = 9),
+                ("x_m is 6.5", &|it| it.x_m = 6.5),
+                ("yaw_rad is NaN", &|it| it.yaw_rad = f64::NAN),
+                ("covariance", &|it| it.covariance[0] = -1.0),
+                ("correlation is 1.5", &|it| it.correlation = 1.5),
+                ("loops is 0", &|it| it.loops = 0),
             ],
         );
     }
@@ -233,12 +239,10 @@ mod tests {
             header,
             &[],
             &[
-                ("x_m is inf", &|header| header.x_m = f64::INFINITY),
-                ("yaw_rad is 4", &|header| header.yaw_rad = 4.0),
-                ("covariance", &|header| {
-                    header.keyframe_covariance[0] = f64::NAN
-                }),
-                ("keyframes is 0", &|header| header.keyframes = 0),
+                ("x_m is inf", &|it| it.x_m = f64::INFINITY),
+                ("yaw_rad is 4", &|it| it.yaw_rad = 4.0),
+                ("covariance", &|it| it.keyframe_covariance[0] = f64::NAN),
+                ("keyframes is 0", &|it| it.keyframes = 0),
             ],
         );
     }
@@ -249,13 +253,11 @@ mod tests {
             FixHeader::default(),
             &[],
             &[
-                ("y_m is inf", &|header| header.y_m = f64::INFINITY),
-                ("yaw_rad is 4", &|header| header.yaw_rad = 4.0),
-                ("covariance", &|header| header.covariance[0] = -1.0),
-                ("correlation is NaN", &|header| {
-                    header.correlation = f64::NAN
-                }),
-                ("status is 4", &|header| header.status = 4),
+                ("y_m is inf", &|it| it.y_m = f64::INFINITY),
+                ("yaw_rad is 4", &|it| it.yaw_rad = 4.0),
+                ("covariance", &|it| it.covariance[0] = -1.0),
+                ("correlation is NaN", &|it| it.correlation = f64::NAN),
+                ("status is 4", &|it| it.status = 4),
             ],
         );
     }
@@ -274,12 +276,12 @@ mod tests {
             header,
             &payload,
             &[
-                ("n is 4", &|header| header.n = 4),
-                ("rasters is 2", &|header| header.rasters = 2),
-                ("cell_m is 0.5", &|header| header.cell_m = 0.5),
-                ("points is 3", &|header| header.points = 3),
-                ("mask is 3", &|header| header.mask = 3),
-                ("twist[1] is NaN", &|header| header.twist[1] = f32::NAN),
+                ("n is 4", &|it| it.n = 4),
+                ("rasters is 2", &|it| it.rasters = 2),
+                ("cell_m is 0.5", &|it| it.cell_m = 0.5),
+                ("points is 3", &|it| it.points = 3),
+                ("mask is 3", &|it| it.mask = 3),
+                ("twist[1] is NaN", &|it| it.twist[1] = f32::NAN),
             ],
         );
         assert!(Masked::check(&header, &payload[..1], &LIMITS).is_err());
@@ -289,8 +291,7 @@ mod tests {
             .chunks_exact(16)
             .map(|values| bytemuck::pod_read_unaligned(bytemuck::cast_slice(values)))
             .collect::<Vec<_>>();
-        let violation = Masked::check(&header, blocks, &LIMITS).map_err(|v| v.to_string());
-        assert!(violation.is_err_and(|text| text.starts_with("point 1 is")));
+        is_refused::<Masked>(&header, blocks, "point 1 is");
     }
 
     #[test]
@@ -309,24 +310,20 @@ mod tests {
             header,
             &[ByteBlock::zeroed()],
             &[
-                ("azimuths is 0", &|header| header.azimuths = 0),
-                ("azimuths is 9999", &|header| header.azimuths = 9999),
-                ("its payload of 64 bytes is shorter", &|header| {
-                    header.bins = 17
+                ("azimuths is 0", &|it| it.azimuths = 0),
+                ("azimuths is 9999", &|it| it.azimuths = 9999),
+                ("its payload of 64 bytes is shorter", &|it| it.bins = 17),
+                ("its payload of 64 bytes is shorter", &|it| {
+                    it.first_byte = u32::MAX
                 }),
-                ("its payload of 64 bytes is shorter", &|header| {
-                    header.first_byte = u32::MAX
+                ("the scan's range resolution", &|it| {
+                    it.range_resolution_m = f32::NAN
                 }),
-                ("the scan's range resolution", &|header| {
-                    header.range_resolution_m = f32::NAN
+                ("the scan's stamp", &|it| it.item.stamp_ns = 12_000_000_000),
+                ("row 2: stamp", &|it| {
+                    it.azimuth_stamp_ns[2] = 12_000_000_000
                 }),
-                ("the scan's stamp", &|header| {
-                    header.item.stamp_ns = 12_000_000_000
-                }),
-                ("row 2: stamp", &|header| {
-                    header.azimuth_stamp_ns[2] = 12_000_000_000
-                }),
-                ("azimuth 3", &|header| header.azimuth_rad[3] = f32::INFINITY),
+                ("azimuth 3", &|it| it.azimuth_rad[3] = f32::INFINITY),
             ],
         );
     }
@@ -347,7 +344,7 @@ mod tests {
             header,
             &payload,
             &[
-                ("samples is 3", &|header| header.samples = 3),
+                ("samples is 3", &|it| it.samples = 3),
                 ("its payload of 192 bytes is shorter", &|header| {
                     header.stride = 64;
                     header.azimuths = 2;
@@ -359,17 +356,11 @@ mod tests {
             (Sample::yaw_rate(2, f64::NAN), "sample 1 is"),
             (Sample::yaw_rate(2, 40.0), "sample 1 is"),
             (unknown, "sample 1 is"),
-            (Sample::yaw_rate(1, 0.5), "sample 1 is not later"),
+            (Sample::yaw_rate(1, 0.5), "a sample is not later"),
         ] {
             let bytes = bytemuck::cast_slice_mut(&mut payload);
             header.set_samples(bytes, &[good[0], bad], 0);
-            let violation = Scan::check(&header, &payload, &LIMITS).map_err(|v| v.to_string());
-            assert!(
-                violation
-                    .as_ref()
-                    .is_err_and(|text| text.starts_with(expected)),
-                "{violation:?}"
-            );
+            is_refused::<Scan>(&header, &payload, expected);
         }
     }
 }

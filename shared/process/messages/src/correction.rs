@@ -4,39 +4,24 @@ use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose as PlanarPose, covariance, pose};
 
 use crate::{
-    block::FloatBlock,
-    check::{Violation, covariance as check_covariance, planar, require},
+    check::{Violation, covariance as check_covariance, fields, planar, require},
     follower::FollowerId,
     item::Item,
-    limits::{History, Limits},
-    message::{Message, Sender, header},
+    limits::Limits,
+    message::{Sender, header, message},
     pose::MAX_DISTANCE_M,
 };
 
-/// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the
-/// correction jumps when a loop is closed (REP-105: the transform from `map` to `odom`).
-#[derive(Debug)]
-pub enum Correction {}
-
-impl Message for Correction {
-    const TOPIC: &'static str = "correction";
-    const SENDER: Sender = Sender::Follower(FollowerId::Trajectory);
-    const READERS: usize = 0;
-    const HISTORY: History = History::Latest;
-    type Header = CorrectionHeader;
-    type Element = FloatBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        _: &[Self::Element],
-        _: &Limits,
-    ) -> Result<(), Violation> {
-        header.check()
-    }
+message! {
+    /// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the
+    /// correction jumps when a loop is closed (REP-105: the transform from `map` to `odom`).
+    Correction: "correction", CorrectionHeader, Sender::Follower(FollowerId::Trajectory),
+    0 readers, Latest
 }
 header!(CorrectionHeader, "gyre_correction_header_v4");
 
-/// The pose of the odometry frame in the map frame.
+/// The pose of the odometry frame in the map frame: x forward, y to the left, yaw
+/// counter-clockwise, in (-pi, pi].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct CorrectionHeader {
@@ -47,25 +32,17 @@ pub struct CorrectionHeader {
     pub keyframe_seq: u64,
     pub keyframes: u64,
     pub loops: u64,
-    /// Forward, m.
     pub x_m: f64,
-    /// To the left, m.
     pub y_m: f64,
-    /// Counter-clockwise, rad, in (-pi, pi].
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame, not scaled by
-    /// residuals: see [`covariance::Packed`].
+    /// residuals.
     pub keyframe_covariance: covariance::Packed,
 }
 
 impl CorrectionHeader {
-    fn check(&self) -> Result<(), Violation> {
-        let correction = [
-            ("x_m", self.x_m),
-            ("y_m", self.y_m),
-            ("yaw_rad", self.yaw_rad),
-        ];
-        planar(correction, MAX_DISTANCE_M)?;
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+        planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         check_covariance(&self.keyframe_covariance)?;
         require(self.keyframes > 0, "keyframes", self.keyframes, "1 or more")
     }

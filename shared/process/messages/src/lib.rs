@@ -1,24 +1,8 @@
 //! Wire types: the messages that Gyre's processes exchange, their versions and limits.
 //!
-//! Each message is a fixed header and a slice of 64-byte aligned elements, on a topic of its own:
-//!
-//! | topic | header | payload |
-//! |---|---|---|
-//! | `scan` | [`ScanHeader`] | the sweep's bytes, in [`ByteBlock`]s |
-//! | `masked` | [`MaskedHeader`] | one or two rasters and the scan's points, in [`FloatBlock`]s |
-//! | `rotation` | [`RotationHeader`] | empty |
-//! | `motion` | [`MotionHeader`] | empty |
-//! | `refined` | [`MotionHeader`] | empty |
-//! | `pose` | [`PoseHeader`] | empty |
-//! | `loop` | [`LoopHeader`] | empty |
-//! | `correction` | [`CorrectionHeader`] | empty |
-//! | `fix` | [`FixHeader`] | empty |
-//! | `objects` | [`ObjectsHeader`] | empty |
-//!
-//! The last four exist only in runs with the follower that publishes them: [`FollowerId`]. All
-//! headers start with an [`Item`], which identifies the scan and carries the time stamps of each
-//! stage. Type names carry a version, so that two builds of different versions reject each other's
-//! messages instead of misreading them.
+//! Each message is a fixed header, which starts with an [`Item`], and a slice of 64-byte aligned
+//! elements, on a topic of its own: see [`topics()`]. Type names carry a version, so that two builds
+//! of different versions reject each other's messages instead of misreading them.
 //!
 //! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its
 //! enforcement), one file per message, `topics`.
@@ -36,6 +20,7 @@ mod limits;
 mod masked;
 mod message;
 mod motion;
+mod named;
 mod numbering;
 mod objects;
 mod pose;
@@ -55,7 +40,7 @@ pub use correction::{Correction, CorrectionHeader};
 pub use fix::{Fix, FixHeader, fix_status};
 pub use follower::FollowerId;
 pub use item::{Hop, HopTimes, Hops, Item, StageId, flag};
-pub use limits::{History, Limits, TopicSizes, Window, WindowError};
+pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Element, Header, Message, Sender};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};

@@ -19,8 +19,9 @@ pub trait Header: Pod + Default + Debug {
     const TYPE_NAME: &'static str;
     /// The scan that the message is about.
     fn item(&self) -> &Item;
-    /// The same, to fill in.
     fn item_mut(&mut self) -> &mut Item;
+    /// Checks all but the item; the end of the stream has no content.
+    fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation>;
 }
 
 /// An element of payloads, plain data too.
@@ -55,11 +56,9 @@ impl Sender {
 pub trait Message: 'static {
     /// The name of the topic.
     const TOPIC: &'static str;
-    /// The process that publishes the topic.
     const SENDER: Sender;
     /// Number of processes that subscribe to the topic.
     const READERS: usize;
-    /// The reach of the publisher's history.
     const HISTORY: History;
     type Header: Header;
     /// The element that the payload is a slice of.
@@ -81,16 +80,9 @@ pub trait Message: 'static {
         item.check()?;
         match item.is(flag::END) {
             true => Ok(()),
-            false => Self::check_content(header, payload, limits),
+            false => header.check(bytemuck::cast_slice(payload), limits),
         }
     }
-
-    /// Checks all but the item; the end of the stream has no content.
-    fn check_content(
-        header: &Self::Header,
-        payload: &[Self::Element],
-        limits: &Limits,
-    ) -> Result<(), Violation>;
 
     /// Returns the bytes of the payload that the header describes; what follows them in memory has
     /// no meaning. `None`: more than a payload can have.
@@ -98,13 +90,12 @@ pub trait Message: 'static {
         Some(0)
     }
 
-    /// The sizes of the topic's queues.
     fn sizes(window: &Window) -> TopicSizes {
         window.queues(Self::HISTORY, Self::READERS)
     }
 }
 
-/// Implements [`Header`] for a type whose first field is `item`.
+/// Implements [`Header`] for a type whose first field is `item`, and which has `check_content`.
 macro_rules! header {
     ($header:ty, $type_name:literal) => {
         const _: () = assert!(std::mem::offset_of!($header, item) == 0);
@@ -115,10 +106,41 @@ macro_rules! header {
             fn item(&self) -> &$crate::item::Item {
                 &self.item
             }
+
             fn item_mut(&mut self) -> &mut $crate::item::Item {
                 &mut self.item
+            }
+
+            fn check(
+                &self,
+                payload: &[u8],
+                limits: &$crate::limits::Limits,
+            ) -> Result<(), $crate::check::Violation> {
+                self.check_content(payload, limits)
             }
         }
     };
 }
 pub(crate) use header;
+
+/// Defines a message without a payload.
+macro_rules! message {
+    (
+        $(#[$doc:meta])*
+        $message:ident: $topic:literal, $header:ty, $sender:expr, $readers:literal readers, $history:ident
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub enum $message {}
+
+        impl $crate::message::Message for $message {
+            const TOPIC: &'static str = $topic;
+            const SENDER: $crate::message::Sender = $sender;
+            const READERS: usize = $readers;
+            const HISTORY: $crate::limits::History = $crate::limits::History::$history;
+            type Header = $header;
+            type Element = $crate::block::FloatBlock;
+        }
+    };
+}
+pub(crate) use message;

@@ -6,49 +6,31 @@ use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, Refined};
 
 use crate::{
-    block::FloatBlock,
-    check::{Violation, covariance as check_covariance, finite, planar, require},
+    check::{Violation, covariance as check_covariance, fields, finite, planar, require, within},
     item::{Item, StageId},
-    limits::{History, Limits},
-    message::{Message, Sender, header},
+    limits::Limits,
+    message::{Sender, header, message},
     refinement::RefinementRecord,
     rotation::RotationEstimate,
 };
 
-/// The motion from the previous scan to this one.
-#[derive(Debug)]
-pub enum Motion {}
-
-impl Message for Motion {
-    const TOPIC: &'static str = "motion";
-    const SENDER: Sender = Sender::Stage(&[StageId::TranslationSearch, StageId::JointSearch]);
-    // Masking, and the next stage in the stream.
-    const READERS: usize = 2;
-    const HISTORY: History = History::Feedback;
-    type Header = MotionHeader;
-    type Element = FloatBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        _: &[Self::Element],
-        limits: &Limits,
-    ) -> Result<(), Violation> {
-        header.motion.check(limits)
-    }
+message! {
+    /// The motion from the previous scan to this one. Masking reads it, and the next stage in the
+    /// stream.
+    Motion: "motion", MotionHeader,
+    Sender::Stage(&[StageId::TranslationSearch, StageId::JointSearch]), 2 readers, Feedback
 }
 header!(MotionHeader, "gyre_motion_header_v11");
 
-/// The pose of this scan's frame in the previous scan's frame, with its covariance.
+/// The pose of this scan's frame in the previous scan's frame, with its covariance: x forward, y to
+/// the left, yaw counter-clockwise.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MotionEstimate {
-    /// Forward, m.
     pub x_m: f64,
-    /// To the left, m.
     pub y_m: f64,
-    /// Counter-clockwise, rad.
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw): see [`covariance::Packed`].
+    /// Covariance of (x, y, yaw).
     pub covariance: covariance::Packed,
     /// Share of the covariance that is drift, 0 to 1: see [`OdometryMotion::drift_share`].
     pub drift_share: f64,
@@ -65,7 +47,6 @@ pub struct MotionEstimate {
     /// The searched motion: x, y (m), yaw (rad). It is the same on every topic, because motion
     /// compensation uses it.
     pub searched: [f64; 3],
-    /// The result of the refinement.
     pub refinement: RefinementRecord,
 }
 
@@ -79,7 +60,6 @@ pub struct SearchedMotion {
 }
 
 impl SearchedMotion {
-    /// Returns the constant velocity of this motion.
     pub fn twist(&self) -> Twist {
         Twist::from_motion(&self.motion, self.interval_ns as f64 * 1e-9)
     }
@@ -91,11 +71,7 @@ const MAX_EXTENTS: f64 = 10.0;
 
 impl MotionEstimate {
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), Violation> {
-        let motion = [
-            ("x_m", self.x_m),
-            ("y_m", self.y_m),
-            ("yaw_rad", self.yaw_rad),
-        ];
+        let motion = fields![self; x_m y_m yaw_rad];
         planar(motion, MAX_EXTENTS * limits.extent_m())?;
         let [x_m, y_m, yaw_rad] = self.searched;
         let searched = [
@@ -105,29 +81,18 @@ impl MotionEstimate {
         ];
         planar(searched, limits.extent_m())?;
         check_covariance(&self.covariance)?;
-        for (key, value) in [
-            ("drift_share", self.drift_share),
-            ("scale_sigma", self.scale_sigma),
-        ] {
-            require((0.0..=1.0).contains(&value), key, value, "0 to 1")?;
-        }
-        let intervals = 0..=MAX_INTERVAL_NS;
+        within("drift_share", self.drift_share, 0.0..=1.0)?;
+        within("scale_sigma", self.scale_sigma, 0.0..=1.0)?;
+        let interval_ns = self.interval_ns;
+        let holds = (0..=MAX_INTERVAL_NS).contains(&interval_ns);
         let expected = format_args!("from 0 to {MAX_INTERVAL_NS}");
-        require(
-            intervals.contains(&self.interval_ns),
-            "interval_ns",
-            self.interval_ns,
-            expected,
-        )?;
-        finite([
-            ("score", self.score),
-            ("runner_up_score", self.runner_up_score),
-        ])?;
+        require(holds, "interval_ns", interval_ns, expected)?;
+        finite(fields![self; score runner_up_score])?;
         self.rotation.check()?;
         self.refinement.check()
     }
 
-    /// Creates a motion from the result of a search, with the rotation that it was searched with.
+    /// Returns the result of a search, with the rotation that it was searched with.
     pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
         Self {
             x_m: found.x_m,
@@ -162,7 +127,6 @@ impl MotionEstimate {
         }
     }
 
-    /// Returns the motion with its covariance.
     pub fn motion(&self) -> OdometryMotion {
         OdometryMotion {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),
@@ -188,4 +152,10 @@ pub struct MotionHeader {
     pub item: Item,
     /// The motion; all zero where the chain starts.
     pub motion: MotionEstimate,
+}
+
+impl MotionHeader {
+    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), Violation> {
+        self.motion.check(limits)
+    }
 }

@@ -3,12 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::{
-    block::FloatBlock,
-    check::{Violation, finite, planar, require, within},
+    check::{Violation, fields, finite, of, planar, require, within},
     follower::FollowerId,
     item::Item,
-    limits::{History, Limits},
-    message::{Message, Sender, header},
+    limits::Limits,
+    message::{Sender, header, message},
     pose::MAX_DISTANCE_M,
 };
 
@@ -18,25 +17,9 @@ pub const MAX_LISTED: usize = 64;
 /// Largest length and width of an object, m.
 const MAX_SIZE_M: f64 = 1e3;
 
-/// The objects at the time of a scan.
-#[derive(Debug)]
-pub enum Objects {}
-
-impl Message for Objects {
-    const TOPIC: &'static str = "objects";
-    const SENDER: Sender = Sender::Follower(FollowerId::Objects);
-    const READERS: usize = 0;
-    const HISTORY: History = History::Latest;
-    type Header = ObjectsHeader;
-    type Element = FloatBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        _: &[Self::Element],
-        _: &Limits,
-    ) -> Result<(), Violation> {
-        header.check()
-    }
+message! {
+    /// The objects at the time of a scan.
+    Objects: "objects", ObjectsHeader, Sender::Follower(FollowerId::Objects), 0 readers, Latest
 }
 header!(ObjectsHeader, "gyre_objects_header_v3");
 
@@ -46,16 +29,14 @@ header!(ObjectsHeader, "gyre_objects_header_v3");
 pub struct ObjectsHeader {
     /// The item of the scan's pose.
     pub item: Item,
-    /// Pose of the sensor at the scan's time: forward, m.
+    /// Pose of the sensor at the scan's time: x forward, y to the left, yaw counter-clockwise, in
+    /// (-pi, pi].
     pub x_m: f64,
-    /// To the left, m.
     pub y_m: f64,
-    /// Counter-clockwise, rad, in (-pi, pi].
     pub yaw_rad: f64,
     /// Objects that move, or did and stand now.
     pub objects: u64,
     pub moving: u64,
-    /// Number of objects in `list`.
     pub listed: u64,
     /// The objects nearest to the vehicle, the nearest first; zero beyond `listed`.
     pub list: [ListedObject; MAX_LISTED],
@@ -67,19 +48,15 @@ pub struct ObjectsHeader {
 pub struct ListedObject {
     /// The identity: counted from 1, and given to no other object of the run.
     pub id: u64,
-    /// The centre: x, m.
+    /// The centre, and the heading in (-pi, pi].
     pub x_m: f64,
-    /// The centre: y, m.
     pub y_m: f64,
-    /// The heading, rad, in (-pi, pi].
     pub yaw_rad: f64,
-    /// The velocity over ground along x, m/s.
+    /// The velocity over ground.
     pub vx_mps: f64,
-    /// The velocity over ground along y, m/s.
     pub vy_mps: f64,
-    /// The length along the heading, m.
+    /// Along the heading, and across it.
     pub length_m: f64,
-    /// The width across it, m.
     pub width_m: f64,
     /// Covariance of the centre: xx, xy and yy, m².
     pub position_covariance: [f64; 3],
@@ -102,19 +79,15 @@ impl ObjectsHeader {
         &self.list[..(self.listed as usize).min(MAX_LISTED)]
     }
 
-    fn check(&self) -> Result<(), Violation> {
-        let pose = [
-            ("x_m", self.x_m),
-            ("y_m", self.y_m),
-            ("yaw_rad", self.yaw_rad),
-        ];
-        planar(pose, MAX_DISTANCE_M)?;
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+        planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         let fits = self.moving <= self.objects;
         require(fits, "moving", self.moving, "at most objects")?;
         let fits = self.listed == self.objects.min(MAX_LISTED as u64);
         let expected = format_args!("objects, at most {MAX_LISTED}");
         require(fits, "listed", self.listed, expected)?;
-        self.list().iter().try_for_each(ListedObject::check)
+        let checked = self.list().iter().try_for_each(ListedObject::check);
+        of("an object's ", checked)
     }
 }
 
@@ -123,27 +96,18 @@ impl ListedObject {
         self.moving != 0
     }
 
-    /// Returns the speed over ground, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.vx_mps.hypot(self.vy_mps)
     }
 
     fn check(&self) -> Result<(), Violation> {
-        let place = [
-            ("an object's x_m", self.x_m),
-            ("an object's y_m", self.y_m),
-            ("an object's yaw_rad", self.yaw_rad),
-        ];
-        planar(place, MAX_DISTANCE_M)?;
-        within("an object's length_m", self.length_m, 0.0..=MAX_SIZE_M)?;
-        within("an object's width_m", self.width_m, 0.0..=MAX_SIZE_M)?;
-        finite([
-            ("an object's vx_mps", self.vx_mps),
-            ("an object's vy_mps", self.vy_mps),
-        ])?;
+        planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
+        within("length_m", self.length_m, 0.0..=MAX_SIZE_M)?;
+        within("width_m", self.width_m, 0.0..=MAX_SIZE_M)?;
+        finite(fields![self; vx_mps vy_mps])?;
         let covariances = [self.position_covariance, self.velocity_covariance];
         let is_finite = covariances.as_flattened().iter().all(|it| it.is_finite());
-        require(is_finite, "an object's covariance", "not finite", "finite")
+        require(is_finite, "covariance", "not finite", "finite")
     }
 }
 
@@ -151,25 +115,14 @@ impl ListedObject {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits = Limits {
-        scan_bytes: 64,
-        raster_cells: 9,
-        cell_m: 2.0,
-        rasters: 1,
-        points: 2,
-        samples: 2,
-    };
-
-    /// A header with two objects, one of them moving.
+    /// Two objects, one of them moving.
     fn header() -> ObjectsHeader {
         let car = ListedObject {
-            id: 3,
             x_m: 20.0,
             yaw_rad: 3.0,
             vx_mps: -9.0,
             length_m: 4.4,
             width_m: 1.9,
-            moving: 1,
             ..ListedObject::default()
         };
         let mut header = ObjectsHeader {
@@ -178,14 +131,17 @@ mod tests {
             listed: 2,
             ..ObjectsHeader::default()
         };
-        header.list[..2].copy_from_slice(&[car, ListedObject { moving: 0, ..car }]);
+        header.list[..2].fill(car);
         header
+    }
+
+    fn check(header: &ObjectsHeader) -> Result<(), Violation> {
+        Objects::check(header, &[], &Limits::default())
     }
 
     #[test]
     fn a_list_that_is_not_that_of_its_objects_is_refused() {
-        assert_eq!(Objects::check(&header(), &[], &LIMITS), Ok(()));
-        assert_eq!(header().list().len(), 2);
+        assert_eq!(check(&header()), Ok(()));
         type Change = fn(&mut ObjectsHeader);
         let changes: [(&str, Change); 8] = [
             ("x_m", |it| it.x_m = f64::NAN),
@@ -196,22 +152,21 @@ mod tests {
             ("an object's vx_mps", |it| it.list[0].vx_mps = f64::NAN),
             ("an object's width_m", |it| it.list[1].width_m = -1.0),
             ("an object's covariance", |it| {
-                it.list[0].velocity_covariance[2] = f64::NAN;
+                it.list[0].velocity_covariance[2] = f64::NAN
             }),
         ];
         for (field, change) in changes {
             let mut header = header();
             change(&mut header);
-            let refused = Objects::check(&header, &[], &LIMITS).map_err(|it| it.to_string());
+            let refused = check(&header).map_err(|it| it.to_string());
             let names_it = refused.as_ref().is_err_and(|it| it.starts_with(field));
             assert!(names_it, "{field}: {refused:?}");
         }
         // Unlisted entries are not checked.
         let mut long = header();
         long.list[2].y_m = f64::NAN;
-        assert_eq!(Objects::check(&long, &[], &LIMITS), Ok(()));
-        let mut many = header();
-        (many.objects, many.listed) = (100, 64);
-        assert_eq!(Objects::check(&many, &[], &LIMITS), Ok(()));
+        assert_eq!(check(&long), Ok(()));
+        (long.objects, long.listed, long.list[2].y_m) = (100, 64, 0.0);
+        assert_eq!(check(&long), Ok(()));
     }
 }

@@ -6,32 +6,16 @@ use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::RotationMatch;
 
 use crate::{
-    block::FloatBlock,
-    check::{Violation, finite, within},
+    check::{Violation, fields, finite, within},
     item::{Item, StageId},
-    limits::{History, Limits},
-    message::{Message, Sender, header},
+    limits::Limits,
+    message::{Sender, header, message},
 };
 
-/// The rotation from the previous scan to this one.
-#[derive(Debug)]
-pub enum Rotation {}
-
-impl Message for Rotation {
-    const TOPIC: &'static str = "rotation";
-    const SENDER: Sender = Sender::Stage(&[StageId::RotationSearch]);
-    const READERS: usize = 1;
-    const HISTORY: History = History::Stream;
-    type Header = RotationHeader;
-    type Element = FloatBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        _: &[Self::Element],
-        _: &Limits,
-    ) -> Result<(), Violation> {
-        header.rotation.check()
-    }
+message! {
+    /// The rotation from the previous scan to this one.
+    Rotation: "rotation", RotationHeader, Sender::Stage(&[StageId::RotationSearch]),
+    1 readers, Stream
 }
 header!(RotationHeader, "gyre_rotation_header_v6");
 
@@ -45,9 +29,8 @@ pub struct RotationEstimate {
     pub variance_rad2: f64,
     /// Height of the correlation peak, at most 1.
     pub score: f64,
-    /// Angle of the second highest peak, rad.
+    /// Angle, rad, and height of the second highest peak.
     pub runner_up_rad: f64,
-    /// Height of the second highest peak.
     pub runner_up_score: f64,
 }
 
@@ -57,10 +40,7 @@ impl RotationEstimate {
         within("angle_rad", self.angle_rad, turn.clone())?;
         within("variance_rad2", self.variance_rad2, 0.0..=f64::MAX)?;
         within("runner_up_rad", self.runner_up_rad, turn)?;
-        finite([
-            ("score", self.score),
-            ("runner_up_score", self.runner_up_score),
-        ])
+        finite(fields![self; score runner_up_score])
     }
 }
 
@@ -96,4 +76,10 @@ pub struct RotationHeader {
     pub item: Item,
     /// The rotation; all zero where the chain starts.
     pub rotation: RotationEstimate,
+}
+
+impl RotationHeader {
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+        self.rotation.check()
+    }
 }

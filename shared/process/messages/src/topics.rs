@@ -27,9 +27,7 @@ const SAMPLE_OVERHEAD: usize = 192;
 pub struct WireType {
     /// The name, with the version.
     pub name: &'static str,
-    /// Bytes of a value.
     pub bytes: usize,
-    /// The alignment of a value in memory.
     pub alignment: usize,
 }
 
@@ -47,9 +45,7 @@ impl WireType {
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     pub name: &'static str,
-    /// The process that publishes it.
     pub sender: Sender,
-    /// The sizes of its queues.
     pub sizes: fn(&Window) -> TopicSizes,
     /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
@@ -59,7 +55,6 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// The topic of a message type.
     pub const fn of<M: Message>() -> Self {
         Self {
             name: M::TOPIC,
@@ -72,7 +67,7 @@ impl Topic {
     }
 
     /// Returns the bytes of its largest sample in shared memory.
-    pub fn max_sample_bytes(&self, limits: &Limits) -> usize {
+    fn max_sample_bytes(&self, limits: &Limits) -> usize {
         SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
     }
 }
@@ -123,15 +118,14 @@ fn bookkeeping(window: &Window) -> usize {
         * PAGE
 }
 
-/// The shared memory that a run needs.
+/// The shared memory that a run needs, bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
-    /// Bytes of each topic's segment, by topic, and of the transport's bookkeeping.
+    /// Of each topic's segment, by topic, and of the transport's bookkeeping.
     pub segments: Vec<(&'static str, usize)>,
 }
 
 impl Footprint {
-    /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
         let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
@@ -143,7 +137,6 @@ impl Footprint {
         }
     }
 
-    /// Bytes of all segments.
     pub fn total(&self) -> usize {
         self.segments.iter().map(|(_, bytes)| bytes).sum()
     }
@@ -187,11 +180,9 @@ mod tests {
 
     #[test]
     fn a_run_has_the_topics_of_its_followers_and_their_memory() {
-        let slam = Window {
-            slam: true,
-            ..WINDOW
-        };
         let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
+        let (mut slam, mut with_objects) = (WINDOW, WINDOW);
+        (slam.slam, with_objects.objects) = (true, true);
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
         assert_eq!(names(&slam)[6..], ["loop", "correction"]);
         let with_map = Window {
@@ -199,10 +190,6 @@ mod tests {
             ..slam
         };
         assert_eq!(names(&with_map)[6..], ["loop", "correction", "fix"]);
-        let with_objects = Window {
-            objects: true,
-            ..WINDOW
-        };
         assert_eq!(names(&with_objects)[6..], ["objects"]);
         assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();

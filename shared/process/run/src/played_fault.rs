@@ -2,21 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The kind of a fault.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlayedFaultKind {
-    /// There are no samples of the gyro.
-    #[default]
-    GyroOut,
-    /// The wheels turn 30 % faster than the vehicle drives.
-    WheelsSlip,
-    /// The stamps of the samples of gyro and wheels are 1 s ahead.
-    ClockJump,
-    /// Scans show nothing.
-    RadarBlind,
+gyre_messages::named! {
+    /// The kind of a fault.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFaultKind {
+        /// There are no samples of the gyro.
+        #[default]
+        GyroOut = "gyro-out",
+        /// The wheels turn 30 % faster than the vehicle drives.
+        WheelsSlip = "wheels-slip",
+        /// The stamps of the samples of gyro and wheels are 1 s ahead.
+        ClockJump = "clock-jump",
+        /// Scans show nothing.
+        RadarBlind = "radar-blind",
+    }
 }
 
 impl PlayedFaultKind {
@@ -24,16 +26,6 @@ impl PlayedFaultKind {
     pub const SLIP_SHARE: f64 = 0.3;
     /// Jump of the stamps of samples, s.
     pub const JUMP_S: f64 = 1.0;
-
-    /// Returns its name in configurations.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::GyroOut => "gyro-out",
-            Self::WheelsSlip => "wheels-slip",
-            Self::ClockJump => "clock-jump",
-            Self::RadarBlind => "radar-blind",
-        }
-    }
 }
 
 /// A fault to inject into the playback of a recording, at the same place of each turn.

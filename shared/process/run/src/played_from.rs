@@ -2,38 +2,29 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The first topic that is played from a recording: the stages that compute it, and all stages
-/// before, are absent.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlayedFrom {
-    /// Scans: all stages compute.
-    #[default]
-    Scan,
-    /// Masked scans.
-    Masked,
-    /// Rotations, beside masked scans.
-    Rotation,
-    /// Searched motions, beside masked scans.
-    Motion,
-    /// Refined motions.
-    Refined,
+gyre_messages::named! {
+    /// The first topic that is played from a recording: the stages that compute it, and all stages
+    /// before, are absent.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFrom {
+        /// Scans: all stages compute.
+        #[default]
+        Scan = "scan",
+        /// Masked scans.
+        Masked = "masked",
+        /// Rotations, beside masked scans.
+        Rotation = "rotation",
+        /// Searched motions, beside masked scans.
+        Motion = "motion",
+        /// Refined motions.
+        Refined = "refined",
+    }
 }
 
 impl PlayedFrom {
-    /// The name of the topic.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scan => "scan",
-            Self::Masked => "masked",
-            Self::Rotation => "rotation",
-            Self::Motion => "motion",
-            Self::Refined => "refined",
-        }
-    }
-
     /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads
     /// masked scans, for the keyframes of SLAM.
     pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {

@@ -6,29 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::{PlayedFault, PlayedFrom};
 
-/// Where scans come from.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum SourceKind {
-    /// A recording, or a simulation.
-    #[default]
-    Recording,
-    /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
-    Colossus,
-    /// A Navtech radar behind its driver in ROS 2.
-    Ros2,
-}
-
-impl SourceKind {
-    /// Returns its name in configurations.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Recording => "recording",
-            Self::Colossus => "colossus",
-            Self::Ros2 => "ros2",
-        }
+gyre_messages::named! {
+    /// Where scans come from.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum SourceKind {
+        /// A recording, or a simulation.
+        #[default]
+        Recording = "recording",
+        /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
+        Colossus = "colossus",
+        /// A Navtech radar behind its driver in ROS 2.
+        Ros2 = "ros2",
     }
 }
 
