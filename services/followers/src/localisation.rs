@@ -24,17 +24,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;
-    let failed = |error: &dyn std::error::Error| StageError::Configuration(error.to_string());
-    let map = Map::open(&slam.map).map_err(|error| failed(&error))?;
+    let map = Map::open(&slam.map).map_err(StageError::configuration)?;
     let options = LocaliserOptions::default();
     let localiser = Localiser::new(map, options, &refinement, points.capacity);
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let out = launch.manifest.out.clone();
     let mut places = Fixes {
         keyframes: RecordReader::open(&out)?,
-        localiser: localiser.map_err(|error| failed(&error))?,
+        localiser: localiser.map_err(StageError::configuration)?,
         read: 0,
         out,
     };
@@ -104,39 +101,30 @@ impl Follower for Fixes {
 }
 
 fn header(index: usize, keyframe: &Keyframe, found: &Localisation, map: &Map) -> FixHeader {
-    let item = Item {
-        seq: index as u64,
-        scan: keyframe.scan,
-        previous_scan: keyframe.scan,
-        stamp_ns: keyframe.stamp_ns,
-        ..Item::default()
-    };
-    let status = match found.status {
-        Status::Lost => fix_status::LOST,
-        Status::Found => fix_status::FOUND,
-        Status::Tracked => fix_status::TRACKED,
-        // Away from the map a prediction is no place.
-        Status::Predicted if found.fix.is_none() => fix_status::LOST,
-        Status::Predicted => fix_status::PREDICTED,
-    };
-    let Some(fix) = &found.fix else {
-        return FixHeader {
-            item,
-            keyframe_seq: keyframe.seq,
-            status,
-            ..FixHeader::default()
-        };
-    };
-    let [x_m, y_m, yaw_rad] = xy_yaw(&fix.pose.motion);
-    FixHeader {
-        item,
+    let mut header = FixHeader {
+        item: Item {
+            seq: index as u64,
+            scan: keyframe.scan,
+            previous_scan: keyframe.scan,
+            stamp_ns: keyframe.stamp_ns,
+            ..Item::default()
+        },
         keyframe_seq: keyframe.seq,
-        status,
-        place: map.keyframes()[fix.keyframe].scan,
-        x_m,
-        y_m,
-        yaw_rad,
-        covariance: covariance::pack(&fix.pose.covariance),
-        correlation: fix.correlation,
+        status: match found.status {
+            Status::Lost => fix_status::LOST,
+            Status::Found => fix_status::FOUND,
+            Status::Tracked => fix_status::TRACKED,
+            // Away from the map a prediction is no place.
+            Status::Predicted if found.fix.is_none() => fix_status::LOST,
+            Status::Predicted => fix_status::PREDICTED,
+        },
+        ..FixHeader::default()
+    };
+    if let Some(fix) = &found.fix {
+        header.place = map.keyframes()[fix.keyframe].scan;
+        [header.x_m, header.y_m, header.yaw_rad] = xy_yaw(&fix.pose.motion);
+        header.covariance = covariance::pack(&fix.pose.covariance);
+        header.correlation = fix.correlation;
     }
+    header
 }

@@ -5,7 +5,7 @@
 //! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
 //! logs. Both follow from the keyframes, whenever those come.
 
-use std::{collections::VecDeque, path::PathBuf};
+use std::{collections::VecDeque, mem, path::PathBuf};
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
 use gyre_journal::loops::loop_header;
@@ -23,9 +23,7 @@ use gyre_stage::{
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let settings = Settings {
         out: launch.manifest.out.clone(),
         slam: launch.section("slam")?,
@@ -35,14 +33,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let growth = Growth::of(launch, LogId::Loops)?;
     let mut state = State::open(&settings)?;
     state.restore(None)?;
-    follower::run(
-        launch,
-        &mut LoopClosing {
-            settings,
-            growth,
-            state,
-        },
-    )
+    let mut closing = LoopClosing {
+        settings,
+        growth,
+        state,
+    };
+    follower::run(launch, &mut closing)
 }
 
 struct LoopClosing {
@@ -61,15 +57,12 @@ struct Settings {
 
 impl Settings {
     fn closer(&self) -> Result<LoopCloser, StageError> {
-        LoopCloser::new(
-            LoopOptions {
-                submap_reach_m: self.slam.submap_reach_m,
-                ..LoopOptions::default()
-            },
-            &self.refinement,
-            self.points.capacity,
-        )
-        .map_err(|error| StageError::Configuration(error.to_string()))
+        let options = LoopOptions {
+            submap_reach_m: self.slam.submap_reach_m,
+            ..LoopOptions::default()
+        };
+        LoopCloser::new(options, &self.refinement, self.points.capacity)
+            .map_err(StageError::configuration)
     }
 }
 
@@ -83,8 +76,7 @@ impl Follower for LoopClosing {
             self.state.restore(Some(unchanged))?;
         }
         let step = self.state.step()?;
-        if self.state.has_appended {
-            self.state.has_appended = false;
+        if mem::take(&mut self.state.has_appended) {
             self.growth.notify()?;
         }
         Ok(step)
@@ -210,7 +202,7 @@ impl State {
         let next = self.closer.keyframes();
         if next < self.keyframes.len() {
             let pushed = self.keyframes.read(next)?;
-            self.closer.push(&pushed).map_err(input)?;
+            self.closer.push(&pushed).map_err(StageError::input)?;
             return Ok(Step::Worked(None));
         }
         if self.keyframes.has_ended() && !self.has_finished {
@@ -268,10 +260,6 @@ impl KeyframeSource for Points<'_> {
 fn failed(error: ClosingError<StageError>) -> StageError {
     match error {
         ClosingError::Source(error) => error,
-        other => input(other),
+        other => StageError::input(other),
     }
-}
-
-fn input(error: impl std::error::Error) -> StageError {
-    StageError::Input(error.to_string())
 }

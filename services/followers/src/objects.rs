@@ -24,9 +24,7 @@ use gyre_stage::{
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let config: ObjectsConfig = launch.section("objects")?;
     let masking: MaskingConfig = launch.section("masking")?;
     let out = launch.manifest.out.clone();
@@ -49,9 +47,8 @@ pub fn tracker(
     masking: &MaskingConfig,
 ) -> Result<ObjectTracker, StageError> {
     let library = Library::find(masking);
-    let library = library.map_err(|error| StageError::Configuration(error.to_string()))?;
-    ObjectTracker::new(config, library.onnx_runtime())
-        .map_err(|error| StageError::Configuration(error.to_string()))
+    let library = library.map_err(StageError::configuration)?;
+    ObjectTracker::new(config, library.onnx_runtime()).map_err(StageError::configuration)
 }
 
 struct Tracking {
@@ -98,7 +95,7 @@ impl Tracking {
         let objects = self
             .tracker
             .update(&placed, &scan.points)
-            .map_err(|error| StageError::Input(error.to_string()))?;
+            .map_err(StageError::input)?;
         let known = self.read < self.tracked.len();
         self.read += 1;
         if known {

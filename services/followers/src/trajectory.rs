@@ -12,7 +12,10 @@
 
 mod live_fixes;
 
-use std::path::PathBuf;
+use std::{
+    mem,
+    path::{Path, PathBuf},
+};
 
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
@@ -31,9 +34,7 @@ use live_fixes::LiveFixes;
 
 /// Runs the follower to the end of both logs, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
         StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
@@ -52,7 +53,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
     let source: SourceConfig = launch.section("source")?;
     let out = &launch.manifest.out;
-    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(input)?;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(StageError::input)?;
     let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
     Ok(Fixes::new(fixes, config))
 }
@@ -82,7 +83,7 @@ struct Trajectory {
 }
 
 impl Trajectory {
-    fn open(out: &std::path::Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
+    fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
         let options = TrajectoryOptions {
             kind,
             ..TrajectoryOptions::default()
@@ -109,12 +110,8 @@ impl Trajectory {
         self.keyframes.refresh()?;
         self.queries.refresh()?;
         let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
-        let was_cut = self
-            .read
-            .iter()
-            .zip(unchanged)
-            .any(|(read, unchanged)| unchanged < *read);
-        if was_cut {
+        let mut read = self.read.iter().zip(unchanged);
+        if read.any(|(read, unchanged)| unchanged < *read) {
             *self = Self {
                 live_fixes: self.live_fixes.take(),
                 ..Self::open(&self.out.clone(), self.kind, self.fixes.clone())?
@@ -129,7 +126,7 @@ impl Trajectory {
         if keyframes < self.keyframes.len() {
             let keyframe = self.keyframes.read_without_points(keyframes)?;
             let fixes = self.estimator.fixes().settled();
-            self.estimator.push(&keyframe).map_err(input)?;
+            self.estimator.push(&keyframe).map_err(StageError::input)?;
             // Without a new loop or fix the poses before stay where they are.
             let standing = self.corrected.map(|last| last.then(&keyframe.motion));
             self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
@@ -144,7 +141,7 @@ impl Trajectory {
             if query.loops().next().is_some() {
                 self.corrected = None;
             }
-            self.estimator.close(&query).map_err(input)?;
+            self.estimator.close(&query).map_err(StageError::input)?;
             self.read[1] += 1;
         } else {
             return Ok(false);
@@ -177,10 +174,12 @@ impl Trajectory {
             Some(corrected) => corrected,
             None => {
                 match self.is_final {
-                    true => self.estimator.solve().map_err(input)?,
-                    false => self.estimator.update().map_err(input)?,
+                    true => self.estimator.solve().map_err(StageError::input)?,
+                    false => self.estimator.update().map_err(StageError::input)?,
                 }
-                self.estimator.pose(keyframes - 1).map_err(input)?
+                self.estimator
+                    .pose(keyframes - 1)
+                    .map_err(StageError::input)?
             }
         };
         self.corrected = Some(corrected);
@@ -225,8 +224,7 @@ impl Follower for Trajectory {
             (self.has_changed, self.corrected) = (true, None);
         }
         self.is_final = has_ended;
-        if self.has_changed {
-            self.has_changed = false;
+        if mem::take(&mut self.has_changed) {
             self.take_live_fixes()?;
             return Ok(Step::Worked(self.correct()?));
         }
@@ -247,10 +245,6 @@ impl Follower for Trajectory {
             total: self.keyframes.len() as u64,
         }
     }
-}
-
-fn input(error: impl std::error::Error) -> StageError {
-    StageError::Input(error.to_string())
 }
 
 #[cfg(test)]

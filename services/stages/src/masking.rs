@@ -11,6 +11,7 @@ mod live;
 mod lossless;
 mod motions;
 mod python;
+mod queue;
 mod scans;
 
 use gyre_geometry::Twist;
@@ -65,7 +66,7 @@ fn work(
     let mut masking = Masking {
         raster,
         config,
-        masker: masker.map_err(|error| StageError::Configuration(error.to_string()))?,
+        masker: masker.map_err(StageError::configuration)?,
         azimuths: Azimuths::default(),
         doppler: doppler.is_used().then(DopplerEstimator::default),
         min_range_m: points.min_range_m,
@@ -97,7 +98,7 @@ impl Stage for Masking {
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
         let failed = |error: MaskError| match error {
-            MaskError::Function(reason) => StageError::Function(reason),
+            MaskError::Function(reason) => StageError::Transient(reason),
             error => input.scan.malformed(error.to_string()),
         };
         let [rows, previous_rows] = &mut self.rows;

@@ -5,6 +5,8 @@
 //! with objects it logs each scan. In live mode poses continue when the disk is full, and are not
 //! kept from then on.
 
+use std::fmt::Display;
+
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal, JournalError,
@@ -26,9 +28,7 @@ use gyre_storage::{LogError, continue_when_full, was_full};
 
 /// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let out = &launch.manifest.out;
     if launch.manifest.live {
         continue_when_full();
@@ -96,10 +96,8 @@ impl Sink for Integration {
         let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
         if self.slam.is_on() {
             let keyframes = Keyframes::open(&self.manifest.out, known, ended);
-            let keyframes = self
-                .keyframes
-                .insert(keyframes.map_err(unusable_keyframes)?);
-            keyframes.reserve(self.points);
+            let keyframes = keyframes.map_err(unusable_keyframes)?;
+            self.keyframes.insert(keyframes).reserve(self.points);
         }
         if self.objects.is_on() {
             let scans = Scans::open(&self.manifest.out, known, ended).map_err(unusable_scans)?;
@@ -125,7 +123,7 @@ impl Sink for Integration {
             scans.add(&pose, points(scan)?).map_err(unusable_scans)?;
             self.wake_followers(LogId::Scans)?;
         }
-        self.write(&pose)?;
+        self.journal.append(&pose).map_err(unusable)?;
         if was_full() && self.loss.is_none() {
             let (out, seq) = (self.manifest.out.display(), pose.item.seq);
             let loss = format!(
@@ -147,13 +145,14 @@ impl Sink for Integration {
             scans.end().map_err(unusable_scans)?;
             self.wake_followers(LogId::Scans)?;
         }
-        self.write(&PoseHeader {
+        let end = PoseHeader {
             item: Item {
                 flags: flag::END,
                 ..*item
             },
             ..PoseHeader::default()
-        })?;
+        };
+        self.journal.append(&end).map_err(unusable)?;
         self.require_kept()?;
         // Once the end is published, the run is complete.
         self.sync()
@@ -164,12 +163,12 @@ impl Integration {
     /// Waits until all that was written survives a power failure: a failure is found by nobody
     /// after this process.
     fn sync(&self) -> Result<(), StageError> {
-        let keyframes = self.keyframes.as_ref();
-        keyframes
-            .map_or(Ok(()), Keyframes::sync)
-            .map_err(unusable_keyframes)?;
-        let scans = self.scans.as_ref();
-        scans.map_or(Ok(()), Scans::sync).map_err(unusable_scans)?;
+        if let Some(keyframes) = &self.keyframes {
+            keyframes.sync().map_err(unusable_keyframes)?;
+        }
+        if let Some(scans) = &self.scans {
+            scans.sync().map_err(unusable_scans)?;
+        }
         self.journal.sync().map_err(unusable)
     }
 
@@ -186,10 +185,6 @@ impl Integration {
         let mut grown = self.growth.iter().filter(|(of, _)| *of == log);
         grown.try_for_each(|(_, growth)| growth.notify())
     }
-
-    fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
-        self.journal.append(pose).map_err(unusable)
-    }
 }
 
 fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
@@ -199,30 +194,23 @@ fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
 }
 
 fn unusable(error: JournalError) -> StageError {
-    match error {
-        JournalError::Busy(_) => busy("open the journal", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    failed(matches!(error, JournalError::Busy(_)), "journal", &error)
 }
 
 fn unusable_keyframes(error: KeyframesError) -> StageError {
-    match error {
-        KeyframesError::Log(LogError::Busy(_)) => busy("open the keyframes", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    let is_busy = matches!(error, KeyframesError::Log(LogError::Busy(_)));
+    failed(is_busy, "keyframes", &error)
 }
 
 fn unusable_scans(error: ScansError) -> StageError {
-    match error {
-        ScansError::Log(LogError::Busy(_)) => busy("open the scans", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    let is_busy = matches!(error, ScansError::Log(LogError::Busy(_)));
+    failed(is_busy, "scans", &error)
 }
 
-/// The error for a file of a process that was killed, and is not gone yet.
-fn busy(action: &str, error: &impl ToString) -> StageError {
-    StageError::Transport {
-        action: action.to_owned(),
-        reason: error.to_string(),
+/// The error for a file: a process that was killed, and is not gone yet, may have it.
+fn failed(is_busy: bool, file: &str, error: &dyn Display) -> StageError {
+    match is_busy {
+        true => StageError::Transient(format!("cannot open the {file}: {error}")),
+        false => StageError::Input(error.to_string()),
     }
 }

@@ -48,16 +48,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     // options too: a dataset.toml that is changed during a run does not change the run.
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
-    match source::open(launch, &tolerance(&config), open)? {
-        Some(mut dataset) => {
-            let gyro: GyroConfig = launch.section("gyro")?;
-            let wheels: WheelsConfig = launch.section("wheels")?;
-            let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
-            let samples = samples.map_err(|error| StageError::Input(error.to_string()))?;
-            play(launch, dataset, samples, Pace::Sensor)
-        }
-        None => Ok(StageCounters::default()),
-    }
+    let mut dataset = source::open(launch, &tolerance(&config), open)?;
+    let (gyro, wheels): (GyroConfig, WheelsConfig) =
+        (launch.section("gyro")?, launch.section("wheels")?);
+    let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
+    let samples = samples.map_err(StageError::input)?;
+    play(launch, dataset, samples, Pace::Sensor)
 }
 
 /// Returns the limits on input that cannot be read.

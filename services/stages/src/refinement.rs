@@ -25,13 +25,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let wheels: WheelsConfig = launch.section("wheels")?;
     let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
-        .map_err(|error| StageError::Configuration(error.to_string()))?
+        .map_err(StageError::configuration)?
         .with_gyro(&gyro)
         .with_wheels(&wheels)
         .with_doppler(&doppler);
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let manifest = &launch.manifest;
     if manifest.live {
         continue_when_full();
@@ -132,10 +130,9 @@ fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
 fn unusable(error: CheckpointError) -> StageError {
     match error {
         // A process that was killed, and is not gone yet.
-        CheckpointError::Busy(_) => StageError::Transport {
-            action: "open the checkpoint".to_owned(),
-            reason: error.to_string(),
-        },
+        CheckpointError::Busy(_) => {
+            StageError::Transient(format!("cannot open the checkpoint: {error}"))
+        }
         _ => StageError::Input(error.to_string()),
     }
 }

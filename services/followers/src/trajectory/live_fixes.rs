@@ -45,8 +45,7 @@ impl LiveFixes {
         }
         let received = &mut self.received;
         let read = self.receiver.if_grown(|| received.read_on())?;
-        read.unwrap_or(Ok(()))
-            .map_err(|error| StageError::Input(error.to_string()))?;
+        read.unwrap_or(Ok(())).map_err(StageError::input)?;
         let new = self.received.count() - self.examined;
         let least = if is_last {
             1

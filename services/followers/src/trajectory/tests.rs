@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use std::{net::UdpSocket, path::Path};
+use std::net::UdpSocket;
 
 use gyre_geometry::{Twist, UncertainMotion, pose};
 use gyre_samples::{Geographic, GnssFix, GnssKind, LocalPlane};

@@ -47,7 +47,7 @@ pub struct Connection {
     /// Bytes received since then.
     without_azimuth: usize,
     /// True from the first azimuth after the opening on.
-    receives_azimuths: bool,
+    pub receives_azimuths: bool,
     retry_at: Instant,
     pause: Duration,
     /// The sender of the last datagram.
@@ -125,10 +125,6 @@ impl Connection {
         self.without_azimuth = 0;
         self.receives_azimuths = true;
         self.pause = RETRY_PAUSES[0];
-    }
-
-    pub fn receives_azimuths(&self) -> bool {
-        self.receives_azimuths
     }
 
     /// Takes from now on only datagrams of the sender of the last one.

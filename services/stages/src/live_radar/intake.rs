@@ -89,9 +89,9 @@ impl Intake {
         let scans = self.scans.as_mut();
         let scan =
             scans.and_then(|scans| scans.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
-        if let Some(scan) = scan {
-            self.missing += scan.missing as u64;
-            self.due_ns = scan.due_ns;
+        if let Some((missing, due_ns)) = scan {
+            self.missing += missing as u64;
+            self.due_ns = due_ns;
         }
         scan.is_some()
     }

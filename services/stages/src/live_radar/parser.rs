@@ -13,15 +13,6 @@ pub enum RadarParser {
 }
 
 impl RadarParser {
-    /// Creates a parser at the start of a stream, or of datagrams whose angles are rounded to
-    /// `encoder_counts` per turn.
-    pub fn new(is_udp: bool, encoder_counts: u16) -> Self {
-        match is_udp {
-            false => Self::Stream(Parser::default()),
-            true => Self::Datagrams(Datagrams::new(encoder_counts)),
-        }
-    }
-
     /// Returns memory to read into.
     pub fn space(&mut self) -> &mut [u8] {
         match self {

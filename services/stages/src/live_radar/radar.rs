@@ -27,8 +27,6 @@ pub struct Radar {
     connection: Connection,
     messages: RadarParser,
     intake: Intake,
-    /// The counts of the source process before this one, if it died.
-    before: Counts,
     /// Descriptions of scans that do not fit into the run.
     refused: u64,
     health: HealthLog,
@@ -42,7 +40,6 @@ impl Radar {
             messages: settings.parser(),
             intake: Intake::new(settings.constants),
             settings,
-            before: Counts::default(),
             refused: 0,
             health: HealthLog::default(),
         }
@@ -154,16 +151,13 @@ impl Sensor for Radar {
 
     fn resume(&mut self, before: Counts) {
         self.intake.resume(before);
-        self.before = before;
     }
 
     fn received(&self) -> Counts {
-        let (before, connection) = (&self.before, &self.connection);
-        Counts {
-            foreign_messages: before.foreign_messages + connection.foreign + self.refused,
-            connections: before.connections + connection.opened,
-            is_receiving: connection.receives_azimuths(),
-            ..self.intake.received()
-        }
+        let mut counts = self.intake.received();
+        counts.foreign_messages += self.connection.foreign + self.refused;
+        counts.connections += self.connection.opened;
+        counts.is_receiving = self.connection.receives_azimuths;
+        counts
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_colossus::{Address, BadAddress, Constants};
+use gyre_colossus::{Address, BadAddress, Constants, Datagrams, Parser};
 use gyre_datasets::DatasetOptions;
 use gyre_run::SourceConfig;
 
@@ -40,8 +40,12 @@ impl Settings {
         })
     }
 
+    /// Returns a parser at the start of a stream, or of datagrams.
     pub(crate) fn parser(&self) -> RadarParser {
-        RadarParser::new(self.address.is_udp(), self.encoder_counts)
+        match self.address.is_udp() {
+            false => RadarParser::Stream(Parser::default()),
+            true => RadarParser::Datagrams(Datagrams::new(self.encoder_counts)),
+        }
     }
 }
 

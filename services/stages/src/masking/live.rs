@@ -16,6 +16,8 @@ use gyre_stage::{
     reader::{Port, Received},
 };
 
+use crate::masking::queue::Queue;
+
 /// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower
 /// than its scans never is, and would have the latency of those that wait for ever.
 const WINDOWS_IN_ORDER: usize = 8;
@@ -68,57 +70,6 @@ impl NewestOnly {
         })
     }
 
-    pub fn receive(&mut self) -> Result<(), StageError> {
-        while let Some(received) = self.port.receive()? {
-            if self
-                .chain
-                .is_some_and(|chain| chain.has_passed(received.item()))
-            {
-                continue;
-            }
-            self.queue.push_back(received);
-            if self.chain.is_some_and(|chain| !chain.repeats) {
-                self.drop_the_oldest();
-            }
-        }
-        let has_begun = self.chain.is_some_and(|chain| chain.published.is_some());
-        if has_begun && self.scans() <= 1 {
-            self.in_order = 0;
-        }
-        Ok(())
-    }
-
-    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the
-    /// last start of the sink, `newest_pose` the number of the newest pose now.
-    pub fn next_action(
-        &mut self,
-        resume_at: &Item,
-        newest_pose: Option<u64>,
-    ) -> Result<Action, StageError> {
-        let chain = match self.chain {
-            None => self.resume(resume_at)?,
-            chain => chain,
-        };
-        let Some(chain) = chain else {
-            return Ok(Action::Wait);
-        };
-        self.chain = Some(chain);
-        if !chain.repeats {
-            self.drop_the_oldest();
-        }
-        let Some(front) = self.queue.front() else {
-            return Ok(Action::Wait);
-        };
-        let item = chain.number(front.item());
-        Ok(match () {
-            // The end of the stream occupies a slot in every history like any item, so it waits for
-            // credit too.
-            () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
-            () if item.is(flag::END) => Action::End(item),
-            () => Action::Process(item, front.received_ns),
-        })
-    }
-
     /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a
     /// restarted source repeats such scans, and the history of a running source begins with them.
     fn resume(&mut self, newest_pose: &Item) -> Result<Option<Chain>, StageError> {
@@ -166,19 +117,70 @@ impl NewestOnly {
         }
     }
 
-    /// Returns the samples of the scans that were dropped since the last one.
-    pub fn take_dropped(&mut self) -> Vec<Sample> {
-        mem::take(&mut self.dropped)
-    }
-
     /// Returns the number of scans in the queue, without the end of the stream.
     fn scans(&self) -> usize {
         let is_end = |last: &Received<Scan>| last.item().is(flag::END);
         self.queue.len() - usize::from(self.queue.back().is_some_and(is_end))
     }
 
-    /// Advances to the next scan.
-    pub fn advance(&mut self) {
+    fn keep(&mut self, done: Option<Received<Scan>>) {
+        if self.window.masks_pairs() {
+            self.previous = done;
+        }
+    }
+}
+
+impl Queue for NewestOnly {
+    fn receive(&mut self) -> Result<(), StageError> {
+        while let Some(received) = self.port.receive()? {
+            if self
+                .chain
+                .is_some_and(|chain| chain.has_passed(received.item()))
+            {
+                continue;
+            }
+            self.queue.push_back(received);
+            if self.chain.is_some_and(|chain| !chain.repeats) {
+                self.drop_the_oldest();
+            }
+        }
+        let has_begun = self.chain.is_some_and(|chain| chain.published.is_some());
+        if has_begun && self.scans() <= 1 {
+            self.in_order = 0;
+        }
+        Ok(())
+    }
+
+    fn next_action(
+        &mut self,
+        resume_at: &Item,
+        newest_pose: Option<u64>,
+    ) -> Result<Action, StageError> {
+        let chain = match self.chain {
+            None => self.resume(resume_at)?,
+            chain => chain,
+        };
+        let Some(chain) = chain else {
+            return Ok(Action::Wait);
+        };
+        self.chain = Some(chain);
+        if !chain.repeats {
+            self.drop_the_oldest();
+        }
+        let Some(front) = self.queue.front() else {
+            return Ok(Action::Wait);
+        };
+        let item = chain.number(front.item());
+        Ok(match () {
+            // The end of the stream occupies a slot in every history like any item, so it waits for
+            // credit too.
+            () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
+            () if item.is(flag::END) => Action::End(item),
+            () => Action::Process(item, front.received_ns),
+        })
+    }
+
+    fn advance(&mut self) {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
             let (scan, published) = (done.item().scan, done.item().published);
@@ -197,19 +199,17 @@ impl NewestOnly {
         self.keep(done);
     }
 
-    /// Returns the current scan if one has been received.
-    pub fn current(&self) -> Option<&Received<Scan>> {
+    fn current(&self) -> Option<&Received<Scan>> {
         self.queue.front()
     }
 
-    /// Returns the listener that the source notifies.
-    pub fn listener(&self) -> &Listener {
+    fn listener(&self) -> &Listener {
         self.port.listener()
     }
 
-    /// Returns the previous scan; `None` at the start of a chain. The source may have lost it when
-    /// all stages were restarted; the current scan is then masked as at the start of a chain.
-    pub fn previous(&self) -> Option<&Received<Scan>> {
+    /// The source may have lost it when all stages were restarted; the current scan is then masked
+    /// as at the start of a chain.
+    fn previous(&self) -> Option<&Received<Scan>> {
         let item = self.chain?.number(self.queue.front()?.item());
         let expected = (!item.is(flag::BREAK)).then_some(item.previous_scan);
         self.previous
@@ -217,10 +217,8 @@ impl NewestOnly {
             .filter(|previous| Some(previous.item().scan) == expected)
     }
 
-    fn keep(&mut self, done: Option<Received<Scan>>) {
-        if self.window.masks_pairs() {
-            self.previous = done;
-        }
+    fn take_dropped(&mut self) -> Vec<Sample> {
+        mem::take(&mut self.dropped)
     }
 }
 

@@ -7,6 +7,8 @@ use gyre_stage::{
     reader::{Reader, Received},
 };
 
+use crate::masking::queue::Queue;
+
 /// The queue of masking in lossless mode.
 pub struct InOrder {
     reader: Reader<Scan>,
@@ -24,14 +26,14 @@ impl InOrder {
             started: false,
         })
     }
+}
 
-    pub fn receive(&mut self) -> Result<(), StageError> {
+impl Queue for InOrder {
+    fn receive(&mut self) -> Result<(), StageError> {
         self.reader.head().map(drop)
     }
 
-    /// Returns what to do with the current scan when `newest_pose` is the number of the newest
-    /// pose.
-    pub fn next_action(&mut self, newest_pose: Option<u64>) -> Result<Action, StageError> {
+    fn next_action(&mut self, _: &Item, newest_pose: Option<u64>) -> Result<Action, StageError> {
         let Some(head) = self.reader.head()? else {
             return Ok(Action::Wait);
         };
@@ -48,31 +50,26 @@ impl InOrder {
         Ok(Action::Process(item, received_ns))
     }
 
-    /// Returns the current scan if one has been received.
-    pub fn current(&self) -> Option<&Received<Scan>> {
+    fn current(&self) -> Option<&Received<Scan>> {
         self.reader.current()
     }
 
-    /// Returns the previous scan, if the mask takes two and the chain is unbroken.
-    pub fn previous(&self) -> Option<&Received<Scan>> {
+    fn previous(&self) -> Option<&Received<Scan>> {
         self.reader.previous()
     }
 
-    /// Advances to the next scan.
-    pub fn advance(&mut self) {
+    fn advance(&mut self) {
         match self.window.masks_pairs() {
             true => self.reader.advance(),
             false => self.reader.release(),
         }
     }
 
-    /// Returns the listener that the source notifies.
-    pub fn listener(&self) -> &Listener {
+    fn listener(&self) -> &Listener {
         self.reader.listener()
     }
 
-    /// Returns the number of scans that were skipped because they had been received before.
-    pub fn duplicates(&self) -> u64 {
+    fn duplicates(&self) -> u64 {
         self.reader.duplicates()
     }
 }
@@ -106,13 +103,8 @@ mod tests {
     fn a_restart_begins_with_the_newest_poses_scan_or_the_previous_one_if_masks_take_two() {
         let window = |look_back| Window {
             scans: 4,
-            lag: 2,
             look_back,
-            live_depth: 0,
-            observers: 0,
-            slam: false,
-            localises: false,
-            objects: false,
+            ..Window::default()
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)

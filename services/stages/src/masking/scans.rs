@@ -10,11 +10,11 @@ use gyre_stage::{
     reader::Received,
 };
 
-use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions};
+use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions, queue::Queue};
 
 /// The scans, in lossless or in live mode, and the motions.
 pub struct Scans {
-    queue: Queue,
+    queue: Box<dyn Queue>,
     motions: Motions,
     gyro: Gyro,
     wheels: Wheels,
@@ -27,19 +27,13 @@ pub struct Scans {
     lost: [Option<LostAzimuths>; 2],
 }
 
-enum Queue {
-    Lossless(Box<InOrder>),
-    Live(Box<NewestOnly>),
-}
-
 pub struct ScanView<'a> {
     pub scan: &'a Received<Scan>,
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
-    /// The turn since the scan before by the gyro.
+    /// The turn and the distance since the scan before.
     pub turn: Option<GyroTurn>,
-    /// The distance since the scan before by the wheels.
     pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
     pub lost: Option<LostAzimuths>,
@@ -61,9 +55,9 @@ impl Inputs for Scans {
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
         let motions = Motions::open(launch)?;
-        let queue = match launch.manifest.live {
-            false => Queue::Lossless(Box::new(InOrder::open(launch)?)),
-            true => Queue::Live(Box::new(NewestOnly::open(launch)?)),
+        let queue: Box<dyn Queue> = match launch.manifest.live {
+            false => Box::new(InOrder::open(launch)?),
+            true => Box::new(NewestOnly::open(launch)?),
         };
         Ok(Self {
             queue,
@@ -78,10 +72,7 @@ impl Inputs for Scans {
     }
 
     fn next_action(&mut self) -> Result<Action, StageError> {
-        match &mut self.queue {
-            Queue::Lossless(queue) => queue.receive()?,
-            Queue::Live(queue) => queue.receive()?,
-        }
+        self.queue.receive()?;
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
         // resumes.
@@ -89,42 +80,30 @@ impl Inputs for Scans {
             return Ok(Action::Wait);
         };
         let newest_pose = self.motions.newest_pose();
-        let action = match &mut self.queue {
-            Queue::Lossless(queue) => queue.next_action(newest_pose)?,
-            Queue::Live(queue) => queue.next_action(&resume_at, newest_pose)?,
-        };
+        let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
-            Action::Process(item, _) if !self.find_motions(&item) => Ok(Action::Wait),
-            Action::Process(item, _) => {
-                self.take_samples(item.is(flag::BREAK))?;
-                Ok(action)
-            }
-            Action::Keep => {
-                self.take_samples(false)?;
-                Ok(action)
-            }
-            action => Ok(action),
+            Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
+            Action::Process(item, _) => self.take_samples(item.is(flag::BREAK))?,
+            Action::Keep => self.take_samples(false)?,
+            _ => {}
         }
+        Ok(action)
     }
 
     fn view(&self) -> Option<ScanView<'_>> {
-        let (scan, previous) = match &self.queue {
-            Queue::Lossless(queue) => (queue.current(), queue.previous()),
-            Queue::Live(queue) => (queue.current(), queue.previous()),
-        };
         let [motion, previous_motion] = self.found;
         let [previous_rate, rate] = self.gyro.sweep_rates_radps();
         let twist = |motion: Option<SearchedMotion>, rate| {
             with_yaw_rate(motion.map(|motion| motion.twist()), rate)
         };
         let [lost, previous_lost] = self.lost;
-        let previous = previous.map(|scan| PreviousScan {
+        let previous = self.queue.previous().map(|scan| PreviousScan {
             scan,
             twist: twist(previous_motion, previous_rate),
             lost: previous_lost,
         });
         Some(ScanView {
-            scan: scan?,
+            scan: self.queue.current()?,
             twist: twist(motion, rate),
             turn: self.gyro.turn(),
             distance: self.wheels.distance(),
@@ -134,19 +113,13 @@ impl Inputs for Scans {
     }
 
     fn advance(&mut self) {
-        match &mut self.queue {
-            Queue::Lossless(queue) => queue.advance(),
-            Queue::Live(queue) => queue.advance(),
-        }
+        self.queue.advance();
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        let (scans, lacks_scan) = match &self.queue {
-            Queue::Lossless(queue) => (queue.listener(), queue.current().is_none()),
-            Queue::Live(queue) => (queue.listener(), queue.current().is_none()),
-        };
+        let scans = self.queue.listener();
         // Motions and poses are read when a scan comes.
-        if lacks_scan && self.motions.resume_at().is_some() {
+        if self.queue.current().is_none() && self.motions.resume_at().is_some() {
             return vec![scans];
         }
         let [motions, poses] = self.motions.listeners();
@@ -154,10 +127,7 @@ impl Inputs for Scans {
     }
 
     fn duplicates(&self) -> u64 {
-        match &self.queue {
-            Queue::Lossless(queue) => queue.duplicates(),
-            Queue::Live(_) => 0,
-        }
+        self.queue.duplicates()
     }
 }
 
@@ -183,13 +153,8 @@ impl Scans {
     /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
     /// since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
-        let (scans, dropped) = match &mut self.queue {
-            Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),
-            Queue::Live(queue) => {
-                let dropped = queue.take_dropped();
-                ([queue.previous(), queue.current()], dropped)
-            }
-        };
+        let dropped = self.queue.take_dropped();
+        let scans = [self.queue.previous(), self.queue.current()];
         let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
         let [previous, current] = scans.map(|scan| scan.filter(is_new));
         let Some(current) = current else {

@@ -6,6 +6,7 @@
 mod exchange;
 
 use std::{
+    fmt::Display,
     fs, io,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
@@ -73,16 +74,12 @@ pub enum Answer {
 /// The state of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// The process of the supervisor.
     pub pid: u32,
-    /// The folder of the results.
     pub out: PathBuf,
     /// The current folder of the command that has started the run.
     pub started_in: PathBuf,
     pub live: bool,
-    /// Where the run is between its start and its end.
     pub phase: Phase,
-    /// Time since the supervisor has started, s.
     pub uptime_s: f64,
     /// Scans that the source has published; `None` if a replaced source does not report them.
     pub published: Option<u64>,
@@ -94,7 +91,6 @@ pub struct Status {
     /// The trouble of the whole run: it waits for its radar, or its disk is full.
     #[serde(default)]
     pub notice: Option<String>,
-    /// The swap that is not done yet.
     pub swap: Option<PendingSwap>,
     /// The processes: the stages in the order of the stream, the followers, the recorder.
     pub processes: Vec<ProcessStatus>,
@@ -115,25 +111,17 @@ pub struct PendingSwap {
     pub limit_s: Option<f64>,
 }
 
-/// Where a run is between its start and its end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Phase {
-    /// A stage has not opened its topics.
-    #[default]
-    Starting,
-    Running,
-    /// The stream has ended, and followers read their logs to the end.
-    Following,
-}
-
-impl Phase {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Running => "running",
-            Self::Following => "following",
-        }
+gyre_messages::named! {
+    /// Where a run is between its start and its end.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Phase {
+        /// A stage has not opened its topics.
+        #[default]
+        Starting = "starting",
+        Running = "running",
+        /// The stream has ended, and followers read their logs to the end.
+        Following = "following",
     }
 }
 
@@ -149,11 +137,8 @@ pub struct ProcessStatus {
     pub activity: Activity,
     /// For how long it has done that, s; `None` if it does not report it.
     pub activity_s: Option<f64>,
-    /// Time since its start, s.
     pub uptime_s: f64,
-    /// The restarts, for whatever reason.
     pub restarts: usize,
-    /// The cause of its last death.
     pub last_death: Option<String>,
     /// Messages that it should have recorded and has missed since its start; `None` if it is no
     /// recorder.
@@ -162,33 +147,22 @@ pub struct ProcessStatus {
     pub received: Option<Received>,
 }
 
-/// The activity of a process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Activity {
-    /// It has not opened its topics: it may be loading a model.
-    Starting,
-    /// It sleeps until there is work.
-    Waiting,
-    /// It works on an item.
-    Working,
-    /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
-    Silent,
-    /// It runs, and writes no heartbeat, as a replacement need not.
-    Running,
-    Ended,
-}
-
-impl Activity {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Waiting => "waiting",
-            Self::Working => "working",
-            Self::Silent => "silent",
-            Self::Running => "running",
-            Self::Ended => "ended",
-        }
+gyre_messages::named! {
+    /// The activity of a process.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Activity {
+        /// It has not opened its topics: it may be loading a model.
+        Starting = "starting",
+        /// It sleeps until there is work.
+        Waiting = "waiting",
+        /// It works on an item.
+        Working = "working",
+        /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
+        Silent = "silent",
+        /// It runs, and writes no heartbeat, as a replacement need not.
+        Running = "running",
+        Ended = "ended",
     }
 }
 
@@ -232,13 +206,11 @@ impl Control {
         runs
     }
 
-    /// Returns the folder of the run's results.
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// Returns the state of the run.
     pub fn status(&self) -> Result<Status, StageError> {
         self.status_or("")
     }
@@ -246,7 +218,7 @@ impl Control {
     fn status_or(&self, otherwise: &str) -> Result<Status, StageError> {
         match self.ask(&Request::Status, otherwise)? {
             Answer::Status(status) => Ok(*status),
-            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+            answer => Err(self.silent(format_args!("its answer is {answer:?}"))),
         }
     }
 
@@ -299,16 +271,17 @@ impl Control {
     fn is_done(&self, answer: Answer) -> Result<(), StageError> {
         match answer {
             Answer::Done => Ok(()),
-            Answer::Refused(reason) => Err(StageError::Refused(reason)),
-            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+            Answer::Refused(reason) => Err(StageError::Input(reason)),
+            answer => Err(self.silent(format_args!("its answer is {answer:?}"))),
         }
     }
 
     /// Asks. The error that there is no answer ends with `otherwise`.
     fn ask(&self, request: &Request, otherwise: &str) -> Result<Answer, StageError> {
         self.wait(self.send(request)?, ANSWER, |_| {
-            let reason = format!("there was no answer within {ANSWER:?}{otherwise}");
-            Err(self.silent(reason))
+            Err(self.silent(format_args!(
+                "there was no answer within {ANSWER:?}{otherwise}"
+            )))
         })
     }
 
@@ -327,7 +300,7 @@ impl Control {
         loop {
             let answer = sent.answer(period).map_err(|error| self.failed(&error))?;
             if let Some(line) = answer {
-                return serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()));
+                return serde_json::from_str(&line).map_err(|error| self.silent(error));
             }
             look(self)?;
         }
@@ -339,15 +312,15 @@ impl Control {
             | io::ErrorKind::ConnectionRefused
             | io::ErrorKind::ConnectionReset
             | io::ErrorKind::UnexpectedEof => not_running(self.out.clone()),
-            _ => self.silent(error.to_string()),
+            _ => self.silent(error),
         }
     }
 
-    fn silent(&self, reason: String) -> StageError {
-        StageError::Silent {
-            out: self.out.clone(),
-            reason,
-        }
+    fn silent(&self, reason: impl Display) -> StageError {
+        let out = self.out.display();
+        StageError::Input(format!(
+            "the run that writes to {out} does not answer: {reason}"
+        ))
     }
 }
 

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use gyre_run::StageCounters;
 
-use crate::{Manifest, StageError, allocations, run};
+use crate::{Manifest, StageError, allocations, clock, run};
 
 /// Returns the file in the run's root for a stage's counters.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
@@ -42,4 +42,27 @@ pub(crate) fn record(counters: &mut StageCounters, allocations: u64, busy_ns: i6
     }
     counters.processed += 1;
     counters.busy_ns += busy_ns.max(0) as u64;
+}
+
+/// The begin of the work on an item.
+pub(crate) struct Work {
+    pub started_ns: i64,
+    allocated: u64,
+}
+
+impl Work {
+    pub fn begin() -> Self {
+        Self {
+            started_ns: clock::now_ns(),
+            allocated: allocations::so_far(),
+        }
+    }
+
+    /// Counts the work; returns its end, ns.
+    pub fn end(&self, counters: &mut StageCounters) -> i64 {
+        let finished_ns = clock::now_ns();
+        let allocations = allocations::so_far() - self.allocated;
+        record(counters, allocations, finished_ns - self.started_ns);
+        finished_ns
+    }
 }

@@ -10,12 +10,10 @@ mod progress;
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Header, Item, Message, flag};
+use gyre_messages::{Header, Item, Message};
 
 pub use crate::log_id::LogId;
-use crate::{
-    Launch, Listener, StageCounters, StageError, allocations, clock, wake, writer::Writer,
-};
+use crate::{Launch, Listener, StageCounters, StageError, counters::Work, wake, writer::Writer};
 pub use growth::Growth;
 use progress::ProgressWriter;
 pub use progress::{Progress, is_done, read as progress_of};
@@ -53,14 +51,12 @@ pub enum Step<H> {
 
 /// Runs a follower to the end of its logs, or until SIGTERM.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     // Only latency depends on it.
     let _ = rustix::process::nice(NICENESS);
     let listeners: Vec<Listener> = F::LOGS
         .iter()
-        .map(|log| Listener::open(&launch.node, log.event()))
+        .map(|log| Listener::open(&launch.node, log.name()))
         .collect::<Result<_, _>>()?;
     let grown: Vec<&Listener> = listeners.iter().collect();
     launch.begin_heartbeat()?;
@@ -110,11 +106,10 @@ impl<M: Message> Flow<M> {
         &mut self,
         follower: &mut F,
     ) -> Result<Step<M::Header>, StageError> {
-        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let work = Work::begin();
         let mut step = follower.step()?;
         if let Step::Worked(message) = &mut step {
-            let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-            crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
+            work.end(&mut self.counters);
             if let Some(header) = message.take() {
                 self.publish(header)?;
             }
@@ -125,7 +120,11 @@ impl<M: Message> Flow<M> {
         let has_ended = matches!(step, Step::Ended);
         if has_ended {
             follower.sync()?;
-            self.publish_end()?;
+            let end = Item {
+                seq: self.next_seq,
+                ..Item::default()
+            };
+            self.output.end(end, None)?;
         }
         self.report.write(follower.progress(), has_ended)?;
         Ok(step)
@@ -135,16 +134,6 @@ impl<M: Message> Flow<M> {
         self.next_seq = header.item().seq.saturating_add(1);
         let mut draft = self.output.loan()?;
         *draft.header() = header;
-        self.output.send_unchanged(draft)
-    }
-
-    fn publish_end(&mut self) -> Result<(), StageError> {
-        let mut draft = self.output.loan()?;
-        *draft.header().item_mut() = Item {
-            seq: self.next_seq,
-            flags: flag::END,
-            ..Item::default()
-        };
         self.output.send_unchanged(draft)
     }
 }

@@ -13,7 +13,6 @@ use std::{
 };
 
 use gyre_messages::{GivenAnew, Item, NumberedBy};
-use gyre_storage::StorageError;
 
 use crate::{Manifest, StageError};
 
@@ -47,10 +46,8 @@ impl Generation {
         });
         let kept = lines.iter().skip(lines.len().saturating_sub(KEPT));
         let text: String = kept.map(Line::to_string).collect();
-        let folder = path.parent().map_or(Ok(()), gyre_storage::create_folder);
-        folder
-            .and_then(|()| gyre_storage::write(&path, text))
-            .map_err(|StorageError { path, source, .. }| StageError::File { path, source })?;
+        gyre_storage::create_folder(&manifest.out.join("journal"))?;
+        gyre_storage::write(&path, text)?;
         Ok(Self(GivenAnew { generation, first }))
     }
 
@@ -118,13 +115,7 @@ impl fmt::Display for Line {
 fn read(path: &Path) -> Result<Vec<Line>, StageError> {
     let text = match gyre_storage::read_text(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(source) => {
-            return Err(StageError::File {
-                path: path.to_owned(),
-                source,
-            });
-        }
-        Ok(text) => text,
+        read => read.map_err(StageError::file(path))?,
     };
     let lines: Option<Vec<Line>> = text.lines().map(Line::parse).collect();
     lines.filter(|lines| !lines.is_empty()).ok_or_else(|| {

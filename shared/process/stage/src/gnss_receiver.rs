@@ -60,7 +60,7 @@ impl GnssReceiver {
     /// Receives at an address, and continues the log if there is one.
     pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
         let socket = listen("fixes of GNSS", "gnss", address)?;
-        let log = Log::open(log).map_err(unwritten)?;
+        let log = Log::open(log)?;
         let timeout = socket.set_read_timeout(Some(WAIT));
         timeout.map_err(|error| StageError::transport("receive fixes", error))?;
         let shared = Arc::new(Shared {
@@ -101,10 +101,10 @@ impl GnssReceiver {
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(ended)) => ended,
-            Some(Err(_)) => {
-                let reason = "the thread has ended without a reason";
-                Err(StageError::transport("receive fixes", reason))
-            }
+            Some(Err(_)) => Err(StageError::transport(
+                "receive fixes",
+                "the thread has ended",
+            )),
         }
     }
 }
@@ -114,10 +114,6 @@ impl Drop for GnssReceiver {
         // Who drops it does not need the log.
         let _ = self.finish();
     }
-}
-
-fn unwritten(StorageError { path, source, .. }: StorageError) -> StageError {
-    StageError::File { path, source }
 }
 
 /// The log, which is written at its end.
@@ -194,8 +190,8 @@ impl Reception {
             tracing::warn!(lost, "datagrams with fixes came faster than they are read");
         }
         let surplus = self.surplus();
-        self.log.append(&surplus).map_err(unwritten)?;
-        self.log.sync.finish().map_err(unwritten)
+        self.log.append(&surplus)?;
+        Ok(self.log.sync.finish()?)
     }
 
     /// Returns the row that counts the surplus; nothing without one.
@@ -221,11 +217,11 @@ impl Reception {
             }
         }
         let mut datagrams = self.shared.lock();
-        self.log.append(&rows).map_err(unwritten)?;
+        self.log.append(&rows)?;
         *datagrams += 1;
         // Readers do not wait for the disk.
         drop(datagrams);
-        self.log.sync.changed().map_err(unwritten)
+        Ok(self.log.sync.changed()?)
     }
 }
 
@@ -233,30 +229,27 @@ impl Reception {
 /// fix), and the standard deviation, m, if the receiver knows it.
 fn row(line: &str) -> String {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let row = match fields[..] {
-        [stamp, "", ""] | [stamp, "", "", _] => no_fix(stamp),
+    let (stamp, numbers) = match fields[..] {
+        [stamp, "", ""] | [stamp, "", "", _] => (stamp, None),
         [stamp, latitude, longitude] | [stamp, latitude, longitude, ""] => {
-            fix(stamp, [latitude, longitude, "0"])
+            (stamp, Some([latitude, longitude, "0"]))
         }
-        [stamp, latitude, longitude, sigma_m] => fix(stamp, [latitude, longitude, sigma_m]),
-        _ => None,
+        [stamp, latitude, longitude, sigma_m] => (stamp, Some([latitude, longitude, sigma_m])),
+        _ => return UNREADABLE.to_owned(),
     };
-    row.unwrap_or_else(|| UNREADABLE.to_owned())
-}
-
-fn no_fix(stamp: &str) -> Option<String> {
-    let stamp_ns: i64 = stamp.parse().ok()?;
-    Some(format!("{stamp_ns},,,0\n"))
-}
-
-fn fix(stamp: &str, numbers: [&str; 3]) -> Option<String> {
-    let stamp_ns: i64 = stamp.parse().ok()?;
-    let numbers = numbers.map(|number| number.parse::<f64>().ok());
-    let [Some(latitude), Some(longitude), Some(sigma_m)] = numbers else {
-        return None;
+    let Ok(stamp_ns) = stamp.parse::<i64>() else {
+        return UNREADABLE.to_owned();
     };
-    // The shortest text that is read back as the same number.
-    Some(format!("{stamp_ns},{latitude},{longitude},{sigma_m}\n"))
+    let Some(numbers) = numbers else {
+        return format!("{stamp_ns},,,0\n");
+    };
+    match numbers.map(str::parse::<f64>) {
+        // The shortest text that is read back as the same number.
+        [Ok(latitude), Ok(longitude), Ok(sigma_m)] => {
+            format!("{stamp_ns},{latitude},{longitude},{sigma_m}\n")
+        }
+        _ => UNREADABLE.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -294,7 +287,6 @@ mod tests {
         }
     }
 
-    /// Returns an address that stays free: senders take their ports on 127.0.0.1.
     /// Returns an address below the ports that the system gives to sockets: no socket of another
     /// test takes the port between two receivers.
     fn free_address() -> String {

@@ -41,6 +41,7 @@ pub mod inputs;
 pub mod launch;
 mod log_id;
 mod manifest;
+mod numbers;
 pub mod observer;
 mod outlet;
 pub mod python_function;

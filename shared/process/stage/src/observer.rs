@@ -60,6 +60,9 @@ pub struct Observer<'run, M: Message> {
     data: Listener,
     current: Option<Received<M>>,
     sequence: Sequence,
+    /// True if the last call of [`next`](Self::next) found the end. After the end of the stream
+    /// masking may still be killed, and reuse numbers.
+    has_ended: bool,
     /// When it last looked at its queue after a sleep.
     looked: Instant,
 }
@@ -93,7 +96,7 @@ impl ObservedRun {
         transport::silence();
         let manifest = Manifest::read(root)?;
         let path = Manifest::path(root);
-        let file = File::open(&path).map_err(|source| StageError::File { path, source })?;
+        let file = File::open(&path).map_err(StageError::file(&path))?;
         let node = manifest.transport()?.join(NAME)?;
         let run = Self {
             manifest,
@@ -106,7 +109,6 @@ impl ObservedRun {
         }
     }
 
-    /// Returns the properties of the run.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -138,6 +140,7 @@ impl ObservedRun {
             data,
             current: None,
             sequence: Sequence::default(),
+            has_ended: false,
             looked: Instant::now(),
         })
     }
@@ -146,11 +149,12 @@ impl ObservedRun {
         if let Sender::Follower(follower) = topic.sender
             && !follower.is_in(&self.manifest.window)
         {
-            return Err(StageError::NoTopic {
-                topic: topic.name,
-                needs: follower.needs(),
-                out: self.manifest.out.clone(),
-            });
+            return Err(StageError::Input(format!(
+                "the run that writes to {} has no topic `{}`: only a run with {} has it",
+                self.manifest.out.display(),
+                topic.name,
+                follower.needs()
+            )));
         }
         let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
         loop {
@@ -215,16 +219,18 @@ impl<M: Message> Observer<'_, M> {
     /// message before it is released, and the next call releases this one.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
         self.current = None;
+        self.has_ended = false;
         let since = Instant::now();
         loop {
             while let Some(message) = self.receive()? {
                 let item = message.item();
-                let skipped = self.skipped(self.sequence.generation, item)?;
+                let skipped = self.skipped_by(self.sequence.generation, item)?;
                 if let Some(missed) = self.sequence.advance_past(item, skipped) {
                     return Ok(Next::Message(self.current.insert(message), missed));
                 }
             }
-            if self.sequence.ended || self.run.has_ended() {
+            self.has_ended = self.sequence.ended || self.run.has_ended();
+            if self.has_ended {
                 return Ok(Next::Ended);
             }
             let left = limit.saturating_sub(since.elapsed());
@@ -235,28 +241,9 @@ impl<M: Message> Observer<'_, M> {
         }
     }
 
-    /// Returns, among the generations after `known` and before the item's, the one that reused the
-    /// smallest number.
-    pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
-        generation::skipped(
-            &self.run.manifest.out,
-            NumberedBy::of(M::TOPIC),
-            known,
-            item,
-        )
-    }
-
-    /// Returns the listener that the publisher notifies: see [`wait_for_any`].
-    pub fn listener(&self) -> &Listener {
-        &self.data
-    }
-
-    /// Counts as missed all items between `next` and the first received item: all before it is
-    /// known already, as from an observer that was there earlier, whose newest item had this
-    /// generation.
-    pub fn expect(&mut self, next: u64, generation: u32) {
-        self.sequence.expected = Some(next);
-        self.sequence.generation = generation;
+    fn skipped_by(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        let out = &self.run.manifest.out;
+        generation::skipped(out, NumberedBy::of(M::TOPIC), known, item)
     }
 
     /// Returns the number of items missed since the observer attached, or since the expected item.

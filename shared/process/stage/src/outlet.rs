@@ -1,9 +1,8 @@
-//! The publisher of a topic whose messages come as bytes: from a recording, or from another
-//! machine.
+//! Messages that come as bytes: from a recording, or from another machine.
 
-use gyre_messages::{Item, Message, Pose, Sender, StageId, flag};
+use gyre_messages::{Item, Message, Pose, Sender, StageId};
 
-use crate::{Launch, Listener, StageError, writer::UntypedWriter};
+use crate::{Launch, StageError, writer::TopicWriter};
 
 /// A wire message outside of shared memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -22,36 +21,35 @@ impl RecordedMessage {
     }
 }
 
-/// The publisher of a topic, whatever its type, in the place of the source.
-pub(crate) struct Outlet(UntypedWriter);
-
-impl Outlet {
-    /// Opens a topic of the stream for publishing.
-    pub(crate) fn open(launch: &Launch, topic: &str) -> Result<Self, StageError> {
-        let of_stream = gyre_messages::topic(topic)
-            .filter(|topic| matches!(topic.sender, Sender::Stage(_)) && topic.name != Pose::TOPIC);
-        let Some(topic) = of_stream else {
-            let reason = format!("a source does not publish the topic `{topic}`");
-            return Err(StageError::Configuration(reason));
+impl TopicWriter {
+    /// Opens topics of the stream for publishing, in the place of the source.
+    pub(crate) fn of_stream(launch: &Launch, topics: &[&str]) -> Result<Vec<Self>, StageError> {
+        let of_stream = |topic: &&str| {
+            let found = gyre_messages::topic(topic)
+                .filter(|it| matches!(it.sender, Sender::Stage(_)) && it.name != Pose::TOPIC);
+            let topic = found.ok_or_else(|| {
+                let reason = format!("a source does not publish the topic `{topic}`");
+                StageError::Configuration(reason)
+            })?;
+            Self::open(&launch.node, &launch.manifest, topic)
         };
-        UntypedWriter::open(&launch.node, &launch.manifest, topic).map(Self)
+        topics.iter().map(of_stream).collect()
     }
 
-    pub(crate) fn topic(&self) -> &'static str {
-        self.0.topic()
-    }
-
-    /// Publishes a message with this item.
-    pub(crate) fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError> {
-        let mut loan = self.0.loan()?;
+    /// Publishes a message with this item, in the place of the source.
+    pub(crate) fn republish(
+        &self,
+        message: &RecordedMessage,
+        item: Item,
+    ) -> Result<(), StageError> {
+        let mut loan = self.loan()?;
         let (header, payload) = loan.parts();
         let (bytes, room) = (message.payload.len(), payload.len());
         let is_whole = message.header.len() == header.len();
         let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
             return Err(StageError::Input(format!(
                 "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
-                item.seq,
-                self.topic()
+                item.seq, self.topic
             )));
         };
         content.copy_from_slice(&message.payload);
@@ -59,25 +57,7 @@ impl Outlet {
         payload[bytes..].fill(0);
         header.copy_from_slice(&message.header);
         *loan.item() = item;
-        self.0.send(loan, StageId::RadarReplay)
-    }
-
-    /// Publishes the end of the stream.
-    pub(crate) fn end(&self, item: Item) -> Result<(), StageError> {
-        let mut loan = self.0.loan()?;
-        *loan.item() = Item {
-            flags: flag::END,
-            ..item
-        };
-        self.0.send(loan, StageId::RadarReplay)
-    }
-
-    pub(crate) fn accept_readers(&self) -> Result<(), StageError> {
-        self.0.accept_readers()
-    }
-
-    pub(crate) fn listener(&self) -> &Listener {
-        self.0.listener()
+        self.send(loan, Some(StageId::RadarReplay))
     }
 }
 

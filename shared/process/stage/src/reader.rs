@@ -38,7 +38,6 @@ impl<M: Message> Received<M> {
         bytemuck::from_bytes(self.sample.header())
     }
 
-    /// Returns the scan that the message is about.
     pub fn item(&self) -> &Item {
         self.header().item()
     }
@@ -213,7 +212,6 @@ impl<M: Message> Reader<M> {
         self.duplicates
     }
 
-    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         self.port.listener()
     }

@@ -12,21 +12,23 @@ use crate::{
     run::{self, SHARED_MEMORY},
 };
 
-/// Allocates the segment of the publisher with this id.
-pub(crate) fn reserve(
-    manifest: &Manifest,
-    topic: &'static str,
-    publisher: u128,
-) -> Result<(), StageError> {
+/// Allocates the segment of the publisher with this id. A dead process may have left memory that is
+/// about to be freed.
+pub(crate) fn reserve(manifest: &Manifest, topic: &str, publisher: u128) -> Result<(), StageError> {
     let suffix = format!("_{publisher}.data");
     let (path, segment) = run::own_files(Path::new(SHARED_MEMORY), &manifest.prefix)
         .find(|(path, _)| path.to_string_lossy().ends_with(&suffix))
         .ok_or_else(|| StageError::transport(format!("find the memory of {topic}"), publisher))?;
-    let full = |source: std::io::Error| StageError::NoMemory {
-        topic,
-        megabytes: segment.len() as f64 / 1e6,
-        source,
-    };
-    let file = File::options().write(true).open(path).map_err(full)?;
-    fallocate(&file, FallocateFlags::empty(), 0, segment.len()).map_err(|error| full(error.into()))
+    let file = File::options().write(true).open(path);
+    let allocated = file.and_then(|file| {
+        let whole = fallocate(&file, FallocateFlags::empty(), 0, segment.len());
+        whole.map_err(Into::into)
+    });
+    allocated.map_err(|error| {
+        StageError::Transient(format!(
+            "shared memory at {SHARED_MEMORY} has no room for the {:.1} MB of topic `{topic}` ({error}): free some, enlarge it \
+             (containers: --shm-size), or lower run.window or raster.n",
+            segment.len() as f64 / 1e6
+        ))
+    })
 }

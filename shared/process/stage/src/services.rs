@@ -5,7 +5,7 @@ use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, TopicSize
 
 use crate::{
     StageError,
-    log_id::LOGS,
+    log_id::LogId,
     transport::{Event, EventSizes, Node, Service},
 };
 
@@ -28,8 +28,8 @@ impl Services {
                 notifiers: 1,
                 nodes: Pose::sizes(window).nodes(),
             };
-            for log in LOGS {
-                events.push(Event::create(node, log.event(), sizes)?);
+            for log in LogId::ALL {
+                events.push(Event::create(node, log.name(), sizes)?);
             }
         }
         Ok(Self {

@@ -2,10 +2,11 @@
 
 use std::fs;
 
-use gyre_messages::{Header, Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
 use crate::{
-    Launch, Manifest, StageCounters, StageError, allocations, clock,
+    Launch, Manifest, StageCounters, StageError,
+    counters::Work,
     reader::{Reader, Received},
     run,
     transport::Listener,
@@ -43,9 +44,7 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     launch: &Launch,
     sink: &mut S,
 ) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
     republish(&poses, &restored, S::HOP)?;
@@ -59,7 +58,10 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
         counters: StageCounters::default(),
     };
     if ended {
-        integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
+        let last = restored.last().map(|pose| pose.item);
+        integration
+            .poses
+            .end(last.unwrap_or_default(), Some(S::HOP))?;
     }
     let mut inputs = Motions::<M>::open(launch, next, integration.sink.takes_scans())?;
     integration.drain(&mut inputs)?;
@@ -100,14 +102,9 @@ pub(crate) fn republish(
     restored: &[PoseHeader],
     hop: StageId,
 ) -> Result<(), StageError> {
-    let base = PoseHeader {
-        item: Item {
-            flags: flag::BASE | flag::SYNC,
-            ..Item::default()
-        },
-        ..PoseHeader::default()
-    };
     let Some((last, earlier)) = restored.split_last() else {
+        let mut base = PoseHeader::default();
+        base.item.flags = flag::BASE | flag::SYNC;
         return publish(poses, base, hop);
     };
     for pose in earlier {
@@ -118,14 +115,9 @@ pub(crate) fn republish(
 
 /// Marks a pose as the newest. Older ones that are published again are not marked: a source that
 /// resumed at one of them would send more scans than its readers have room for.
-pub(crate) fn newest(pose: PoseHeader) -> PoseHeader {
-    PoseHeader {
-        item: Item {
-            flags: pose.item.flags | flag::SYNC,
-            ..pose.item
-        },
-        ..pose
-    }
+pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
+    pose.item.flags |= flag::SYNC;
+    pose
 }
 
 pub(crate) fn publish(
@@ -230,7 +222,7 @@ impl<S: Sink> Integration<'_, S> {
             match item.is(flag::END) {
                 true => {
                     self.sink.end(&item)?;
-                    self.publish_end(item)?;
+                    self.poses.end(item, Some(S::HOP))?;
                     self.ended = true;
                 }
                 false => self.integrate(input)?,
@@ -242,25 +234,12 @@ impl<S: Sink> Integration<'_, S> {
     }
 
     fn integrate(&mut self, input: Input<'_>) -> Result<(), StageError> {
-        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let work = Work::begin();
         let mut motion = input.motion;
         let hop = motion.item.hop_mut(S::HOP);
-        (hop.received_ns, hop.started_ns) = (input.received_ns, started_ns);
+        (hop.received_ns, hop.started_ns) = (input.received_ns, work.started_ns);
         let pose = self.sink.integrate(&motion, input.scan)?;
-        crate::counters::record(
-            &mut self.counters,
-            allocations::so_far() - allocated,
-            clock::now_ns() - started_ns,
-        );
+        work.end(&mut self.counters);
         publish(&self.poses, newest(pose), S::HOP)
-    }
-
-    fn publish_end(&mut self, item: Item) -> Result<(), StageError> {
-        let mut draft = self.poses.loan()?;
-        *draft.header().item_mut() = Item {
-            flags: flag::END,
-            ..item
-        };
-        self.poses.send(draft, S::HOP)
     }
 }

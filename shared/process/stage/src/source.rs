@@ -3,6 +3,7 @@
 
 mod attempts;
 mod credit;
+mod feed;
 mod live_samples;
 mod pace;
 mod playback;
@@ -20,11 +21,11 @@ use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
 
-use crate::{Launch, StageCounters, StageError, schedule::ScheduleWriter, writer::Writer};
+use crate::{Launch, StageCounters, StageError, writer::Writer};
 pub(crate) use credit::Credit;
+pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
-pub(crate) use sensor::ALIVE_NS;
 
 pub use crate::outlet::RecordedMessage;
 pub use attempts::{Tolerance, Unreadable, open};
@@ -71,26 +72,14 @@ pub fn run(
     source: &mut impl Source,
     tolerance: &Tolerance,
 ) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
-    let credit = Credit::open(launch)?;
-    let schedule = ScheduleWriter::create(&launch.manifest)?;
-    let scans = Writer::open(&launch.node, &launch.manifest)?;
+    launch.take_place()?;
     let mut playback = Playback {
-        launch,
+        feed: Feed::open(launch, || Writer::open(&launch.node, &launch.manifest))?,
         source,
         tolerance,
-        credit,
-        scans,
-        schedule,
-        counters: StageCounters::default(),
-        may_have_new_readers: false,
     };
     // By default the system ends a wait up to 50 us late. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
-    if let Some(position) = playback.wait_for_start()? {
-        playback.play(position)?;
-    }
-    Ok(playback.counters)
+    let ended = playback.play();
+    playback.feed.finish(ended)
 }

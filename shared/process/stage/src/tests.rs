@@ -32,8 +32,8 @@ const WINDOW: Window = Window {
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.
-struct Run {
-    manifest: Manifest,
+pub(crate) struct Run {
+    pub(crate) manifest: Manifest,
     _services: Services,
     _supervisor: Node,
     // Last: removes all files of the run.
@@ -42,7 +42,7 @@ struct Run {
 }
 
 impl Run {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::writing_to(&Rc::new(tempfile::tempdir().unwrap()))
     }
 

@@ -12,6 +12,8 @@ mod sealed;
 mod service;
 mod subscriber;
 
+use std::{fmt::Debug, path::Path};
+
 use iceoryx2::{
     node::NodeView,
     prelude::{
@@ -52,39 +54,30 @@ pub fn silence() {
 }
 
 impl Manifest {
-    /// Returns the transport of the run.
+    /// Returns the transport of the run. Names and paths are unique to the run, and only the
+    /// supervisor cleans up.
     pub fn transport(&self) -> Result<Transport, StageError> {
-        Transport::of(self)
-    }
-}
-
-impl Transport {
-    /// The transport of a run. Names and paths are unique to the run, and only the supervisor
-    /// cleans up.
-    pub(crate) fn of(manifest: &Manifest) -> Result<Self, StageError> {
         let mut config = Config::default();
-        config.global.prefix = FileName::new(manifest.prefix.as_bytes())
+        config.global.prefix = FileName::new(self.prefix.as_bytes())
             .map_err(|e| StageError::transport("name the run", e))?;
-        let root = format!("{}/", manifest.root.display());
+        let root = format!("{}/", self.root.display());
         let root = TransportPath::new(root.as_bytes())
             .map_err(|e| StageError::transport("use the run's root", e))?;
         config.global.set_root_path(&root);
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
-        Ok(Self(config))
+        Ok(Transport(config))
     }
+}
 
+impl Transport {
     /// Makes the configuration in a file the global one, which the transport uses to clean up
     /// incomplete nodes.
-    pub fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
-        let failed = |reason: String| StageError::Manifest {
-            path: path.to_owned(),
-            reason,
-        };
-        let file = FilePath::new(path.as_os_str().as_encoded_bytes())
-            .map_err(|e| failed(format!("{e:?}")))?;
-        Config::setup_global_config_from_file(&file).map_err(|e| failed(format!("{e:?}")))?;
+    pub fn use_as_global(path: &Path) -> Result<(), StageError> {
+        let failed = |error: &dyn Debug| StageError::manifest(path, format_args!("{error:?}"));
+        let file = FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(&e))?;
+        Config::setup_global_config_from_file(&file).map_err(|e| failed(&e))?;
         Ok(())
     }
 

@@ -127,8 +127,8 @@ impl Signals {
 
     /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is
     /// first. Consumes the notifications of `data`: read all queues afterwards. A notification of
-    /// `handshake` is left for [`Writer::accept_readers`](crate::writer::Writer::accept_readers),
-    /// to be called if [`Woken::may_have_new_readers`].
+    /// `handshake` is left for `accept_readers` of the writer, to be called if
+    /// [`Woken::may_have_new_readers`].
     pub fn wait(
         &self,
         data: &[&Listener],

@@ -1,8 +1,8 @@
 //! The publisher of a topic.
 
-use std::marker::PhantomData;
+use std::{marker::PhantomData, ops::Deref, slice};
 
-use gyre_messages::{Message, StageId, Topic};
+use gyre_messages::{Item, Message, StageId, Topic, flag};
 
 use crate::{
     Manifest, StageError, clock, reservation, services,
@@ -10,9 +10,9 @@ use crate::{
 };
 
 /// Publishes the messages of a topic and keeps a history for late readers: see
-/// [`Writer::accept_readers`].
+/// [`TopicWriter::accept_readers`].
 pub struct Writer<M: Message> {
-    untyped: UntypedWriter,
+    untyped: TopicWriter,
     message: PhantomData<M>,
 }
 
@@ -23,8 +23,8 @@ pub struct Draft<M: Message> {
 }
 
 /// A [`Writer`] of messages of any type, as bytes.
-pub(crate) struct UntypedWriter {
-    topic: &'static str,
+pub struct TopicWriter {
+    pub(crate) topic: &'static str,
     handshake: Listener,
     data: Notifier,
     publisher: Publisher,
@@ -34,7 +34,7 @@ impl<M: Message> Writer<M> {
     /// Opens the topic for publishing.
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         Ok(Self {
-            untyped: UntypedWriter::open(node, manifest, &Topic::of::<M>())?,
+            untyped: TopicWriter::open(node, manifest, &Topic::of::<M>())?,
             message: PhantomData,
         })
     }
@@ -49,34 +49,30 @@ impl<M: Message> Writer<M> {
 
     /// Publishes a message without copying: readers receive its offset in shared memory.
     pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
-        self.untyped.send(draft.loan, hop)
+        self.untyped.send(draft.loan, Some(hop))
     }
 
     /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
     pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
-        self.untyped.send_unchanged(draft.loan)
-    }
-
-    /// Sends the history to readers that have subscribed since the last call, and wakes them.
-    ///
-    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
-    /// topics, so unconditional wake-ups would circulate for ever.
-    pub fn accept_readers(&self) -> Result<(), StageError> {
-        self.untyped.accept_readers()
-    }
-
-    /// The same for readers that have notified alone; returns whether there were any.
-    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
-        self.untyped.answer_handshakes()
-    }
-
-    /// Returns the listener that new readers notify.
-    pub fn listener(&self) -> &Listener {
-        self.untyped.listener()
+        self.untyped.send(draft.loan, None)
     }
 }
 
-impl UntypedWriter {
+impl<M: Message> Deref for Writer<M> {
+    type Target = TopicWriter;
+
+    fn deref(&self) -> &TopicWriter {
+        &self.untyped
+    }
+}
+
+impl<M: Message> AsRef<[TopicWriter]> for Writer<M> {
+    fn as_ref(&self) -> &[TopicWriter] {
+        slice::from_ref(&self.untyped)
+    }
+}
+
+impl TopicWriter {
     pub(crate) fn open(
         node: &Node,
         manifest: &Manifest,
@@ -96,25 +92,34 @@ impl UntypedWriter {
         })
     }
 
-    pub(crate) fn topic(&self) -> &'static str {
-        self.topic
-    }
-
     pub(crate) fn loan(&self) -> Result<Loan, StageError> {
         self.publisher.loan()
     }
 
-    pub(crate) fn send(&self, mut loan: Loan, hop: StageId) -> Result<(), StageError> {
-        loan.item().hop_mut(hop).published_ns = clock::now_ns();
-        self.send_unchanged(loan)
-    }
-
-    fn send_unchanged(&self, loan: Loan) -> Result<(), StageError> {
+    /// Publishes a message of a stage, or of a process without a hop.
+    pub(crate) fn send(&self, mut loan: Loan, hop: Option<StageId>) -> Result<(), StageError> {
+        if let Some(hop) = hop {
+            loan.item().hop_mut(hop).published_ns = clock::now_ns();
+        }
         self.publisher.send(loan)?;
         self.notify()
     }
 
-    pub(crate) fn accept_readers(&self) -> Result<(), StageError> {
+    /// Publishes the end of the stream.
+    pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
+        let mut loan = self.loan()?;
+        *loan.item() = Item {
+            flags: flag::END,
+            ..item
+        };
+        self.send(loan, hop)
+    }
+
+    /// Sends the history to readers that have subscribed since the last call, and wakes them.
+    ///
+    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
+    /// topics, so unconditional wake-ups would circulate for ever.
+    pub fn accept_readers(&self) -> Result<(), StageError> {
         let new_reader = self.has_new_reader()?;
         // Unconditionally: after a lost handshake the reader finds the history at the end of its
         // own wait.
@@ -122,7 +127,8 @@ impl UntypedWriter {
         if new_reader { self.notify() } else { Ok(()) }
     }
 
-    fn answer_handshakes(&self) -> Result<bool, StageError> {
+    /// The same for readers that have notified alone; returns whether there were any.
+    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
         let new_reader = self.has_new_reader()?;
         if new_reader {
             self.publisher.connect()?;
@@ -136,6 +142,7 @@ impl UntypedWriter {
         Ok(self.handshake.take(action)? > 0)
     }
 
+    /// Returns the listener that new readers notify.
     pub fn listener(&self) -> &Listener {
         &self.handshake
     }

@@ -11,13 +11,13 @@ pub struct Growth {
 impl Growth {
     /// Opens the event of a log, as the one process that appends to it.
     pub fn of(launch: &Launch, log: LogId) -> Result<Self, StageError> {
-        let notifier = Notifier::open(&launch.node, log.event())?;
+        let notifier = Notifier::open(&launch.node, log.name())?;
         Ok(Self { log, notifier })
     }
 
     /// Wakes the followers: a record was appended.
     pub fn notify(&self) -> Result<(), StageError> {
         self.notifier
-            .notify(format_args!("notify {}", self.log.event()))
+            .notify(format_args!("notify {}", self.log.name()))
     }
 }

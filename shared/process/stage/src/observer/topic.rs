@@ -21,22 +21,21 @@ pub trait TopicObserver {
     /// Returns whether the end of the stream or of the run has been taken.
     fn has_ended(&self) -> bool;
 
-    /// See [`Observer::listener`].
+    /// Returns the listener that the publisher notifies: see
+    /// [`wait_for_any`](super::wait_for_any).
     fn listener(&self) -> &Listener;
 
-    /// See [`Observer::expect`].
+    /// Counts as missed all items between `next` and the first received item: all before it is
+    /// known already, as from an observer that was there earlier, whose newest item had this
+    /// generation.
     fn expect(&mut self, next: u64, generation: u32);
 
     /// See [`Observer::missed`].
     fn missed(&self) -> u64;
 
-    /// See [`Observer::skipped`].
+    /// Returns, among the generations after `known` and before the item's, the one that reused the
+    /// smallest number.
     fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
-}
-
-struct Typed<'run, M: Message> {
-    observer: Observer<'run, M>,
-    has_ended: bool,
 }
 
 impl ObservedRun {
@@ -45,39 +44,30 @@ impl ObservedRun {
         &self,
         topic: &str,
     ) -> Result<Option<Box<dyn TopicObserver + '_>>, StageError> {
-        Ok(Some(match topic {
-            Scan::TOPIC => self.typed::<Scan>()?,
-            Masked::TOPIC => self.typed::<Masked>()?,
-            Rotation::TOPIC => self.typed::<Rotation>()?,
-            Motion::TOPIC => self.typed::<Motion>()?,
-            Refined::TOPIC => self.typed::<Refined>()?,
-            Pose::TOPIC => self.typed::<Pose>()?,
-            Loop::TOPIC => self.typed::<Loop>()?,
-            Correction::TOPIC => self.typed::<Correction>()?,
-            Fix::TOPIC => self.typed::<Fix>()?,
-            Objects::TOPIC => self.typed::<Objects>()?,
+        let observer: Box<dyn TopicObserver + '_> = match topic {
+            Scan::TOPIC => Box::new(self.observe::<Scan>()?),
+            Masked::TOPIC => Box::new(self.observe::<Masked>()?),
+            Rotation::TOPIC => Box::new(self.observe::<Rotation>()?),
+            Motion::TOPIC => Box::new(self.observe::<Motion>()?),
+            Refined::TOPIC => Box::new(self.observe::<Refined>()?),
+            Pose::TOPIC => Box::new(self.observe::<Pose>()?),
+            Loop::TOPIC => Box::new(self.observe::<Loop>()?),
+            Correction::TOPIC => Box::new(self.observe::<Correction>()?),
+            Fix::TOPIC => Box::new(self.observe::<Fix>()?),
+            Objects::TOPIC => Box::new(self.observe::<Objects>()?),
             _ => return Ok(None),
-        }))
-    }
-
-    fn typed<M: Message>(&self) -> Result<Box<dyn TopicObserver + '_>, StageError> {
-        Ok(Box::new(Typed {
-            observer: self.observe::<M>()?,
-            has_ended: false,
-        }))
+        };
+        Ok(Some(observer))
     }
 }
 
-impl<M: Message> TopicObserver for Typed<'_, M> {
+impl<M: Message> TopicObserver for Observer<'_, M> {
     fn topic(&self) -> &'static str {
         M::TOPIC
     }
 
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
-        let next = self.observer.next(Duration::ZERO)?;
-        // After the end of the stream masking may still be killed, and reuse numbers.
-        self.has_ended = matches!(next, Next::Ended);
-        Ok(match next {
+        Ok(match self.next(Duration::ZERO)? {
             Next::Message(message, _) => Some(message.to_bytes()),
             Next::Idle | Next::Ended => None,
         })
@@ -88,18 +78,19 @@ impl<M: Message> TopicObserver for Typed<'_, M> {
     }
 
     fn listener(&self) -> &Listener {
-        self.observer.listener()
+        &self.data
     }
 
     fn expect(&mut self, next: u64, generation: u32) {
-        self.observer.expect(next, generation);
+        self.sequence.expected = Some(next);
+        self.sequence.generation = generation;
     }
 
     fn missed(&self) -> u64 {
-        self.observer.missed()
+        self.sequence.missed
     }
 
     fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
-        self.observer.skipped(known, item)
+        self.skipped_by(known, item)
     }
 }

@@ -6,7 +6,6 @@ use std::{
 };
 
 use serde::Deserialize;
-use thiserror::Error;
 
 /// The environment variable that names the interpreter.
 const VARIABLE: &str = "GYRE_PYTHON";
@@ -31,18 +30,6 @@ pub struct Interpreter {
     pub numpy: Option<String>,
 }
 
-/// There is none.
-#[derive(Debug, Error)]
-pub enum NoInterpreter {
-    #[error("cannot start {python}: {source}; install Python 3, or name one with GYRE_PYTHON")]
-    Start {
-        python: String,
-        source: std::io::Error,
-    },
-    #[error("{python} is no Python of version {}.{} or newer: name one with GYRE_PYTHON", OLDEST[0], OLDEST[1])]
-    Other { python: String },
-}
-
 /// Returns what `GYRE_PYTHON` names, or `python3`.
 pub(crate) fn name() -> String {
     env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
@@ -50,17 +37,21 @@ pub(crate) fn name() -> String {
 
 impl Interpreter {
     /// Starts the interpreter for functions, and asks for its version and packages.
-    pub fn find() -> Result<Self, NoInterpreter> {
+    pub fn find() -> Result<Self, String> {
         let python = name();
         let mut command = Command::new(&python);
         command.args(["-c", PROBE]).stdin(Stdio::null());
-        let output = match command.output() {
-            Ok(output) => output,
-            Err(source) => return Err(NoInterpreter::Start { python, source }),
-        };
+        let output = command.output().map_err(|error| {
+            format!(
+                "cannot start {python}: {error}; install Python 3, or name one with GYRE_PYTHON"
+            )
+        })?;
         let found: Option<Self> = serde_json::from_slice(&output.stdout).ok();
+        let [major, minor] = OLDEST;
         found
             .filter(|found| found.version[..2] >= OLDEST[..])
-            .ok_or(NoInterpreter::Other { python })
+            .ok_or_else(|| {
+                format!("{python} is no Python of version {major}.{minor} or newer: name one with GYRE_PYTHON")
+            })
     }
 }

@@ -3,13 +3,12 @@
 use std::os::fd::BorrowedFd;
 
 use gyre_messages::{
-    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
-    StageId, flag,
+    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, StageId,
 };
 
 use crate::{
-    Launch, StageCounters, StageError, outlet::RecordedMessage, reader::Reader,
-    remote_progress::ProgressWriter, sink, transport::Listener, wake, writer::Writer,
+    Launch, StageCounters, StageError, counters, numbers::Numbers, outlet::RecordedMessage,
+    reader::Reader, remote_progress, sink, transport::Listener, wake, writer::Writer,
 };
 
 /// Reads the topics of the last stages, which are on another machine, and publishes the poses that
@@ -20,7 +19,7 @@ pub struct LastStages<'a> {
     /// For masking, if the searches are on the other machine.
     motions: Option<Writer<Motion>>,
     inlets: Vec<Box<dyn Inlet>>,
-    progress: ProgressWriter,
+    progress: Numbers<1>,
     counters: StageCounters,
 }
 
@@ -31,7 +30,7 @@ impl<'a> LastStages<'a> {
         let motions = publishes_motions.then(|| Writer::open(node, manifest));
         Ok(Self {
             launch,
-            progress: ProgressWriter::create(manifest)?,
+            progress: remote_progress::begin(manifest)?,
             motions: motions.transpose()?,
             poses: Writer::open(node, manifest)?,
             inlets: Vec::new(),
@@ -65,28 +64,21 @@ impl<'a> LastStages<'a> {
     }
 
     /// Reports the number of items whose poses the other machine owes, counted at the source.
-    pub fn has_handed_over(&self, items: u64) -> Result<(), StageError> {
-        self.progress.has_published(items)
+    pub fn has_handed_over(&mut self, items: u64) -> Result<(), StageError> {
+        self.progress.write([items])
     }
 
     /// Publishes a new pose, the credit for one more scan.
     pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
-        crate::counters::record(&mut self.counters, 0, hop.finished_ns - hop.started_ns);
+        counters::record(&mut self.counters, 0, hop.finished_ns - hop.started_ns);
         sink::publish(&self.poses, sink::newest(pose), StageId::PoseIntegration)
     }
 
     /// Publishes the end of the stream.
     pub fn end(&self, item: Item) -> Result<(), StageError> {
-        let end = PoseHeader {
-            item: Item {
-                flags: flag::END,
-                ..item
-            },
-            ..PoseHeader::default()
-        };
-        sink::publish(&self.poses, end, StageId::PoseIntegration)
+        self.poses.end(item, Some(StageId::PoseIntegration))
     }
 
     pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
@@ -102,7 +94,7 @@ impl<'a> LastStages<'a> {
     /// handshakes of new readers; true on a request to stop.
     pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
         let data: Vec<_> = self.inlets.iter().map(|inlet| inlet.listener()).collect();
-        let motions = self.motions.as_ref().map(Writer::listener);
+        let motions = self.motions.as_ref().map(|motions| motions.listener());
         let handshakes: Vec<_> = [self.poses.listener()].into_iter().chain(motions).collect();
         let signals = &self.launch.signals;
         let woken =

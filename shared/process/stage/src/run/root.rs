@@ -59,12 +59,8 @@ pub enum RootError {
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
     Unusable { path: PathBuf, source: io::Error },
-    #[error("{path} {state}, so the shared memory of a run would not be safe in it: {remedy}")]
-    Unsafe {
-        path: PathBuf,
-        state: String,
-        remedy: String,
-    },
+    #[error("{0}")]
+    Unsafe(String),
     #[error("interrupted before the start")]
     Interrupted,
     #[error(transparent)]
@@ -78,7 +74,7 @@ impl RootError {
         match self {
             Self::Busy { .. } => true,
             Self::Unusable { source, .. } => source.kind() == io::ErrorKind::NotFound,
-            Self::Unsafe { .. } | Self::Interrupted | Self::Signals(_) => false,
+            Self::Unsafe(_) | Self::Interrupted | Self::Signals(_) => false,
         }
     }
 }
@@ -205,10 +201,11 @@ fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
 /// all others. A process with another umask may have created it, as the transport does in a process
 /// whose run has been removed.
 fn make_owner_only(path: &Path) -> Result<(), RootError> {
-    let unsafe_ = |state: String, remedy: String| RootError::Unsafe {
-        path: path.to_owned(),
-        state,
-        remedy,
+    let unsafe_ = |state: &str, remedy: &str| {
+        let path = path.display();
+        RootError::Unsafe(format!(
+            "{path} {state}, so the shared memory of a run would not be safe in it: {remedy}"
+        ))
     };
     let unusable = |source| RootError::Unusable {
         path: path.to_owned(),
@@ -217,8 +214,10 @@ fn make_owner_only(path: &Path) -> Result<(), RootError> {
     let directory = match open_directory(path) {
         Ok(directory) => directory,
         Err(Errno::NOTDIR | Errno::LOOP) => {
-            let remedy = "remove it, or ask its owner to".to_owned();
-            return Err(unsafe_("is not a directory".to_owned(), remedy));
+            return Err(unsafe_(
+                "is not a directory",
+                "remove it, or ask its owner to",
+            ));
         }
         Err(error) => return Err(unusable(error.into())),
     };
@@ -227,17 +226,14 @@ fn make_owner_only(path: &Path) -> Result<(), RootError> {
     match (owner == geteuid().as_raw(), mode) {
         (true, OWNER_ONLY) => Ok(()),
         (true, mode) if mode & NOT_OWN == 0 => set_owner_only(&directory).map_err(unusable),
-        (true, _) => {
-            let remedy = format!("remove it, or `chmod 700 {}`", path.display());
-            Err(unsafe_(
-                format!("has mode {mode:04o} instead of 0700"),
-                remedy,
-            ))
-        }
-        (false, _) => {
-            let remedy = "ask that user or the administrator to remove it".to_owned();
-            Err(unsafe_(format!("belongs to user {owner}"), remedy))
-        }
+        (true, _) => Err(unsafe_(
+            &format!("has mode {mode:04o} instead of 0700"),
+            &format!("remove it, or `chmod 700 {}`", path.display()),
+        )),
+        (false, _) => Err(unsafe_(
+            &format!("belongs to user {owner}"),
+            "ask that user or the administrator to remove it",
+        )),
     }
 }
 

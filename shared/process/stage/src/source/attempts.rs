@@ -24,22 +24,20 @@ pub struct Tolerance {
     pub max_unreadable: usize,
 }
 
-/// Opens the input of a source, and tries again while that fails with a sentence. `None` on a
-/// request to stop.
-/// Fails when input is unreadable for longer than `tolerance`.
+/// Opens the input of a source, and tries again while that fails with a sentence.
 pub fn open<T>(
     launch: &Launch,
     tolerance: &Tolerance,
     mut open: impl FnMut() -> Result<T, String>,
-) -> Result<Option<T>, StageError> {
+) -> Result<T, StageError> {
     let mut attempts = Attempts::new(tolerance);
     loop {
         match open() {
-            Ok(input) => return Ok(Some(input)),
+            Ok(input) => return Ok(input),
             Err(reason) => attempts.failed(reason)?,
         }
-        if launch.signals.wait(&[], None, PAUSE)?.stop {
-            return Ok(None);
+        if launch.signals.sleep(PAUSE)? {
+            return Err(StageError::Stopped);
         }
     }
 }
@@ -60,13 +58,10 @@ impl Attempts {
 
     /// Allows another attempt after one that failed.
     pub fn failed(&mut self, reason: String) -> Result<(), StageError> {
-        let since = match self.first_failure {
-            Some(since) => since,
-            None => {
-                tracing::warn!("tried again: {reason}");
-                *self.first_failure.insert(Instant::now())
-            }
-        };
+        if self.first_failure.is_none() {
+            tracing::warn!("tried again: {reason}");
+        }
+        let since = self.first_failure.get_or_insert_with(Instant::now);
         match since.elapsed() < self.retry {
             true => Ok(()),
             false => Err(StageError::Input(format!(

@@ -58,7 +58,7 @@ fn all_followers_of_a_log_are_woken_and_a_dead_one_does_not_matter() {
     let run = Run::new();
     let manifest: &Manifest = &run.manifest;
     let node = node(manifest);
-    let event = LogId::Keyframes.event();
+    let event = LogId::Keyframes.name();
     let notifier = Notifier::open(&node, event).unwrap();
     let [first, second] = [(); 2].map(|()| Listener::open(&node, event).unwrap());
     let notify = || notifier.notify(format_args!("notify")).unwrap();
