@@ -88,10 +88,6 @@ impl Follower for Fixes {
         })
     }
 
-    fn sync(&mut self) -> Result<(), StageError> {
-        Ok(())
-    }
-
     fn progress(&self) -> Progress {
         Progress {
             done: self.read as u64,

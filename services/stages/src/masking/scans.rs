@@ -1,7 +1,7 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
 use gyre_geometry::Twist;
-use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
+use gyre_messages::{Item, Scan, Window, flag};
 use gyre_radar::LostAzimuths;
 use gyre_samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
 use gyre_stage::{
@@ -21,8 +21,8 @@ pub struct Scans {
     /// The scan whose samples it has taken last.
     sampled: Option<u64>,
     window: Window,
-    /// The motions for the current and for the previous scan.
-    found: [Option<SearchedMotion>; 2],
+    /// The velocities for the current and for the previous scan.
+    found: [Option<Twist>; 2],
     /// Where azimuths of both were lost, if they have poses.
     lost: [Option<LostAzimuths>; 2],
 }
@@ -76,10 +76,10 @@ impl Inputs for Scans {
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
         // resumes.
-        let Some(resume_at) = self.motions.resume_at().copied() else {
+        let Some(resume_at) = self.motions.resume_at else {
             return Ok(Action::Wait);
         };
-        let newest_pose = self.motions.newest_pose();
+        let newest_pose = self.motions.newest_pose;
         let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
             Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
@@ -93,18 +93,15 @@ impl Inputs for Scans {
     fn view(&self) -> Option<ScanView<'_>> {
         let [motion, previous_motion] = self.found;
         let [previous_rate, rate] = self.gyro.sweep_rates_radps();
-        let twist = |motion: Option<SearchedMotion>, rate| {
-            with_yaw_rate(motion.map(|motion| motion.twist()), rate)
-        };
         let [lost, previous_lost] = self.lost;
         let previous = self.queue.previous().map(|scan| PreviousScan {
             scan,
-            twist: twist(previous_motion, previous_rate),
+            twist: with_yaw_rate(previous_motion, previous_rate),
             lost: previous_lost,
         });
         Some(ScanView {
             scan: self.queue.current()?,
-            twist: twist(motion, rate),
+            twist: with_yaw_rate(motion, rate),
             turn: self.gyro.turn(),
             distance: self.wheels.distance(),
             lost,
@@ -119,7 +116,7 @@ impl Inputs for Scans {
     fn listeners(&self) -> Vec<&Listener> {
         let scans = self.queue.listener();
         // Motions and poses are read when a scan comes.
-        if self.queue.current().is_none() && self.motions.resume_at().is_some() {
+        if self.queue.current().is_none() && self.motions.resume_at.is_some() {
             return vec![scans];
         }
         let [motions, poses] = self.motions.listeners();
@@ -182,7 +179,7 @@ impl Scans {
         Ok(())
     }
 
-    fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+    fn motion_for(&self, seq: u64) -> Option<Option<Twist>> {
         match self.window.lag {
             0 => Some(None),
             lag => self.motions.before(seq, lag as u64),

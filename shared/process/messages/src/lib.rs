@@ -43,7 +43,7 @@ pub use item::{Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Element, Header, Message, Sender};
-pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
+pub use motion::{Motion, MotionEstimate, MotionHeader};
 pub use numbering::{GivenAnew, NumberedBy};
 pub use objects::{ListedObject, MAX_LISTED, Objects, ObjectsHeader};
 pub use pose::{Pose, PoseHeader};

@@ -1,7 +1,7 @@
 //! `motion`: the motion of the vehicle between two scans.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{OdometryMotion, Pose, Twist, covariance, pose, xy_yaw};
+use gyre_geometry::{OdometryMotion, Twist, covariance, pose, xy_yaw};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, Refined};
 
@@ -48,21 +48,6 @@ pub struct MotionEstimate {
     /// compensation uses it.
     pub searched: [f64; 3],
     pub refinement: RefinementRecord,
-}
-
-/// The searched motion. It is the same whether masking reads it from `motion` or from `pose` after
-/// refinement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SearchedMotion {
-    pub motion: Pose,
-    /// Time between the two scans, ns on the sensor's clock.
-    pub interval_ns: i64,
-}
-
-impl SearchedMotion {
-    pub fn twist(&self) -> Twist {
-        Twist::from_motion(&self.motion, self.interval_ns as f64 * 1e-9)
-    }
 }
 
 /// Longest motion in widths of a raster. The search stays within one; a prediction over a gap may
@@ -136,12 +121,12 @@ impl MotionEstimate {
         }
     }
 
-    pub fn searched(&self) -> SearchedMotion {
+    /// Returns the constant velocity of the searched motion. It is the same whether masking reads
+    /// it from `motion` or from `pose` after refinement.
+    pub fn searched_twist(&self) -> Twist {
         let [x_m, y_m, yaw_rad] = self.searched;
-        SearchedMotion {
-            motion: pose(x_m, y_m, yaw_rad),
-            interval_ns: self.interval_ns,
-        }
+        let interval_s = self.interval_ns as f64 * 1e-9;
+        Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s)
     }
 }
 

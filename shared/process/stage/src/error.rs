@@ -79,6 +79,14 @@ impl StageError {
         }
     }
 
+    pub(crate) fn gap(topic: &'static str, expected: u64, got: u64) -> Self {
+        Self::SequenceGap {
+            topic,
+            expected,
+            got,
+        }
+    }
+
     pub fn configuration(error: impl Display) -> Self {
         Self::Configuration(error.to_string())
     }

@@ -32,7 +32,9 @@ pub trait Follower {
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
     /// Makes its writes survive a power failure. A failure is found by nobody after the process.
-    fn sync(&mut self) -> Result<(), StageError>;
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
 
     /// Returns the position in the logs.
     fn progress(&self) -> Progress;
@@ -54,10 +56,9 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     launch.take_place()?;
     // Only latency depends on it.
     let _ = rustix::process::nice(NICENESS);
-    let listeners: Vec<Listener> = F::LOGS
-        .iter()
-        .map(|log| Listener::open(&launch.node, log.name()))
-        .collect::<Result<_, _>>()?;
+    let logs = F::LOGS.iter();
+    let listeners = logs.map(|log| Listener::open(&launch.node, log.name()));
+    let listeners: Vec<Listener> = listeners.collect::<Result<_, _>>()?;
     let grown: Vec<&Listener> = listeners.iter().collect();
     launch.begin_heartbeat()?;
     let mut flow = Flow {
@@ -111,7 +112,8 @@ impl<M: Message> Flow<M> {
         if let Step::Worked(message) = &mut step {
             work.end(&mut self.counters);
             if let Some(header) = message.take() {
-                self.publish(header)?;
+                self.next_seq = header.item().seq.saturating_add(1);
+                self.output.publish(header, None)?;
             }
             if !self.delay.is_zero() {
                 thread::sleep(self.delay);
@@ -128,12 +130,5 @@ impl<M: Message> Flow<M> {
         }
         self.report.write(follower.progress(), has_ended)?;
         Ok(step)
-    }
-
-    fn publish(&mut self, header: M::Header) -> Result<(), StageError> {
-        self.next_seq = header.item().seq.saturating_add(1);
-        let mut draft = self.output.loan()?;
-        *draft.header() = header;
-        self.output.send_unchanged(draft)
     }
 }

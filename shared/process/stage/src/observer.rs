@@ -182,7 +182,7 @@ impl ObservedRun {
         if service.subscribers_named(NAME) >= places {
             return Err(no_place());
         }
-        let subscriber = Subscriber::observe(&service, NAME)?;
+        let subscriber = Subscriber::create(&service, Some(NAME))?;
         // Another observer may have come at the same time. The places of the stages must stay free
         // for their restarts.
         if service.subscribers_named(NAME) > places {

@@ -95,7 +95,7 @@ impl<M: Message> Port<M> {
         let service = Service::open(node, &Topic::of::<M>())?;
         Ok(Self {
             limits: manifest.limits,
-            subscriber: Subscriber::create(&service)?,
+            subscriber: Subscriber::create(&service, None)?,
             data: Listener::open(node, &services::data_event(M::TOPIC))?,
             message: PhantomData,
         })
@@ -117,8 +117,7 @@ impl<M: Message> Port<M> {
 
 /// Notifies the publisher of a topic, which then connects to its new readers.
 pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageError> {
-    Notifier::open(node, &services::handshake_event(topic))?
-        .notify(format_args!("notify the publisher of {topic}"))
+    Notifier::open(node, &services::handshake_event(topic))?.notify()
 }
 
 /// The items of a topic in order, each once: the current and the previous one.
@@ -161,11 +160,7 @@ impl<M: Message> Reader<M> {
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
                 Some(next) if got > next => {
-                    return Err(StageError::SequenceGap {
-                        topic: M::TOPIC,
-                        expected: next,
-                        got,
-                    });
+                    return Err(StageError::gap(M::TOPIC, next, got));
                 }
                 _ => self.head = Some(received),
             }

@@ -48,9 +48,8 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
     republish(&poses, &restored, S::HOP)?;
-    let next = restored
-        .last()
-        .map_or(0, |pose| pose.item.seq.saturating_add(1));
+    let last = restored.last().map(|pose| pose.item);
+    let next = last.map_or(0, |last| last.seq.saturating_add(1));
     let mut integration = Integration {
         sink,
         poses,
@@ -58,10 +57,8 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
         counters: StageCounters::default(),
     };
     if ended {
-        let last = restored.last().map(|pose| pose.item);
-        integration
-            .poses
-            .end(last.unwrap_or_default(), Some(S::HOP))?;
+        let last = last.unwrap_or_default();
+        integration.poses.end(last, Some(S::HOP))?;
     }
     let mut inputs = Motions::<M>::open(launch, next, integration.sink.takes_scans())?;
     integration.drain(&mut inputs)?;
@@ -105,12 +102,12 @@ pub(crate) fn republish(
     let Some((last, earlier)) = restored.split_last() else {
         let mut base = PoseHeader::default();
         base.item.flags = flag::BASE | flag::SYNC;
-        return publish(poses, base, hop);
+        return poses.publish(base, Some(hop));
     };
     for pose in earlier {
-        publish(poses, *pose, hop)?;
+        poses.publish(*pose, Some(hop))?;
     }
-    publish(poses, newest(*last), hop)
+    poses.publish(newest(*last), Some(hop))
 }
 
 /// Marks a pose as the newest. Older ones that are published again are not marked: a source that
@@ -118,16 +115,6 @@ pub(crate) fn republish(
 pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
     pose.item.flags |= flag::SYNC;
     pose
-}
-
-pub(crate) fn publish(
-    poses: &Writer<Pose>,
-    pose: PoseHeader,
-    hop: StageId,
-) -> Result<(), StageError> {
-    let mut draft = poses.loan()?;
-    *draft.header() = pose;
-    poses.send(draft, hop)
 }
 
 /// The motions in order, each with its scan if the sink takes scans.
@@ -160,11 +147,8 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
                 return Ok(None);
             };
             if head.item().seq != input.motion.item.seq {
-                return Err(StageError::SequenceGap {
-                    topic: Masked::TOPIC,
-                    expected: input.motion.item.seq,
-                    got: head.item().seq,
-                });
+                let expected = input.motion.item.seq;
+                return Err(StageError::gap(Masked::TOPIC, expected, head.item().seq));
             }
             input.received_ns = input.received_ns.max(head.received_ns);
             input.scan = Some(head);
@@ -240,6 +224,6 @@ impl<S: Sink> Integration<'_, S> {
         (hop.received_ns, hop.started_ns) = (input.received_ns, work.started_ns);
         let pose = self.sink.integrate(&motion, input.scan)?;
         work.end(&mut self.counters);
-        publish(&self.poses, newest(pose), S::HOP)
+        self.poses.publish(newest(pose), Some(S::HOP))
     }
 }

@@ -134,11 +134,9 @@ impl<S: Stage> Flow<'_, S> {
             .replace(item.seq)
             .map(|last| last.saturating_add(1))
         {
-            Some(expected) if item.seq != expected => Err(StageError::SequenceGap {
-                topic: S::Output::TOPIC,
-                expected,
-                got: item.seq,
-            }),
+            Some(expected) if item.seq != expected => {
+                Err(StageError::gap(S::Output::TOPIC, expected, item.seq))
+            }
             _ => Ok(()),
         }
     }

@@ -166,7 +166,7 @@ impl Signals {
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
         for listener in data {
             if next() {
-                consume(listener)?;
+                listener.take()?;
             }
         }
         self.stopped.set(stop || self.stopped.get());
@@ -195,7 +195,7 @@ pub(crate) fn wait_for(listener: &Listener, limit: Duration) -> Result<(), Stage
     let polled = PollFd::new(listener, PollFlags::IN);
     match sleep_until_ready(&mut [polled], limit)? {
         true => Ok(()),
-        false => consume(listener),
+        false => listener.take().map(drop),
     }
 }
 
@@ -210,10 +210,6 @@ fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool,
         Err(Errno::INTR) => Ok(false),
         Err(error) => Err(StageError::transport("wait", error)),
     }
-}
-
-fn consume(listener: &Listener) -> Result<(), StageError> {
-    listener.take(format_args!("read notifications")).map(drop)
 }
 
 fn drain(mut socket: &UnixStream) -> bool {

@@ -47,6 +47,17 @@ impl<M: Message> Writer<M> {
         })
     }
 
+    /// Publishes a header, as [`TopicWriter::send`].
+    pub(crate) fn publish(
+        &self,
+        header: M::Header,
+        hop: Option<StageId>,
+    ) -> Result<(), StageError> {
+        let mut draft = self.loan()?;
+        *draft.header() = header;
+        self.untyped.send(draft.loan, hop)
+    }
+
     /// Publishes a message without copying: readers receive its offset in shared memory.
     pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         self.untyped.send(draft.loan, Some(hop))
@@ -102,7 +113,7 @@ impl TopicWriter {
             loan.item().hop_mut(hop).published_ns = clock::now_ns();
         }
         self.publisher.send(loan)?;
-        self.notify()
+        self.data.notify()
     }
 
     /// Publishes the end of the stream.
@@ -120,36 +131,30 @@ impl TopicWriter {
     /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
     /// topics, so unconditional wake-ups would circulate for ever.
     pub fn accept_readers(&self) -> Result<(), StageError> {
-        let new_reader = self.has_new_reader()?;
+        let new_reader = self.handshake.take()? > 0;
         // Unconditionally: after a lost handshake the reader finds the history at the end of its
         // own wait.
         self.publisher.connect()?;
-        if new_reader { self.notify() } else { Ok(()) }
+        if new_reader {
+            self.data.notify()
+        } else {
+            Ok(())
+        }
     }
 
     /// The same for readers that have notified alone; returns whether there were any.
     pub fn answer_handshakes(&self) -> Result<bool, StageError> {
-        let new_reader = self.has_new_reader()?;
+        let new_reader = self.handshake.take()? > 0;
         if new_reader {
             self.publisher.connect()?;
-            self.notify()?;
+            self.data.notify()?;
         }
         Ok(new_reader)
-    }
-
-    fn has_new_reader(&self) -> Result<bool, StageError> {
-        let action = format_args!("read the handshakes of {}", self.topic);
-        Ok(self.handshake.take(action)? > 0)
     }
 
     /// Returns the listener that new readers notify.
     pub fn listener(&self) -> &Listener {
         &self.handshake
-    }
-
-    fn notify(&self) -> Result<(), StageError> {
-        self.data
-            .notify(format_args!("wake the readers of {}", self.topic))
     }
 }
 

@@ -3,21 +3,16 @@
 use crate::{Launch, StageError, log_id::LogId, transport::Notifier};
 
 /// Notifies the followers of a log. A run without SLAM and objects has no such events.
-pub struct Growth {
-    log: LogId,
-    notifier: Notifier,
-}
+pub struct Growth(Notifier);
 
 impl Growth {
     /// Opens the event of a log, as the one process that appends to it.
     pub fn of(launch: &Launch, log: LogId) -> Result<Self, StageError> {
-        let notifier = Notifier::open(&launch.node, log.name())?;
-        Ok(Self { log, notifier })
+        Notifier::open(&launch.node, log.name()).map(Self)
     }
 
     /// Wakes the followers: a record was appended.
     pub fn notify(&self) -> Result<(), StageError> {
-        self.notifier
-            .notify(format_args!("notify {}", self.log.name()))
+        self.0.notify()
     }
 }

@@ -73,7 +73,8 @@ impl<'a> LastStages<'a> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
         counters::record(&mut self.counters, 0, hop.finished_ns - hop.started_ns);
-        sink::publish(&self.poses, sink::newest(pose), StageId::PoseIntegration)
+        let hop = Some(StageId::PoseIntegration);
+        self.poses.publish(sink::newest(pose), hop)
     }
 
     /// Publishes the end of the stream.
@@ -82,12 +83,10 @@ impl<'a> LastStages<'a> {
     }
 
     pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
-        let Some(motions) = &self.motions else {
-            return Ok(());
-        };
-        let mut draft = motions.loan()?;
-        *draft.header() = motion;
-        motions.send_unchanged(draft)
+        match &self.motions {
+            Some(motions) => motions.publish(motion, None),
+            None => Ok(()),
+        }
     }
 
     /// Sleeps until a topic has a message or the connection has something to read, and answers the
@@ -102,9 +101,8 @@ impl<'a> LastStages<'a> {
         self.counters.wakes += 1;
         if woken.may_have_new_readers() {
             self.poses.accept_readers()?;
-            if let Some(motions) = &self.motions {
-                motions.accept_readers()?;
-            }
+            let motions = self.motions.as_ref();
+            motions.map_or(Ok(()), |motions| motions.accept_readers())?;
         }
         Ok(woken.stop)
     }

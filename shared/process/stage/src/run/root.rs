@@ -21,7 +21,7 @@ use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use rustix::{
     fs::{Mode, OFlags},
     io::Errno,
-    process::{Uid, geteuid},
+    process::geteuid,
 };
 use thiserror::Error;
 
@@ -49,12 +49,9 @@ pub struct RunRoot {
 /// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    #[error("another run is writing to {out}{holder}: wait for it, or choose another --out")]
-    Busy {
-        out: PathBuf,
-        /// The process of the other run, after a comma.
-        holder: String,
-    },
+    /// Another run has the same results.
+    #[error("{0}")]
+    Busy(String),
     #[error(
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
@@ -72,7 +69,7 @@ impl RootError {
     /// user has ended and removed the user's directory.
     fn may_pass(&self) -> bool {
         match self {
-            Self::Busy { .. } => true,
+            Self::Busy(_) => true,
             Self::Unusable { source, .. } => source.kind() == io::ErrorKind::NotFound,
             Self::Unsafe(_) | Self::Interrupted | Self::Signals(_) => false,
         }
@@ -83,15 +80,12 @@ impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
     pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
-        let name = name(out, geteuid());
+        let name = name(out);
         let deadline = Instant::now() + LIMIT;
         loop {
-            let failed = match Self::try_acquire(out, &name) {
-                Err(failed) if failed.may_pass() => failed,
+            match Self::try_acquire(out, &name) {
+                Err(failed) if failed.may_pass() && Instant::now() <= deadline => {}
                 acquired => return acquired,
-            };
-            if Instant::now() > deadline {
-                return Err(failed);
             }
             if signals.sleep(PAUSE)? {
                 return Err(RootError::Interrupted);
@@ -101,7 +95,7 @@ impl RunRoot {
 
     fn try_acquire(out: &Path, name: &str) -> Result<Self, RootError> {
         let runs = user_directory()?;
-        remove_dead_runs(&runs);
+        roots_in(&runs).for_each(|root| remove_if_dead(&root));
         let path = runs.join(name);
         let unusable = |source| RootError::Unusable {
             path: path.clone(),
@@ -119,10 +113,13 @@ impl RunRoot {
                     _lock: lock,
                 })
             }
-            Attempt::Held(holder) => Err(RootError::Busy {
-                out: out.to_owned(),
-                holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
-            }),
+            Attempt::Held(holder) => {
+                let holder = holder.map_or(String::new(), |holder| format!(", {holder}"));
+                Err(RootError::Busy(format!(
+                    "another run is writing to {}{holder}: wait for it, or choose another --out",
+                    out.display()
+                )))
+            }
         }
     }
 
@@ -145,23 +142,25 @@ impl Drop for RunRoot {
 /// Returns the root of this user's run that writes to `out`, an absolute path, whether there is one
 /// or not.
 pub fn root_of(out: &Path) -> PathBuf {
-    path_of(geteuid()).join(name(out, geteuid()))
+    user_path().join(name(out))
 }
 
 /// Returns the name of the run that writes to `out`. It differs between users, since names in
 /// `/dev/shm` are common to all.
-fn name(out: &Path, user: Uid) -> String {
-    let user = user.as_raw().to_le_bytes();
+fn name(out: &Path) -> String {
+    let user = geteuid().as_raw().to_le_bytes();
     let hash = hash(out.as_os_str().as_encoded_bytes().iter().chain(&user));
     format!("gyre{:0DIGITS$x}", hash & 0xff_ffff_ffff)
 }
 
-fn path_of(user: Uid) -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("gyre-{}", user.as_raw()))
+fn user_path() -> PathBuf {
+    Path::new(SHARED_MEMORY).join(format!("gyre-{}", geteuid().as_raw()))
 }
 
-fn is_name(name: &str) -> bool {
-    let digits = name.strip_prefix("gyre").unwrap_or_default();
+fn is_root(root: &Path) -> bool {
+    let name = root.file_name().and_then(|name| name.to_str());
+    let digits = name.and_then(|name| name.strip_prefix("gyre"));
+    let digits = digits.unwrap_or_default();
     let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
     digits.len() == DIGITS && digits.bytes().all(is_digit)
 }
@@ -175,7 +174,7 @@ fn lock_of(root: &Path) -> PathBuf {
 /// all users, so an entry there is used only if it is a directory of this user that no other can
 /// write to.
 fn user_directory() -> Result<PathBuf, RootError> {
-    let path = path_of(geteuid());
+    let path = user_path();
     make_directory(&path).map_err(|source| RootError::Unusable {
         path: path.clone(),
         source,
@@ -249,18 +248,13 @@ fn make_directory(path: &Path) -> io::Result<()> {
 
 /// Removes what dead runs of this user left in shared memory. [`RunRoot::acquire`] does this too.
 pub fn sweep() {
-    let runs = path_of(geteuid());
-    if make_owner_only(&runs).is_ok() {
-        remove_dead_runs(&runs);
-    }
+    roots().iter().for_each(|root| remove_if_dead(root));
 }
 
 /// Removes the remains of the run with this root in shared memory, if its supervisor is dead and no
 /// other run has its place.
 pub fn sweep_run(root: &Path) {
-    let is_run = root.file_name().and_then(|name| name.to_str());
-    let of_user = root.parent() == Some(path_of(geteuid()).as_path());
-    if of_user && is_run.is_some_and(is_name) {
+    if root.parent() == Some(&*user_path()) && is_root(root) {
         remove_if_dead(root);
     }
 }
@@ -272,7 +266,7 @@ pub(crate) fn is_alive(root: &Path) -> bool {
 
 /// Returns the roots of this user's runs, dead ones too.
 pub(crate) fn roots() -> Vec<PathBuf> {
-    let runs = path_of(geteuid());
+    let runs = user_path();
     match make_owner_only(&runs) {
         Ok(()) => roots_in(&runs).collect(),
         Err(_) => Vec::new(),
@@ -280,23 +274,16 @@ pub(crate) fn roots() -> Vec<PathBuf> {
 }
 
 /// Returns the roots of the runs in a directory: a run has a root or a lock or both.
-fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> {
+fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let entries = fs::read_dir(runs).into_iter().flatten().flatten();
-    let names: BTreeSet<String> = entries
-        .filter_map(|entry| {
-            let path = PathBuf::from(entry.file_name());
-            Some(path.file_stem()?.to_str()?.to_owned())
-        })
-        .filter(|name| is_name(name))
+    let roots: BTreeSet<PathBuf> = entries
+        .map(|entry| entry.path().with_extension(""))
+        .filter(|root| is_root(root))
         .collect();
-    names.into_iter().map(|name| runs.join(name))
+    roots.into_iter()
 }
 
-/// Removes runs whose supervisor was killed: their locks are free.
-fn remove_dead_runs(runs: &Path) {
-    roots_in(runs).for_each(|root| remove_if_dead(&root));
-}
-
+/// Removes a run whose supervisor was killed: its lock is free.
 fn remove_if_dead(root: &Path) {
     // A run that has just ended has removed its lock last. Created again, that would stay if this
     // process were killed here.

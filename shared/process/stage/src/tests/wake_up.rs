@@ -50,7 +50,7 @@ fn a_handshake_is_answered_once() {
     let run = Run::new();
     let poses = writer::<Pose>(&run.manifest);
     let late = reader::<Pose>(&run.manifest, None);
-    let woken = || late.listener().take(format_args!("read")).unwrap();
+    let woken = || late.listener().take().unwrap();
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 1);
     // A second answer without a handshake would let wake-ups circulate for ever.

@@ -33,7 +33,10 @@ impl Service {
             .max_nodes(sizes.nodes())
             .create()
             .map_err(|e| StageError::transport(format!("create the topic {}", topic.name), e))?;
-        Ok(Self::new(topic, factory))
+        Ok(Self {
+            topic: *topic,
+            factory: Sealed::new(factory),
+        })
     }
 
     /// Opens a topic, which the supervisor has created.
@@ -41,17 +44,10 @@ impl Service {
         let factory = builder(node, topic)?
             .open()
             .map_err(|e| StageError::transport(format!("open the topic {}", topic.name), e))?;
-        Ok(Self::new(topic, factory))
-    }
-
-    fn new(
-        topic: &Topic,
-        factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
-    ) -> Self {
-        Self {
+        Ok(Self {
             topic: *topic,
             factory: Sealed::new(factory),
-        }
+        })
     }
 
     /// Returns whether a process publishes it. A dead one counts until its resources are removed.

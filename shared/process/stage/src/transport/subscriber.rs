@@ -25,35 +25,23 @@ pub(crate) struct Sample {
 }
 
 impl Subscriber {
-    /// Subscribes as a process of the run.
-    pub(crate) fn create(service: &Service) -> Result<Self, StageError> {
+    /// Subscribes as a process of the run, or as an observer, under a name for counting observers.
+    pub(crate) fn create(service: &Service, observer: Option<&str>) -> Result<Self, StageError> {
         let topic = service.topic.name;
-        let port = service.factory.subscriber_builder().create();
-        let port = port.map_err(|e| StageError::transport(format!("subscribe to {topic}"), e))?;
-        Ok(Self::new(service, port, false))
-    }
-
-    /// Subscribes as an observer, under a name for counting observers.
-    pub(crate) fn observe(service: &Service, name: &str) -> Result<Self, StageError> {
-        let name =
-            PortName::new(name).map_err(|e| StageError::transport("name the observer", e))?;
-        let topic = service.topic.name;
-        let port = service.factory.subscriber_builder().name(&name).create();
-        let port = port.map_err(|e| StageError::transport(format!("observe {topic}"), e))?;
-        Ok(Self::new(service, port, true))
-    }
-
-    fn new(
-        service: &Service,
-        port: subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>,
-        is_observer: bool,
-    ) -> Self {
-        Self {
-            topic: service.topic.name,
-            header_bytes: service.topic.header.bytes,
-            is_observer,
-            port: Sealed::new(port),
+        let mut builder = service.factory.subscriber_builder();
+        if let Some(name) = observer {
+            let name = PortName::new(name);
+            builder =
+                builder.name(&name.map_err(|e| StageError::transport("name the observer", e))?);
         }
+        let port = builder.create();
+        let port = port.map_err(|e| StageError::transport(format!("subscribe to {topic}"), e))?;
+        Ok(Self {
+            topic,
+            header_bytes: service.topic.header.bytes,
+            is_observer: observer.is_some(),
+            port: Sealed::new(port),
+        })
     }
 
     /// Receives the next message; `None` if the queue is empty, or cannot be read now.
