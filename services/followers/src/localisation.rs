@@ -39,7 +39,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 struct Fixes {
-    /// The folder of the results.
     out: PathBuf,
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,

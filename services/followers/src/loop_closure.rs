@@ -48,7 +48,6 @@ struct LoopClosing {
 }
 
 struct Settings {
-    /// The folder of the results.
     out: PathBuf,
     slam: SlamConfig,
     refinement: RefinementConfig,
@@ -95,20 +94,16 @@ impl Follower for LoopClosing {
     }
 }
 
-/// The logs and the records read so far.
 struct State {
     keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
     closer: LoopCloser,
     submap_reach_m: f64,
-    /// Number of loops so far.
     loops: u64,
-    /// Loops that are to be published.
     pending: VecDeque<LoopHeader>,
     /// True if the closer knows that no keyframes follow.
     has_finished: bool,
-    /// True if the queries have grown.
     has_appended: bool,
 }
 
@@ -212,7 +207,6 @@ impl State {
         self.close()
     }
 
-    /// Describes or queries the next keyframe.
     fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
         let mut source = Points(&mut self.keyframes);
         if let Some(place) = self.closer.describe(&mut source).map_err(failed)? {

@@ -52,7 +52,6 @@ pub fn tracker(
 }
 
 struct Tracking {
-    /// The folder of the results.
     out: PathBuf,
     config: ObjectsConfig,
     masking: MaskingConfig,
@@ -112,7 +111,6 @@ impl Tracking {
     }
 }
 
-/// Returns the message about the objects of a scan.
 fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
     let [x_m, y_m, yaw_rad] = xy_yaw(&scan.pose);
     let mut header = ObjectsHeader {

@@ -59,7 +59,6 @@ fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
 }
 
 struct Trajectory {
-    /// The folder of the results.
     out: PathBuf,
     kind: EstimatorKind,
     /// The fixes that are later than all keyframes.
@@ -69,9 +68,7 @@ struct Trajectory {
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
-    /// The newest keyframe that was read.
     newest: Option<Keyframe>,
-    /// Keyframes and queries that were read.
     read: [usize; 2],
     /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
     /// corrected no pose yet.
@@ -164,7 +161,6 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Corrects the poses by all that was read.
     fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
         let Some(newest) = &self.newest else {
             return Ok(None);

@@ -28,7 +28,6 @@ use scans::{ScanView, Scans};
 
 pub use python::python;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     work(launch, launch.section("masking")?, None)
 }
@@ -83,7 +82,6 @@ struct Masking {
     doppler: Option<DopplerEstimator>,
     /// Nearer echoes are of the vehicle itself.
     min_range_m: f32,
-    /// Of the scan and of the previous one.
     rows: [PlacedRows; 2],
 }
 

@@ -26,7 +26,6 @@ use gyre_stage::{
 };
 use gyre_storage::{LogError, continue_when_full, was_full};
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let out = &launch.manifest.out;
@@ -68,7 +67,6 @@ struct Integration {
     last: Option<PoseHeader>,
     slam: SlamConfig,
     objects: ObjectsConfig,
-    /// The most points of a scan.
     points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
@@ -172,7 +170,6 @@ impl Integration {
         self.journal.sync().map_err(unusable)
     }
 
-    /// Reports the poses that are not kept.
     fn require_kept(&self) -> Result<(), StageError> {
         let (Some(loss), Some(last)) = (&self.loss, self.last) else {
             return Ok(());

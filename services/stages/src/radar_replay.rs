@@ -56,7 +56,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     play(launch, dataset, samples, Pace::Sensor)
 }
 
-/// Returns the limits on input that cannot be read.
 pub fn tolerance(config: &SourceConfig) -> Tolerance {
     Tolerance {
         retry: Duration::try_from_secs_f64(config.retry_s).unwrap_or(Duration::MAX),
@@ -112,7 +111,6 @@ pub fn play(
     Ok(counters)
 }
 
-/// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
     samples: ScanSamples,

@@ -17,7 +17,6 @@ use gyre_stage::{
     writer::Draft,
 };
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
@@ -46,7 +45,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut stage)
 }
 
-/// The refiner and the checkpoint of its state.
 struct RefinementStage {
     refiner: Refiner,
     checkpoint: Checkpoint,
@@ -100,7 +98,6 @@ impl Stage for RefinementStage {
 }
 
 impl RefinementStage {
-    /// Restores the state of the refiner before this item.
     fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
         let starts_chain = item.is(flag::BREAK);
         if self.next != Some(item.seq) {

@@ -16,7 +16,6 @@ pub struct LiveFixes {
     receiver: GnssReceiver,
     config: GnssConfig,
     received: ReceivedFixes,
-    /// The number of them that were examined.
     examined: usize,
 }
 

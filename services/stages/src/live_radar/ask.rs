@@ -12,9 +12,7 @@ use thiserror::Error;
 
 use crate::live_radar::{Settings, connection::RadarSocket};
 
-/// The longest wait for an answer.
 const MAX_WAIT: Duration = Duration::from_secs(5);
-/// Time between two polls for the answer.
 const POLL: Duration = Duration::from_millis(10);
 
 /// A radar that cannot be used: a sentence.
@@ -57,10 +55,8 @@ impl AskError {
     }
 }
 
-/// The sizes of a radar's scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Time of a turn, ns.
     pub period_ns: i64,
     pub limits: ScanLimits,
 }
@@ -81,7 +77,6 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     }
 }
 
-/// Waits for the radar's description of itself.
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let address = settings.address.to_string();
     let no_answer = |error| AskError::no_answer(&address, &error);

@@ -2,10 +2,8 @@
 
 use gyre_colossus::{Health, HealthStatus};
 
-/// The state of a radar's health that was logged last.
 #[derive(Clone, Debug, Default)]
 pub struct HealthLog {
-    /// The names of the readings that are unhealthy.
     unhealthy: Vec<&'static str>,
     is_silent: bool,
 }

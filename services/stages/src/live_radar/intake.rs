@@ -31,15 +31,12 @@ pub enum NoScans {
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]
     TooLarge {
-        /// The bytes of a scan.
         bytes: usize,
-        /// The bytes that the run has for a scan.
         room: usize,
     },
 }
 
 impl Intake {
-    /// Creates an intake without a configuration.
     pub fn new(constants: Constants) -> Self {
         Self {
             constants,
@@ -67,7 +64,6 @@ impl Intake {
         Ok(true)
     }
 
-    /// Returns whether there is a configuration.
     pub fn is_configured(&self) -> bool {
         self.scans.is_some()
     }
@@ -96,7 +92,6 @@ impl Intake {
         scan.is_some()
     }
 
-    /// Counts a message that cannot be used.
     pub fn damaged(&mut self, reason: impl Display, skipped_bytes: usize) {
         self.damaged += 1;
         // There may be thousands in a second.

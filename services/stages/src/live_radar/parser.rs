@@ -5,7 +5,6 @@ use gyre_colossus::{Datagrams, Event, Parser};
 /// Bytes to read of a stream at once: some ten azimuths.
 const CHUNK: usize = 1 << 16;
 
-/// The parser of a stream, or of datagrams.
 #[derive(Debug)]
 pub enum RadarParser {
     Stream(Parser),
@@ -13,7 +12,6 @@ pub enum RadarParser {
 }
 
 impl RadarParser {
-    /// Returns memory to read into.
     pub fn space(&mut self) -> &mut [u8] {
         match self {
             Self::Stream(parser) => parser.space(CHUNK),
@@ -29,7 +27,6 @@ impl RadarParser {
         }
     }
 
-    /// Returns the next message or fault.
     #[expect(
         clippy::should_implement_trait,
         reason = "a message borrows the parser"

@@ -21,7 +21,6 @@ const MAX_READS: usize = 64;
 /// Bytes without a message after which the other end does not count as a radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;
 
-/// A radar on the network.
 pub struct Radar {
     settings: Settings,
     connection: Connection,
@@ -33,7 +32,6 @@ pub struct Radar {
 }
 
 impl Radar {
-    /// Creates a radar that is connected to when it is first read.
     pub fn new(settings: Settings) -> Self {
         Self {
             connection: Connection::new(&settings),

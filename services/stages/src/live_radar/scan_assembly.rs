@@ -15,15 +15,12 @@ const BATCH: f64 = 10.0;
 /// The part of the azimuths up to the end of a turn: the radar may turn faster than configured.
 const BATCH_SHARE: f64 = 0.5;
 
-/// Assembles the azimuths of one connection to scans.
 pub struct ScanAssembly {
     radar: Configuration,
     clock: RadarClock,
     assembler: SweepAssembler,
     delay: ReadDelay,
-    /// True once the kind of the clock is logged.
     is_clock_logged: bool,
-    /// True once it is logged that the delay of reception is not known.
     is_delay_logged: bool,
 }
 
@@ -103,7 +100,6 @@ impl ScanAssembly {
         due_ns
     }
 
-    /// Logs once which clock the stamps are of.
     fn log_clock(&mut self) {
         if let (false, Some(found)) = (self.is_clock_logged, self.clock.found()) {
             self.is_clock_logged = true;
@@ -125,7 +121,6 @@ impl ScanAssembly {
         (azimuths >= 2.0).then(|| Duration::from_nanos((azimuths * per_azimuth_ns) as u64))
     }
 
-    /// Returns whether a configuration makes the same scans.
     pub fn is_of(&self, radar: &Configuration) -> bool {
         let scans = |of: &Configuration| {
             let counts = [

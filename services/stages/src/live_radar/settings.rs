@@ -15,7 +15,6 @@ const ENCODER_COUNTS: u16 = 5600;
 /// The address of a radar, and the properties that it does not send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The address where the radar is received.
     pub address: Address,
     /// Encoder counts per turn, for rounding the angles of a radar that sends by UDP.
     pub encoder_counts: u16,
@@ -23,7 +22,6 @@ pub struct Settings {
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
-    /// Constants of its ranges and angles.
     pub constants: Constants,
 }
 

@@ -37,7 +37,6 @@ impl TurnCounter {
         }
     }
 
-    /// Sets the configured duration of a turn.
     pub fn configure(&mut self, period_ns: i64) {
         if self.configured_ns != period_ns {
             self.configured_ns = period_ns;

@@ -4,7 +4,6 @@
 use gyre_masking::Sweep;
 use gyre_radar::{LostAzimuthFinder, LostAzimuths, lost::stale_rows};
 
-/// Finds lost azimuths of scan after scan.
 #[derive(Default)]
 pub struct Azimuths {
     finder: LostAzimuthFinder,
@@ -43,7 +42,6 @@ impl Azimuths {
         lost
     }
 
-    /// Returns the last finding.
     pub fn last(&self) -> LostAzimuths {
         self.last.map(|(_, lost)| lost).unwrap_or_default()
     }

@@ -22,12 +22,10 @@ use crate::masking::queue::Queue;
 /// than its scans never is, and would have the latency of those that wait for ever.
 const WINDOWS_IN_ORDER: usize = 8;
 
-/// The queue of masking in live mode.
 pub struct NewestOnly {
     port: Port<Scan>,
     /// The current scan and the ones received since; at the start, the history of the source.
     queue: VecDeque<Received<Scan>>,
-    /// The previous scan, if the mask takes two.
     previous: Option<Received<Scan>>,
     window: Window,
     /// The run, where the generation and its numbers begin together.
@@ -35,7 +33,6 @@ pub struct NewestOnly {
     chain: Option<Chain>,
     /// Scans that may still be processed in order after a start; 0: the newest scan alone.
     in_order: usize,
-    /// Samples of the scans that were dropped since the last one.
     dropped: Vec<Sample>,
 }
 
@@ -247,7 +244,6 @@ impl Chain {
         }
     }
 
-    /// Returns whether a scan has been processed or dropped already.
     fn has_passed(&self, item: &Item) -> bool {
         !item.is(flag::END)
             && self
@@ -255,7 +251,6 @@ impl Chain {
                 .is_some_and(|published| item.published <= published)
     }
 
-    /// Numbers a scan in the chain of motions.
     fn number(&self, item: &Item) -> Item {
         let is_continuous = |before_ns| continues(before_ns, item.stamp_ns);
         let previous_scan = self

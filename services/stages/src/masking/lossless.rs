@@ -9,7 +9,6 @@ use gyre_stage::{
 
 use crate::masking::queue::Queue;
 
-/// The queue of masking in lossless mode.
 pub struct InOrder {
     reader: Reader<Scan>,
     window: Window,

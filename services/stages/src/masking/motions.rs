@@ -15,7 +15,6 @@ use gyre_stage::{Launch, Listener, StageError, reader::Port};
 /// Number of motions kept: more than any window and lag need.
 const KEPT: usize = 256;
 
-/// The known motions, and the newest pose.
 pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
@@ -24,7 +23,6 @@ pub struct Motions {
     lost: BTreeMap<u64, LostAzimuths>,
     /// The item of the newest pose as the sink reported it.
     pub resume_at: Option<Item>,
-    /// The number of the newest pose.
     pub newest_pose: Option<u64>,
 }
 
@@ -40,7 +38,6 @@ impl Motions {
         })
     }
 
-    /// Receives the new motions and poses.
     pub fn update(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.motions.receive()? {
             self.known
@@ -108,7 +105,6 @@ impl KnownMotions {
         drop_the_oldest(&mut self.0);
     }
 
-    /// See [`Motions::before`].
     fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
         let Some(first) = seq.checked_sub(lag) else {
             return Some(None);

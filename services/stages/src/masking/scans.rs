@@ -12,13 +12,11 @@ use gyre_stage::{
 
 use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions, queue::Queue};
 
-/// The scans, in lossless or in live mode, and the motions.
 pub struct Scans {
     queue: Box<dyn Queue>,
     motions: Motions,
     gyro: Gyro,
     wheels: Wheels,
-    /// The scan whose samples it has taken last.
     sampled: Option<u64>,
     window: Window,
     /// The velocities for the current and for the previous scan.
@@ -41,12 +39,9 @@ pub struct ScanView<'a> {
     pub previous: Option<PreviousScan<'a>>,
 }
 
-/// The scan before the one to mask.
 pub struct PreviousScan<'a> {
     pub scan: &'a Received<Scan>,
-    /// The velocity used for motion compensation.
     pub twist: Option<Twist>,
-    /// Where its azimuths were lost, if it has a pose.
     pub lost: Option<LostAzimuths>,
 }
 

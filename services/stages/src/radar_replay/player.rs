@@ -18,7 +18,6 @@ pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
     run_player(launch, &mut player)
 }
 
-/// The messages of a recording that a run plays.
 pub struct Player {
     recording: Recording,
     topics: Vec<&'static str>,

@@ -7,7 +7,6 @@ use gyre_datasets::Dataset;
 /// The turns of a part of a recording. Each turn continues in time where the one before ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Turns {
-    /// The scans of a turn, by their index in the recording.
     once: Range<usize>,
     /// Duration of a turn, ns: from its first scan to the first one of the next turn.
     turn_ns: i64,

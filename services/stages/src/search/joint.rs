@@ -12,7 +12,6 @@ use gyre_stage::{
     writer::Draft,
 };
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;

@@ -15,7 +15,6 @@ use gyre_stage::{
 pub type Search =
     Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;

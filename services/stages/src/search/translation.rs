@@ -17,7 +17,6 @@ pub type Search = Box<
     dyn FnMut(&PairView<'_, Masked>, &RotationMatch) -> Result<Option<MotionMatch>, StageError>,
 >;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;

@@ -3,7 +3,6 @@
 use crate::refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 
 crate::named! {
-    /// The basis of a motion.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Basis {
         /// Two scans: there is no refinement, or the chain starts here.
@@ -36,7 +35,6 @@ impl Basis {
 }
 
 impl RefinementRecord {
-    /// Returns whether the motion is made with the turn of the gyro.
     pub fn uses_gyro(&self) -> bool {
         [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
     }
@@ -57,7 +55,6 @@ impl RefinementRecord {
     }
 }
 
-/// Counts of motions by their basis, and by the part of gyro, wheels and Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct WitnessCounts {
     /// In the order of [`Basis::ALL`].

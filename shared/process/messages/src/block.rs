@@ -24,7 +24,6 @@ macro_rules! block {
         impl $block {
             pub const LEN: usize = $len;
 
-            /// Returns the number of blocks that hold so many values.
             pub fn count(values: usize) -> usize {
                 values.div_ceil(Self::LEN)
             }

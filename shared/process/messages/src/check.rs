@@ -12,7 +12,6 @@ pub struct Violation(pub String);
 /// Tolerance for a yaw of pi, rad.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Requires a condition on a field.
 pub(crate) fn require(
     holds: bool,
     field: &str,
@@ -81,7 +80,6 @@ pub(crate) fn planar([x, y, yaw]: [(&str, f64); 3], reach_m: f64) -> Result<(), 
     within(yaw.0, yaw.1, -PI - ROUNDING_RAD..=PI + ROUNDING_RAD)
 }
 
-/// Requires a covariance of (x, y, yaw).
 pub(crate) fn covariance(packed: &covariance::Packed) -> Result<(), Violation> {
     match covariance::is_positive_semidefinite(packed) {
         true => Ok(()),

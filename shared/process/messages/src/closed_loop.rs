@@ -25,13 +25,11 @@ pub struct LoopHeader {
     /// `seq` counts the loops, from 0. `scan` is the later keyframe's and `previous_scan` the
     /// earlier one's.
     pub item: Item,
-    /// Number of the later keyframe's scan in the run.
     pub later_seq: u64,
     pub earlier_seq: u64,
     pub x_m: f64,
     pub y_m: f64,
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw).
     pub covariance: covariance::Packed,
     /// Correlation of the two places where they overlap, from -1 to 1.
     pub correlation: f64,

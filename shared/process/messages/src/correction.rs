@@ -28,7 +28,6 @@ pub struct CorrectionHeader {
     /// `seq` counts the records read from the logs, from 0; their ends count as one. `scan` and the
     /// times are the newest keyframe's.
     pub item: Item,
-    /// Number of the newest keyframe's scan in the run.
     pub keyframe_seq: u64,
     pub keyframes: u64,
     pub loops: u64,

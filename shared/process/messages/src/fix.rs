@@ -37,7 +37,6 @@ header!(FixHeader, "gyre_fix_header_v4");
 pub struct FixHeader {
     /// `seq` counts the keyframes of the run, from 0. `scan` and the times are the keyframe's.
     pub item: Item,
-    /// Number of the keyframe's scan in the run.
     pub keyframe_seq: u64,
     /// See [`fix_status`].
     pub status: u64,

@@ -24,7 +24,6 @@ pub trait Header: Pod + Default + Debug {
     fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation>;
 }
 
-/// An element of payloads, plain data too.
 pub trait Element: Pod + Debug {
     /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
@@ -54,7 +53,6 @@ impl Sender {
 }
 
 pub trait Message: 'static {
-    /// The name of the topic.
     const TOPIC: &'static str;
     const SENDER: Sender;
     /// Number of processes that subscribe to the topic.

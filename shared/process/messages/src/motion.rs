@@ -30,7 +30,6 @@ pub struct MotionEstimate {
     pub x_m: f64,
     pub y_m: f64,
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw).
     pub covariance: covariance::Packed,
     /// Share of the covariance that is drift, 0 to 1: see [`OdometryMotion::drift_share`].
     pub drift_share: f64,

@@ -66,7 +66,6 @@ pub struct ScanHeader {
     pub bins: u32,
     /// Bytes from the first bin of a row to the first bin of the next row.
     pub stride: u32,
-    /// Position of the first bin of the first row.
     pub first_byte: u32,
     pub range_resolution_m: f32,
     /// Offset of ranges, m: the centre of bin `b` is at
@@ -191,7 +190,6 @@ impl ScanHeader {
         Some(samples.map(bytemuck::pod_read_unaligned).collect())
     }
 
-    /// Where the samples are in the payload.
     fn sample_bytes(&self) -> Option<Range<usize>> {
         let first = self.first_sample()?;
         let bytes = (self.samples as usize).checked_mul(size_of::<Sample>())?;

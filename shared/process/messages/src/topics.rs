@@ -25,7 +25,6 @@ const SAMPLE_OVERHEAD: usize = 192;
 /// A type of headers or of elements, as the transport compares it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireType {
-    /// The name, with the version.
     pub name: &'static str,
     pub bytes: usize,
     pub alignment: usize,
@@ -41,7 +40,6 @@ impl WireType {
     }
 }
 
-/// The properties of a message type as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     pub name: &'static str,
@@ -50,7 +48,6 @@ pub struct Topic {
     /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
     pub header: WireType,
-    /// The type of the elements of its payload.
     pub element: WireType,
 }
 
@@ -72,14 +69,12 @@ impl Topic {
     }
 }
 
-/// Bytes of a page of memory.
 const PAGE: usize = 4096;
 /// Pages of bookkeeping, whatever the topics.
 const OTHER_PAGES: usize = 32;
 const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
-/// All topics, in the order of the stream.
 const TOPICS: [Topic; 10] = [
     Topic::of::<Scan>(),
     Topic::of::<Masked>(),
@@ -102,7 +97,6 @@ pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
     })
 }
 
-/// Returns the topic of this name.
 pub fn topic(name: &str) -> Option<&'static Topic> {
     TOPICS.iter().find(|topic| topic.name == name)
 }

@@ -14,17 +14,12 @@ use overlap::Overlap;
 /// Percentiles of a duration, microseconds; exact to 0.1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// Median, us.
     pub p50_us: f64,
-    /// 90th percentile, us.
     pub p90_us: f64,
-    /// 99th percentile, us.
     pub p99_us: f64,
-    /// Maximum, us.
     pub max_us: f64,
 }
 
-/// The latency of one stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct HopLatency {
     /// From the publication by the stage before to the reception.
@@ -60,7 +55,6 @@ pub struct LatencyMeter {
     overlap: Overlap,
 }
 
-/// The durations of one stage.
 #[derive(Debug, Default)]
 pub struct HopMeter {
     /// From the publication by the stage before to the reception; empty of the first stage.
@@ -72,7 +66,6 @@ pub struct HopMeter {
 }
 
 impl LatencyMeter {
-    /// Adds the time stamps of a pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         let hops = &pose.item.hops;
         let (source, sink) = (hops[0], hops[StageId::PoseIntegration as usize]);
@@ -98,7 +91,6 @@ impl LatencyMeter {
         stages.filter(|(_, meter)| meter.work.count() > 0)
     }
 
-    /// Returns the latency of all poses.
     pub fn latency(self) -> Latency {
         let span_ns = self.span.map_or(0, |(first, last)| last - first).max(1) as f64;
         let hop = |meter: &HopMeter| HopLatency {

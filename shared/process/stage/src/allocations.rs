@@ -48,12 +48,10 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Returns the number of allocations of this thread; 0 if they are not counted.
 pub(crate) fn so_far() -> u64 {
     COUNT.with(Cell::get)
 }
 
-/// Returns whether this program counts its allocations.
 pub(crate) fn are_counted() -> bool {
     // Every stage allocates before its first item.
     so_far() > 0

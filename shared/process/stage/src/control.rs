@@ -18,7 +18,6 @@ use serde::{Deserialize, Serialize};
 use crate::{Manifest, StageError, run, sessions::not_running, source::Received};
 use exchange::Sent;
 
-/// The name of the socket in the run's root.
 pub const SOCKET: &str = "control.sock";
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -27,51 +26,40 @@ const LOOK: Duration = Duration::from_secs(1);
 /// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
-/// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
-    /// Report the state of the run.
     Status,
     /// End the run as an interrupt does: its journal stays, and the same command continues it.
     Stop,
     Restart {
-        /// The name of the stage or follower, or `recorder`.
         process: String,
     },
-    /// Replace the program of a stage.
     Swap(Swap),
 }
 
-/// Another program for a stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Swap {
-    /// The name of the stage or follower.
     pub process: String,
     /// Program and arguments; `None`: those that the run was begun with.
     pub command: Option<Vec<String>>,
-    /// The directory for starting the program.
     pub directory: PathBuf,
     /// True if the program is started only when the one before has ended, since it cannot stand by.
     pub cold: bool,
 }
 
-/// The answer to a request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
-    /// To [`Request::Status`].
     Status(Box<Status>),
     /// It is done, or has begun.
     Done,
-    /// It was not done, and why.
     Refused(String),
     /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a
     /// sentence.
     Untried(String),
 }
 
-/// The state of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     pub pid: u32,
@@ -84,7 +72,6 @@ pub struct Status {
     /// Scans that the source has published; `None` if a replaced source does not report them.
     pub published: Option<u64>,
     pub poses: u64,
-    /// Scans that were dropped before the newest pose.
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
@@ -96,10 +83,8 @@ pub struct Status {
     pub processes: Vec<ProcessStatus>,
 }
 
-/// A swap that is not done yet.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PendingSwap {
-    /// The name of the stage or follower.
     pub process: String,
     pub command: Vec<String>,
     /// True if the program has taken over, but no scan has passed through it yet; false if it has
@@ -125,10 +110,8 @@ gyre_messages::named! {
     }
 }
 
-/// The state of a process of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProcessStatus {
-    /// The name of the stage or follower, or `recorder`.
     pub name: String,
     pub pid: u32,
     pub command: Vec<String>,
@@ -148,15 +131,12 @@ pub struct ProcessStatus {
 }
 
 gyre_messages::named! {
-    /// The activity of a process.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Activity {
         /// It has not opened its topics: it may be loading a model.
         Starting = "starting",
-        /// It sleeps until there is work.
         Waiting = "waiting",
-        /// It works on an item.
         Working = "working",
         /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
         Silent = "silent",
@@ -166,7 +146,6 @@ gyre_messages::named! {
     }
 }
 
-/// A client of a run's supervisor.
 #[derive(Debug)]
 pub struct Control {
     root: PathBuf,
@@ -227,7 +206,6 @@ impl Control {
         self.order(&Request::Stop)
     }
 
-    /// Starts a process of the run again.
     pub fn restart(&self, process: &str) -> Result<(), StageError> {
         let process = process.to_owned();
         self.order(&Request::Restart { process })

@@ -6,7 +6,6 @@ use gyre_run::StageCounters;
 
 use crate::{Manifest, StageError, allocations, clock, run};
 
-/// Returns the file in the run's root for a stage's counters.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.root.join(format!("{stage}.counters.json"))
 }
@@ -31,7 +30,6 @@ pub(crate) fn write(
     run::write(path_of(manifest, stage), &text)
 }
 
-/// Counts the work on one item.
 pub(crate) fn record(counters: &mut StageCounters, allocations: u64, busy_ns: i64) {
     if allocations::are_counted() {
         let count = match counters.processed < WARM_UP {
@@ -44,7 +42,6 @@ pub(crate) fn record(counters: &mut StageCounters, allocations: u64, busy_ns: i6
     counters.busy_ns += busy_ns.max(0) as u64;
 }
 
-/// The begin of the work on an item.
 pub(crate) struct Work {
     pub started_ns: i64,
     allocated: u64,

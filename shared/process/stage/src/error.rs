@@ -19,7 +19,6 @@ pub enum StageError {
     Stopped,
     #[error("no run is writing to {out}{end}: `gyre run` starts one, and its --out names the folder", out = out.display())]
     NotRunning {
-        /// The folder of the results.
         out: PathBuf,
         /// When and why the last run there ended, in parentheses.
         end: String,
@@ -51,7 +50,6 @@ pub enum StageError {
     #[error("topic `{topic}`, item {seq}, sent by {sender}: {reason}")]
     Malformed {
         topic: &'static str,
-        /// The stage that sent it.
         sender: &'static str,
         seq: u64,
         reason: String,
@@ -66,7 +64,6 @@ impl StageError {
     /// Exit code after an error that would occur again.
     pub const PERMANENT: u8 = 2;
 
-    /// Creates an error of the transport.
     pub fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
         // The transport does not name this cause.
         let full = match shared_memory::is_full() {
@@ -110,7 +107,6 @@ impl StageError {
         ))
     }
 
-    /// Returns the exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Transport { .. }

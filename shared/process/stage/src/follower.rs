@@ -21,7 +21,6 @@ pub use progress::{Progress, is_done, read as progress_of};
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
 
-/// A follower: a function of its logs.
 pub trait Follower {
     type Output: Message;
     /// The logs whose growth wakes it.
@@ -36,14 +35,11 @@ pub trait Follower {
         Ok(())
     }
 
-    /// Returns the position in the logs.
     fn progress(&self) -> Progress;
 }
 
-/// The result of a step.
 #[derive(Debug)]
 pub enum Step<H> {
-    /// There is nothing new in the logs.
     Idle,
     /// Records were worked on, and there may be more. The message is published.
     Worked(Option<H>),

@@ -18,10 +18,8 @@ use crate::{Manifest, StageError};
 
 /// Generations in the file of a run: the newest ones. Who looks on has missed far fewer.
 const KEPT: usize = 1000;
-/// The largest such file, bytes.
 const MAX_BYTES: u64 = 64 * KEPT as u64;
 
-/// The generation of the numbers of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Generation(GivenAnew);
 
@@ -51,12 +49,10 @@ impl Generation {
         Ok(Self(GivenAnew { generation, first }))
     }
 
-    /// Returns the file that keeps the generations of a run.
     pub fn path(out: &Path) -> PathBuf {
         out.join("journal").join("generation")
     }
 
-    /// Writes it into the item of a message.
     pub fn mark(&self, item: &mut Item) {
         (item.generation, item.numbered_from) = (self.0.generation, self.0.first);
     }
@@ -111,7 +107,6 @@ impl fmt::Display for Line {
     }
 }
 
-/// Reads the generations of a run; none before the first.
 fn read(path: &Path) -> Result<Vec<Line>, StageError> {
     let text = match gyre_storage::read_text(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -20,7 +20,6 @@ use crate::{
     datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
 };
 
-/// The first row of the log.
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
 /// The row of a line that is no fix: readers of the log count it.
 const UNREADABLE: &str = "unreadable\n";
@@ -29,7 +28,6 @@ const MAX_ROWS: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
 /// Maximum size of the log, bytes: several days of fixes.
 const MAX_LOG: u64 = 1 << 30;
-/// Time between two looks whether reception is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Receives fixes in a thread of its own, so that no fix waits while the trajectory is solved, and
@@ -37,11 +35,9 @@ const WAIT: Duration = Duration::from_millis(50);
 pub struct GnssReceiver {
     thread: Option<JoinHandle<Result<(), StageError>>>,
     shared: Arc<Shared>,
-    /// Number of datagrams when the log was last read.
     read: Option<u64>,
 }
 
-/// The state that both threads have.
 struct Shared {
     ends: AtomicBool,
     /// Datagrams in the log. It is written and read while this is locked.
@@ -116,7 +112,6 @@ impl Drop for GnssReceiver {
     }
 }
 
-/// The log, which is written at its end.
 struct Log {
     file: File,
     end: u64,
@@ -194,7 +189,6 @@ impl Reception {
         Ok(self.log.sync.finish()?)
     }
 
-    /// Returns the row that counts the surplus; nothing without one.
     fn surplus(&mut self) -> String {
         match std::mem::take(&mut self.surplus) {
             0 => String::new(),
@@ -279,7 +273,6 @@ mod tests {
         }
     }
 
-    /// Sends datagrams to a receiver at this port.
     fn send(address: &str, datagrams: &[&[u8]]) {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         for datagram in datagrams {

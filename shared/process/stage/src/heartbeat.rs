@@ -23,13 +23,10 @@ const SILENT: Duration = MAX_WAIT.saturating_mul(5);
 /// The activity of a process, by its number in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// It works on an item.
     Works = 1,
-    /// It sleeps until there is work.
     Waits = 2,
 }
 
-/// The newest beat of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
     /// Time when the activity began, `CLOCK_MONOTONIC`, ns.
@@ -39,7 +36,6 @@ pub struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// Returns for how long the activity has lasted.
     pub fn age(&self) -> Duration {
         Duration::from_nanos(clock::now_ns().saturating_sub(self.since_ns).max(0) as u64)
     }
@@ -74,7 +70,6 @@ impl Heartbeat {
     }
 }
 
-/// Writes the beats of this process.
 #[derive(Debug)]
 pub(crate) struct HeartbeatWriter(Numbers<2>);
 
@@ -87,7 +82,6 @@ impl HeartbeatWriter {
         Ok(Self(file))
     }
 
-    /// Reports that an activity begins now.
     pub fn beat(&self, activity: Activity) {
         let _ = self.0.put(now(activity));
     }

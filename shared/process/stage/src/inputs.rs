@@ -9,7 +9,6 @@ use crate::{
     transport::Listener,
 };
 
-/// The next action of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Wait: an input is missing.
@@ -18,23 +17,18 @@ pub enum Action {
     Keep,
     /// Process this item, whose last input was received at the given time (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
-    /// Pass on the end of the stream.
     End(Item),
 }
 
-/// The inputs of a stage.
 pub trait Inputs: Sized {
-    /// The inputs of one item.
     type View<'a>
     where
         Self: 'a;
 
     fn open(launch: &Launch) -> Result<Self, StageError>;
-    /// Reads the queues and returns what to do next.
     fn next_action(&mut self) -> Result<Action, StageError>;
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
-    /// Advances to the next item.
     fn advance(&mut self);
     /// Returns the listeners to wait for after [`Action::Wait`]. Where two inputs are missing one
     /// of them is enough, best the one that comes last: each wake-up less leaves a processor to the
@@ -49,7 +43,6 @@ pub struct Pairs<M: Message> {
     reader: Reader<M>,
 }
 
-/// A view of [`Pairs`].
 pub struct PairView<'a, M: Message> {
     pub current: &'a Received<M>,
     /// The previous item; `None` where the chain starts.
@@ -67,7 +60,6 @@ impl<M: Message> PairView<'_, M> {
 }
 
 impl PairView<'_, Masked> {
-    /// Returns the rasters to match.
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
         let previous = self
             .previous
@@ -127,11 +119,8 @@ pub struct Joined<A: Message, B: Message> {
     other: Reader<B>,
 }
 
-/// A view of [`Joined`].
 pub struct JoinedView<'a, A: Message, B: Message> {
-    /// The current and the previous item of the first topic.
     pub pair: PairView<'a, A>,
-    /// The message of the other topic for the current item.
     pub other: &'a Received<B>,
 }
 

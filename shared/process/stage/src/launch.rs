@@ -34,13 +34,11 @@ pub struct Launch {
     pub signals: Signals,
     configuration: toml::Table,
     pub(crate) node: Node,
-    /// True from [`Launch::take_place`] on.
     has_place: Cell<bool>,
     _log: EnteredSpan,
 }
 
 impl Launch {
-    /// Joins the run that [`run::ENVIRONMENT`] names.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| {
             StageError::Configuration(
@@ -140,7 +138,6 @@ impl Launch {
         })
     }
 
-    /// The section `[stages.NAME]`.
     fn own_section(&self) -> Option<&toml::Value> {
         self.configuration.get("stages")?.get(&self.name)
     }
@@ -165,7 +162,6 @@ impl Launch {
         })
     }
 
-    /// Returns whether the run's configuration has a section.
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
     }
@@ -175,7 +171,6 @@ impl Launch {
     }
 }
 
-/// Returns whether this process was started to stand by.
 fn stands_by() -> bool {
     std::env::var_os(run::STANDBY).is_some()
 }
@@ -227,7 +222,6 @@ fn leave_last_words(stage: &str, sentence: &str) {
     }
 }
 
-/// Returns the filter of the log: `GYRE_LOG`, or `FILTER` without it.
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {

@@ -15,10 +15,8 @@ use crate::StageError;
 /// The properties of a run that its processes need.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Prefix of all names of the run in shared memory.
     pub prefix: String,
     pub root: PathBuf,
-    /// The folder of the results.
     pub out: PathBuf,
     pub window: Window,
     pub limits: Limits,
@@ -35,7 +33,6 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Reads the manifest of the run at `root`.
     pub fn read(root: &Path) -> Result<Self, StageError> {
         let path = Self::path(root);
         let text = fs::read_to_string(&path).map_err(|error| StageError::manifest(&path, error))?;
@@ -82,7 +79,6 @@ pub(crate) fn options() -> OpenOptions {
     options
 }
 
-/// Writes a file of a run.
 pub(crate) fn write(path: PathBuf, text: &str) -> Result<(), StageError> {
     let opened = options().write(true).truncate(true).open(&path);
     opened

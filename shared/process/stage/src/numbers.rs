@@ -10,7 +10,6 @@ use std::{
 
 use crate::{Manifest, StageError, manifest};
 
-/// The writer of a file of numbers.
 #[derive(Debug)]
 pub(crate) struct Numbers<const N: usize> {
     path: PathBuf,

@@ -42,7 +42,6 @@ const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
 /// all busy each wake-up takes time from the stages; at hundreds of messages in a second that is
 /// more than what most observers do with them. The queue holds 9 meanwhile.
 const REST: Duration = Duration::from_millis(10);
-/// Time between two attempts to get a place.
 const RETRY: Duration = Duration::from_millis(100);
 
 /// A running run, seen from outside.
@@ -53,7 +52,6 @@ pub struct ObservedRun {
     node: Node,
 }
 
-/// An observer of one topic.
 pub struct Observer<'run, M: Message> {
     run: &'run ObservedRun,
     subscriber: Subscriber,
@@ -63,19 +61,15 @@ pub struct Observer<'run, M: Message> {
     /// True if the last call of [`next`](Self::next) found the end. After the end of the stream
     /// masking may still be killed, and reuse numbers.
     has_ended: bool,
-    /// When it last looked at its queue after a sleep.
     looked: Instant,
 }
 
-/// The next message of a topic.
 pub enum Next<'a, M: Message> {
     /// A message, and the number of items that were missed directly before it. If masking was
     /// started again in live mode, it may have a number that was received before: see
     /// [`Item::generation`](gyre_messages::Item).
     Message(&'a Received<M>, u64),
-    /// No message within the limit.
     Idle,
-    /// The stream or the run has ended.
     Ended,
 }
 
@@ -126,7 +120,6 @@ impl ObservedRun {
         run::write(missed_file(&self.manifest.root), &text)
     }
 
-    /// Returns whether the run has ended and removed its files.
     pub fn has_ended(&self) -> bool {
         rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
     }

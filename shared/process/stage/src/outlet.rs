@@ -7,7 +7,6 @@ use crate::{Launch, StageError, writer::TopicWriter};
 /// A wire message outside of shared memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordedMessage {
-    /// The bytes of its header.
     pub header: Vec<u8>,
     /// The bytes of its payload that the header describes.
     pub payload: Vec<u8>,

@@ -19,7 +19,6 @@ use serde_json::{Map, Value, json};
 
 pub use interpreter::Interpreter;
 
-/// The program of the interpreter's side.
 const PROGRAM: &str = include_str!("python_function/function.py");
 /// Room in the pipes, bytes: the most that a process may ask for without privileges.
 const PIPE_BYTES: usize = 1 << 20;
@@ -38,13 +37,11 @@ gyre_messages::named! {
     }
 }
 
-/// An argument of a call.
 pub enum Argument<'a> {
     Number(f64),
     Scan(Scan<'a>),
 }
 
-/// The attributes of a scan.
 pub struct Scan<'a> {
     pub values: Map<String, Value>,
     pub arrays: Vec<(&'static str, Array<'a>)>,
@@ -56,7 +53,6 @@ pub enum Array<'a> {
     Floats(ArrayViewD<'a, f32>),
 }
 
-/// The result of a call.
 #[derive(Debug)]
 pub enum Returned {
     Values(Vec<f64>),
@@ -64,7 +60,6 @@ pub enum Returned {
     Factors(Array2<f32>, String),
 }
 
-/// A function of Python that is ready to be called.
 #[derive(Debug)]
 pub struct Function {
     file: PathBuf,

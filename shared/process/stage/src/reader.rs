@@ -21,7 +21,6 @@ pub struct Received<M: Message> {
 }
 
 impl<M: Message> Received<M> {
-    /// Checks a message that another process has sent.
     pub(crate) fn checked(sample: Sample, limits: &Limits) -> Result<Self, StageError> {
         let received = Self {
             sample,
@@ -58,7 +57,6 @@ impl<M: Message> Received<M> {
         }
     }
 
-    /// Creates an error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
             topic: M::TOPIC,
@@ -69,7 +67,6 @@ impl<M: Message> Received<M> {
     }
 }
 
-/// The raw queue of a topic.
 pub struct Port<M: Message> {
     limits: Limits,
     subscriber: Subscriber,
@@ -109,7 +106,6 @@ impl<M: Message> Port<M> {
             .transpose()
     }
 
-    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         &self.data
     }
@@ -181,7 +177,6 @@ impl<M: Message> Reader<M> {
         follows.then_some(previous)
     }
 
-    /// Makes the current item the previous one.
     pub fn advance(&mut self) {
         if let Some(head) = self.head.take() {
             self.next = Some(head.item().seq.saturating_add(1));

@@ -27,7 +27,6 @@ pub const ENVIRONMENT: &str = "GYRE_RUN";
 /// input ends.
 pub const STANDBY: &str = "GYRE_STANDBY";
 
-/// Returns the path of the file that marks a process as ready on standby.
 pub fn ready_file(root: &Path, process: &str) -> PathBuf {
     root.join(format!("{process}.ready"))
 }

@@ -13,7 +13,6 @@ use crate::{
 const FILE: &str = "source.schedule";
 const ORIGIN_AT: u64 = 16;
 
-/// The state of the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
     /// One more than `Item::published` of the newest item; 0 before the first one.
@@ -23,7 +22,6 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Returns whether the next item is overdue.
     pub fn is_late(&self) -> bool {
         clock::now_ns() > self.due_ns
     }
@@ -57,19 +55,16 @@ impl ScheduleWriter {
         Ok(writer)
     }
 
-    /// Scans are due by the pace with this origin.
     pub fn is_paced_from(&mut self, origin: (i64, i64)) -> Result<(), StageError> {
         self.origin = Some(origin);
         self.origin_file.write([origin.0 as u64, origin.1 as u64])
     }
 
-    /// The next item is due at this time.
     pub fn due_at(&mut self, due_ns: i64) -> Result<(), StageError> {
         self.schedule.due_ns = due_ns;
         self.write()
     }
 
-    /// The source has published the item with this `Item::published`.
     pub fn has_published(&mut self, published: u64) -> Result<(), StageError> {
         self.schedule.published = published.saturating_add(1);
         self.write()

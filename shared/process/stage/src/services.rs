@@ -50,12 +50,10 @@ impl Services {
     }
 }
 
-/// Returns the name of a publisher's event to wake the readers of a topic.
 pub(crate) fn data_event(topic: &str) -> String {
     format!("{topic}_data")
 }
 
-/// Returns the name of a new reader's event to notify the publisher of a topic.
 pub(crate) fn handshake_event(topic: &str) -> String {
     format!("{topic}_handshake")
 }

@@ -38,10 +38,8 @@ pub(crate) use subscriber::{Sample, Subscriber};
 type Ipc = ipc::Service;
 /// Stands for a header of any type. It has no bytes itself.
 type AnyHeader = CustomHeaderMarker;
-/// Stands for the elements of any type: their bytes.
 type AnyPayload = [CustomPayloadMarker];
 
-/// The transport of one run.
 #[derive(Clone)]
 pub struct Transport(Config);
 
@@ -103,7 +101,6 @@ impl Transport {
         self.0.global.service.directory.to_string()
     }
 
-    /// Returns the ids of the nodes of dead processes.
     pub fn dead_nodes(&self) -> Vec<String> {
         let mut dead = Vec::new();
         self.for_each_node(|state| {
@@ -139,7 +136,6 @@ impl Transport {
         all && listed
     }
 
-    /// Returns whether the nodes could be listed.
     fn for_each_node(&self, mut visit: impl FnMut(NodeState<Ipc>)) -> bool {
         let listed = iceoryx2::node::Node::<Ipc>::list(&self.0, |state| {
             visit(state);

@@ -48,10 +48,8 @@ pub fn let_signals_end_the_process() -> Result<(), StageError> {
     Ok(())
 }
 
-/// The signals that request a stop.
 const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
-/// Signals as file descriptors to wait for.
 #[derive(Debug)]
 pub struct Signals {
     stop: UnixStream,
@@ -62,16 +60,12 @@ pub struct Signals {
     heartbeat: OnceCell<HeartbeatWriter>,
 }
 
-/// The reasons why a wait ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Woken {
     /// SIGTERM, SIGINT or SIGHUP has arrived, now or earlier.
     pub stop: bool,
-    /// A child process has exited.
     pub child: bool,
-    /// A new reader has opened the topic.
     pub handshake: bool,
-    /// The limit was reached without any event.
     pub timed_out: bool,
 }
 
@@ -199,7 +193,6 @@ pub(crate) fn wait_for(listener: &Listener, limit: Duration) -> Result<(), Stage
     }
 }
 
-/// Returns whether the limit has passed without any event.
 fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool, StageError> {
     let limit = Timespec {
         tv_sec: limit.as_secs() as i64,

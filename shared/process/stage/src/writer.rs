@@ -16,7 +16,6 @@ pub struct Writer<M: Message> {
     message: PhantomData<M>,
 }
 
-/// A message that is being written in shared memory.
 pub struct Draft<M: Message> {
     loan: Loan,
     message: PhantomData<M>,
@@ -31,7 +30,6 @@ pub struct TopicWriter {
 }
 
 impl<M: Message> Writer<M> {
-    /// Opens the topic for publishing.
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         Ok(Self {
             untyped: TopicWriter::open(node, manifest, &Topic::of::<M>())?,
@@ -47,7 +45,6 @@ impl<M: Message> Writer<M> {
         })
     }
 
-    /// Publishes a header, as [`TopicWriter::send`].
     pub(crate) fn publish(
         &self,
         header: M::Header,
@@ -107,7 +104,6 @@ impl TopicWriter {
         self.publisher.loan()
     }
 
-    /// Publishes a message of a stage, or of a process without a hop.
     pub(crate) fn send(&self, mut loan: Loan, hop: Option<StageId>) -> Result<(), StageError> {
         if let Some(hop) = hop {
             loan.item().hop_mut(hop).published_ns = clock::now_ns();
@@ -116,7 +112,6 @@ impl TopicWriter {
         self.data.notify()
     }
 
-    /// Publishes the end of the stream.
     pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
         let mut loan = self.loan()?;
         *loan.item() = Item {

@@ -4,12 +4,10 @@ use hdrhistogram::Histogram;
 
 use crate::latency::Percentiles;
 
-/// Significant digits of a percentile.
 const DIGITS: u8 = 3;
 /// The longest distinguished duration, ns: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 
-/// The distribution of a duration, ns.
 #[derive(Debug, Default)]
 pub struct Durations(Option<Histogram<u64>>);
 
@@ -36,7 +34,6 @@ impl Durations {
         Some(histogram.value_at_quantile(share))
     }
 
-    /// Returns the percentiles; zero if there is no duration.
     pub fn percentiles(&self) -> Percentiles {
         self.percentiles_if_any().unwrap_or_default()
     }

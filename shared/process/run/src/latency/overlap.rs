@@ -15,7 +15,6 @@ pub struct Overlap {
 }
 
 impl Overlap {
-    /// Adds the work on the next scan.
     pub fn add(&mut self, hops: &Hops) {
         let worked = |hop: &&Hop| **hop != Hop::default();
         for hop in hops.iter().filter(worked) {

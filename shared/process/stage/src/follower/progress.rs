@@ -7,10 +7,8 @@ use crate::{
     numbers::{self, Numbers},
 };
 
-/// The position of a follower.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// Records that it has worked on.
     pub done: u64,
     pub total: u64,
 }
@@ -36,7 +34,6 @@ pub fn read(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
     Some((Progress { done, total }, ended == 1))
 }
 
-/// Returns whether a follower has come to the end of its logs.
 pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
     read(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
 }

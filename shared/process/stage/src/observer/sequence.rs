@@ -8,12 +8,10 @@ use gyre_messages::{GivenAnew, Item, flag};
 pub struct Sequence {
     /// The number behind the newest item.
     pub next: Option<u64>,
-    /// The generation of the newest item.
     pub generation: u32,
     /// The first item that counts if it is missing; `None`: from the first one received.
     pub expected: Option<u64>,
     pub missed: u64,
-    /// True if the newest item was the end of the stream.
     pub ended: bool,
 }
 

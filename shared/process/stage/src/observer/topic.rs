@@ -10,7 +10,6 @@ use gyre_messages::{
 use super::{Next, ObservedRun, Observer};
 use crate::{Listener, StageError, outlet::RecordedMessage};
 
-/// The observer of a topic, whatever its type.
 pub trait TopicObserver {
     fn topic(&self) -> &'static str;
 
@@ -30,7 +29,6 @@ pub trait TopicObserver {
     /// generation.
     fn expect(&mut self, next: u64, generation: u32);
 
-    /// See [`Observer::missed`].
     fn missed(&self) -> u64;
 
     /// Returns, among the generations after `known` and before the item's, the one that reused the

@@ -7,11 +7,8 @@ use std::{
 
 use serde::Deserialize;
 
-/// The environment variable that names the interpreter.
 const VARIABLE: &str = "GYRE_PYTHON";
-/// The oldest version that the interpreter's side runs in.
 const OLDEST: [u32; 2] = [3, 8];
-/// Prints an [`Interpreter`].
 const PROBE: &str = "
 import json, sys
 try:
@@ -30,13 +27,11 @@ pub struct Interpreter {
     pub numpy: Option<String>,
 }
 
-/// Returns what `GYRE_PYTHON` names, or `python3`.
 pub(crate) fn name() -> String {
     env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
 }
 
 impl Interpreter {
-    /// Starts the interpreter for functions, and asks for its version and packages.
     pub fn find() -> Result<Self, String> {
         let python = name();
         let mut command = Command::new(&python);

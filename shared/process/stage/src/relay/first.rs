@@ -56,7 +56,6 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.has_ended
     }
 
-    /// Returns the number of the newest pose.
     pub fn newest_pose(&self) -> Option<u64> {
         self.feed.credit.newest
     }
@@ -66,7 +65,6 @@ impl<'a> FirstStages<'a> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }
 
-    /// Returns whether the window admits an item.
     pub fn admits(&self, seq: u64) -> bool {
         let window = &self.feed.launch.manifest.window;
         window.admits(seq, self.newest_pose())
@@ -95,7 +93,6 @@ impl<'a> FirstStages<'a> {
         self.feed.schedule.has_published(item.published)
     }
 
-    /// Publishes the end of the stream.
     pub fn end(&mut self, item: Item) -> Result<(), StageError> {
         self.feed.end(item)
     }

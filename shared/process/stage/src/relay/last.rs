@@ -44,12 +44,10 @@ impl<'a> LastStages<'a> {
         sink::republish(&self.poses, restored, StageId::PoseIntegration)
     }
 
-    /// Returns the number of poses to publish again.
     pub fn history(&self) -> usize {
         Pose::sizes(&self.launch.manifest.window).history
     }
 
-    /// Subscribes to topics of the stream.
     pub fn read(&mut self, topics: &[&str]) -> Result<(), StageError> {
         let inlets = topics.iter().map(|topic| inlet(self.launch, topic));
         self.inlets = inlets.collect::<Result<_, _>>()?;
@@ -77,7 +75,6 @@ impl<'a> LastStages<'a> {
         self.poses.publish(sink::newest(pose), hop)
     }
 
-    /// Publishes the end of the stream.
     pub fn end(&self, item: Item) -> Result<(), StageError> {
         self.poses.end(item, Some(StageId::PoseIntegration))
     }
@@ -112,7 +109,6 @@ impl<'a> LastStages<'a> {
     }
 }
 
-/// A reader in the place of a stage, whatever the type of its topic.
 trait Inlet {
     fn receive(&mut self) -> Result<Option<RecordedMessage>, StageError>;
     fn listener(&self) -> &Listener;

@@ -30,7 +30,6 @@ use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 const OWNER_ONLY: u32 = 0o700;
 /// Modes of a directory where others could have put something, or of a special directory.
 const NOT_OWN: u32 = 0o7022;
-/// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
 /// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some
 /// milliseconds, while it removes it.
@@ -46,10 +45,8 @@ pub struct RunRoot {
     _lock: File,
 }
 
-/// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    /// Another run has the same results.
     #[error("{0}")]
     Busy(String),
     #[error(
@@ -123,7 +120,6 @@ impl RunRoot {
         }
     }
 
-    /// Returns the prefix of all names of the run in shared memory.
     pub fn prefix(&self) -> String {
         self.prefix.clone()
     }
@@ -298,7 +294,6 @@ fn remove_if_dead(root: &Path) {
     }
 }
 
-/// Removes a run whose lock this process holds.
 fn remove(root: &Path) {
     remove_files(root);
     // Last: with it the name is free.

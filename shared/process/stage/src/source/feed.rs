@@ -129,7 +129,6 @@ impl<'a, O: AsRef<[TopicWriter]>> Feed<'a, O> {
         }
     }
 
-    /// Publishes the end of the stream.
     pub fn end(&mut self, item: Item) -> Result<(), StageError> {
         let mut outputs = self.outputs.as_ref().iter();
         outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;

@@ -28,7 +28,6 @@ pub(crate) fn bind_alone() -> MutexGuard<'static, ()> {
     BINDING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Numbers of ports that an event has room for, without the spare ones.
 #[derive(Clone, Copy)]
 pub(crate) struct EventSizes {
     pub(crate) listeners: usize,
@@ -39,13 +38,11 @@ pub(crate) struct EventSizes {
 /// An event. It exists as long as a process has it open.
 pub(crate) struct Event(Sealed<event::PortFactory<Ipc>>);
 
-/// The receiver of an event's notifications.
 pub struct Listener {
     event: String,
     port: Sealed<listener::Listener<Ipc>>,
 }
 
-/// The sender of an event's notifications.
 pub(crate) struct Notifier {
     event: String,
     port: Sealed<notifier::Notifier<Ipc>>,
@@ -87,7 +84,6 @@ impl Listener {
         })
     }
 
-    /// Takes the notifications that have arrived, and returns their number.
     pub(crate) fn take(&self) -> Result<usize, StageError> {
         let mut notifications = 0;
         let taken = self.port.try_wait(|_| notifications += 1);
@@ -113,7 +109,6 @@ impl Notifier {
         })
     }
 
-    /// Wakes the listeners.
     pub(crate) fn notify(&self) -> Result<(), StageError> {
         let notified = self.port.notify().map(drop);
         notified.map_err(|e| StageError::transport(format!("notify {}", self.event), e))

@@ -12,7 +12,6 @@ use iceoryx2::{
 use super::{AnyHeader, AnyPayload, Ipc, Sealed, Service};
 use crate::StageError;
 
-/// The port that publishes a topic.
 pub(crate) struct Publisher {
     topic: &'static str,
     header_bytes: usize,
@@ -20,14 +19,12 @@ pub(crate) struct Publisher {
     port: Sealed<publisher::Publisher<Ipc, AnyPayload, AnyHeader>>,
 }
 
-/// A message that is being written in shared memory.
 pub(crate) struct Loan {
     sample: Sealed<SampleMut<Ipc, AnyPayload, AnyHeader>>,
     header_bytes: usize,
 }
 
 impl Publisher {
-    /// Creates the port, which connects to all existing readers at once.
     pub(crate) fn create(
         service: &Service,
         window: &Window,
@@ -81,7 +78,6 @@ impl Publisher {
             .map_err(|e| StageError::transport(format!("send {}", self.topic), e))
     }
 
-    /// Connects to new readers, and sends them the history.
     pub(crate) fn connect(&self) -> Result<(), StageError> {
         self.port
             .update_connections()
@@ -90,7 +86,6 @@ impl Publisher {
 }
 
 impl Loan {
-    /// Returns the bytes of header and payload.
     pub(crate) fn parts(&mut self) -> (&mut [u8], &mut [u8]) {
         let header = std::ptr::from_mut(self.sample.user_header_mut()).cast::<u8>();
         let payload = self.sample.payload_mut();

@@ -10,7 +10,6 @@ use iceoryx2::{
 use super::{AnyHeader, AnyPayload, Ipc, Sealed, Service};
 use crate::StageError;
 
-/// The port that receives a topic.
 pub(crate) struct Subscriber {
     topic: &'static str,
     header_bytes: usize,
@@ -63,7 +62,6 @@ impl Subscriber {
 }
 
 impl Sample {
-    /// Returns the bytes of the header.
     pub(crate) fn header(&self) -> &[u8] {
         let header = std::ptr::from_ref(self.sample.user_header()).cast::<u8>();
         // SAFETY: the topic was opened with this size of headers, so that the sample has as many
@@ -71,7 +69,6 @@ impl Sample {
         unsafe { slice::from_raw_parts(header, self.header_bytes) }
     }
 
-    /// Returns the bytes of the payload.
     pub(crate) fn payload(&self) -> &[u8] {
         let payload = self.sample.payload();
         // SAFETY: an element of `AnyPayload` is one byte.
