@@ -1,7 +1,5 @@
-//! Localisation of a run in the map of an earlier drive, while it drives.
-//!
-//! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place
-//! as a `fix`. It writes no file: its fixes depend only on the keyframes and the map, whenever the
+//! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map, whenever the
 //! keyframes arrive.
 
 use std::path::PathBuf;

@@ -1,9 +1,6 @@
-//! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
-//! run.
-//!
-//! It follows `journal/keyframes.log`. It keeps the places of keyframes in `journal/places.log` and
-//! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
-//! logs. Both follow from the keyframes, whenever those come.
+//! Loop closing: follows `journal/keyframes.log`, and keeps the places of keyframes in
+//! `journal/places.log` and the verdicts on all candidates in `journal/loops.log`. A restarted
+//! process continues from both logs. Both follow from the keyframes, whenever those come.
 
 use std::{collections::VecDeque, mem, path::PathBuf};
 

@@ -1,10 +1,6 @@
-//! Moving objects: tracks what moves around the vehicle, scan after scan.
-//!
-//! It follows `journal/scans.log`, which has each scan's points and pose. It keeps the objects of
-//! each scan in `journal/objects.log`, and `objects.csv` is made from that log. A restarted process
-//! works through the scans again from the first scan, since an identity can be as old as the run,
-//! and appends the records that the log lacks. Its records depend only on the scans, whenever the
-//! scans arrive.
+//! Moving objects: follows `journal/scans.log`, and keeps the objects of each scan in
+//! `journal/objects.log`. A restarted process works through the scans from the first one, since an
+//! identity can be as old as the run, and appends the records that the log lacks.
 
 use std::path::PathBuf;
 

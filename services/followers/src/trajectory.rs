@@ -1,14 +1,7 @@
-//! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
-//! them and the fixes of GNSS.
-//!
-//! It follows `journal/keyframes.log` and `journal/loops.log`. The log of the fixes is complete
-//! when it starts, or grows: fixes of a live receiver are written to `journal/gnss.csv` here, until
-//! both other logs have ended. A fix counts once both keyframes around it have come.
-//!
-//! During the run, new loops and fixes update the standing estimate, which may depend a little on
-//! their time of arrival. When both logs have ended, the poses are solved again. The last
-//! correction is then a function of the logs alone, and so equals the results that the supervisor
-//! makes from the same logs.
+//! The trajectory that agrees with the loops: follows `journal/keyframes.log` and
+//! `journal/loops.log`, and the fixes of GNSS, which for a live receiver are written to
+//! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
+//! ended, the poses are solved again, so that the last correction equals the results.
 
 mod live_fixes;
 

@@ -1,9 +1,6 @@
 //! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as
 //! ASTERIX CAT-240 by UDP, and publishes each sweep on `scan`, written directly into shared memory.
-//!
-//! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
-//! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
-//! (the completion time of a scan).
+//! [`Intake`] makes scans of azimuths, whatever the transport.
 
 mod ask;
 mod connection;

@@ -1,9 +1,5 @@
 //! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion
-//! compensation.
-//!
-//! [`gyre_masking::Masker`] does the work, with a function of Python where one is given (`python`).
-//! `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of taking scans
-//! from the queue; `azimuths` finds those that were lost. The velocity by Doppler is measured here,
+//! compensation. [`gyre_masking::Masker`] does the work. The velocity by Doppler is measured here,
 //! where the rows of the scan are.
 
 mod azimuths;

@@ -1,9 +1,6 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
-//! pose before it is published.
-//!
-//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled;
-//! with objects it logs each scan. In live mode poses continue when the disk is full, and are not
-//! kept from then on.
+//! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
+//! poses continue when the disk is full, and are not kept from then on.
 
 use std::fmt::Display;
 

@@ -156,7 +156,7 @@ impl Connection {
                 tracing::info!(address = %self.address, "connected to the radar");
                 self.socket = Some(socket);
                 self.last_azimuth = Instant::now();
-                        self.receives_azimuths = false;
+                self.receives_azimuths = false;
                 self.opened += 1;
                 ReadResult::Opened
             }

@@ -30,10 +30,7 @@ pub enum NoScans {
     #[error(
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]
-    TooLarge {
-        bytes: usize,
-        room: usize,
-    },
+    TooLarge { bytes: usize, room: usize },
 }
 
 impl Intake {

@@ -1,9 +1,7 @@
-//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers,
-//! so no later stage sees a gap; the gaps in the source's own count are the dropped scans.
-//!
-//! After a start scans are processed in order until masking has caught up, and as many may wait as
-//! the window has room for: so a restart that is shorter than that drops none of those that came
-//! meanwhile.
+//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers;
+//! the gaps in the source's own count are the dropped scans. After a start scans are processed in
+//! order until masking has caught up, and as many may wait as the window has room for: so a restart
+//! that is shorter than that drops none of those that came meanwhile.
 
 use std::{collections::VecDeque, mem};
 

@@ -1,9 +1,6 @@
-//! The motions for motion compensation, by sequence number.
-//!
-//! Masking receives a motion twice: from the search, and with its journalled pose. It uses the
-//! first one, so both must be equal. Therefore only the searched motion is used, which refinement
-//! passes on unchanged. After a restart the motions up to the newest pose come from the journal;
-//! the search finds later ones again.
+//! The motions for motion compensation, by sequence number. Masking receives a motion twice: from
+//! the search, and with its journalled pose. So only the searched motion is used, which refinement
+//! passes on unchanged. After a restart the motions up to the newest pose come from the journal.
 
 use std::collections::BTreeMap;
 

@@ -1,12 +1,5 @@
 //! A run as data: the sections of its configuration that its processes read, and its report at the
-//! end.
-//!
-//! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and
-//!   [`Budget`] are sections;
-//! - [`Report`] is the supervisor's report, with the [`StageCounters`] of each process.
-//!
-//! It is light, so that a stage which reads its own section, and a program which only writes
-//! configurations, need neither the mathematics nor the transport.
+//! end. It needs neither the mathematics nor the transport.
 
 mod budget;
 pub mod latency;

@@ -1,9 +1,6 @@
 //! The loop of a follower: a process that reads durable logs at its own pace, and publishes for
-//! observers.
-//!
-//! A follower is not in the stream: no stage waits for it, and it gives no credit. It can be late
-//! by any time, since all that it needs is in the logs. An event wakes it when a log has grown; as
-//! events can be lost, it looks every 200 ms.
+//! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
+//! grown; as events can be lost, it looks every 200 ms.
 
 mod growth;
 mod progress;

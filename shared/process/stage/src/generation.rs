@@ -1,11 +1,7 @@
-//! Generations of numbers.
-//!
-//! In live mode masking numbers the scans that it takes. When it is started again it gives the
-//! numbers behind the newest pose to other scans, and what had been sent under them is void; a
-//! sensor's source does so when the run is started again. Each such start begins a generation,
-//! which its messages carry. So an observer, or a reader of a recording, can distinguish a scan
-//! that reuses a number from a scan that is sent again. The file of the generations has all of them
-//! with their first numbers, for one that has seen no message of some.
+//! Generations of numbers: masking that is started again in live mode gives the numbers behind the
+//! newest pose to other scans, and a sensor's source does so when the run is started again. Each
+//! such start begins a generation, which its messages carry, so that a reused number differs from a
+//! message that is sent again. The file has all generations, for one that has seen none of some.
 
 use std::{
     fmt, io,

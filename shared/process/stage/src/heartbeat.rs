@@ -1,10 +1,6 @@
-//! The heartbeat of a process: whether it waits or works, and since when. It distinguishes a
-//! process that hangs from one that waits.
-//!
-//! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait,
-//! which is every 200 ms or more often, and a stage also before each item. So a process that works
-//! has a beat as old as its work, and a process that is stopped, or that the system does not run,
-//! has an old beat that reports a wait.
+//! The heartbeat of a process, a file in the run's root: written when a wait begins and ends, every
+//! 200 ms or more often, and by a stage before each item. A process that works has a beat as old as
+//! its work; one that is stopped, or not run by the system, has an old beat of a wait.
 
 use std::{process, time::Duration};
 

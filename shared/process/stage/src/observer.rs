@@ -1,12 +1,7 @@
-//! Observers: subscribers that the run does not depend on, in processes of their own.
-//!
-//! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it:
-//! a full queue loses its oldest message, and the observer counts its missed messages. It looks at
-//! its queue at most every 10 ms, whatever the rate. It holds one message at a time, which the
-//! publishers' memory is sized for (see
-//! [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once,
-//! when it attaches, so that the publisher connects to it while it waits, and not while it sends.
-//! The supervisor frees the places of killed observers.
+//! Observers: subscribers that the run does not depend on, in processes of their own. They may
+//! attach, be slow, be stopped or be killed at any time: a full queue loses its oldest message, and
+//! the observer counts those that it has missed. It holds one message at a time, and notifies the
+//! publisher once, when it attaches. The supervisor frees the places of killed observers.
 
 mod sequence;
 mod topic;

@@ -1,9 +1,6 @@
-//! A function in a file of Python, called from Rust.
-//!
-//! The function lives in a process of its own, an interpreter with numpy that ends with its caller.
-//! A call writes a line of JSON and the arrays to its standard input, and reads a line and the
-//! array that it returns: a scan of 1.5 MB takes about a millisecond. So any Python will do, its
-//! crash is not the stage's, and no interpreter is linked.
+//! A function in a file of Python, called from Rust in a process of its own: a call writes a line
+//! of JSON and the arrays, and reads a line and the array that it returns. A scan of 1.5 MB takes
+//! about a millisecond. Any Python will do, its crash is not the stage's, and none is linked.
 
 mod interpreter;
 

@@ -1,10 +1,6 @@
-//! The transport, iceoryx2, behind a boundary without its types.
-//!
-//! The ports are generic in the message. Here each is instantiated once, for messages of any type:
-//! header and payload are bytes, and a topic is opened with the names, sizes and alignments of
-//! [`gyre_messages::Topic`], as by the transport's bindings for other languages. So no other crate
-//! compiles its code again; [`writer`](crate::writer) and [`reader`](crate::reader) give the bytes
-//! their types.
+//! The transport, iceoryx2, behind a boundary without its types. Its ports are generic in the
+//! message; here each is instantiated once, for bytes, and a topic is opened with the names, sizes
+//! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
 mod publisher;

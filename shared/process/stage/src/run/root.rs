@@ -1,9 +1,6 @@
-//! The place of a run in shared memory: its root, its lock, and the removal of both.
-//!
-//! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of
-//! each run lies its lock, and as long as the run lives its supervisor holds it. So a lock that is
-//! free belongs to a dead run, and whoever holds it may remove that run. No lock is shared between
-//! runs, and no run waits for one.
+//! The place of a run in shared memory, `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the
+//! root of each run lies its lock, which its supervisor holds as long as the run lives. So a lock
+//! that is free belongs to a dead run, and whoever holds it may remove that run.
 
 use std::{
     collections::BTreeSet,
