@@ -145,18 +145,6 @@ mod tests {
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
 
-    fn scans() -> ScanAssembly {
-        let radar = Configuration {
-            azimuth_samples: AZIMUTHS,
-            bin_size: 438,
-            range_in_bins: 16,
-            encoder_size: 5600,
-            rotation_mhz: 4000,
-            ..Configuration::default()
-        };
-        ScanAssembly::new(radar, Constants::default()).unwrap()
-    }
-
     /// The assembly of scans in the memory of one scan.
     struct Source {
         scans: ScanAssembly,
@@ -167,10 +155,18 @@ mod tests {
 
     impl Source {
         fn new() -> Self {
+            let radar = Configuration {
+                azimuth_samples: AZIMUTHS,
+                bin_size: 438,
+                range_in_bins: 16,
+                encoder_size: 5600,
+                rotation_mhz: 4000,
+                ..Configuration::default()
+            };
             let mut turns = TurnCounter::resume(None, 0);
             turns.configure(250_000_000);
             Self {
-                scans: scans(),
+                scans: ScanAssembly::new(radar, Constants::default()).unwrap(),
                 turns,
                 header: ScanHeader::default(),
                 bytes: vec![0; 400 * 16],
@@ -235,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_configuration_that_differs_in_unused_numbers_is_the_same() {
-        let scans = scans();
+        let scans = Source::new().scans;
         let radar = scans.radar;
         let unused = Configuration {
             range_gain: f32::NAN,

@@ -293,17 +293,15 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_chain_repeats_the_scan_of_the_newest_pose_with_its_number() {
-        let item = Chain::resume(&scan(31), &newest_pose()).number(&scan(31));
-        assert_eq!(
-            (item.seq, item.scan, item.previous_scan, item.flags),
-            (9, 40, 37, 0)
-        );
-    }
-
-    #[test]
-    fn a_chain_without_its_last_scan_starts_again_with_the_next_number() {
-        let item = Chain::resume(&scan(35), &newest_pose()).number(&scan(35));
+    fn a_resumed_chain_repeats_the_scan_of_the_newest_pose_or_starts_again_with_the_next_number() {
+        let numbered = |published| {
+            let scan = scan(published);
+            Chain::resume(&scan, &newest_pose()).number(&scan)
+        };
+        let item = numbered(31);
+        let numbers = [item.seq, item.scan, item.previous_scan, item.flags.into()];
+        assert_eq!(numbers, [9, 40, 37, 0]);
+        let item = numbered(35);
         assert_eq!((item.seq, item.previous_scan), (10, item.scan));
         assert!(item.is(flag::BREAK));
     }
@@ -326,23 +324,14 @@ mod tests {
 
     #[test]
     fn scans_before_the_newest_pose_never_start_a_chain() {
-        assert!(
-            Chain::precedes(&scan(30), &newest_pose())
-                && !Chain::precedes(&scan(31), &newest_pose())
-        );
-        assert!(!Chain::precedes(
-            &scan(0),
-            &Item {
-                flags: flag::BASE,
-                ..newest_pose()
-            }
-        ));
-        assert!(!Chain::precedes(
-            &Item {
-                flags: flag::END,
-                ..scan(0)
-            },
-            &newest_pose()
-        ));
+        let flagged = |item, flags| Item { flags, ..item };
+        for (item, newest, precedes) in [
+            (scan(30), newest_pose(), true),
+            (scan(31), newest_pose(), false),
+            (scan(0), flagged(newest_pose(), flag::BASE), false),
+            (flagged(scan(0), flag::END), newest_pose(), false),
+        ] {
+            assert_eq!(Chain::precedes(&item, &newest), precedes, "{item:?}");
+        }
     }
 }

@@ -95,9 +95,9 @@ mod tests {
     use gyre_samples::Sample;
 
     use crate::{
-        ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits, Loop,
-        LoopHeader, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, PoseHeader,
-        Rotation, RotationHeader, Scan, ScanHeader, flag,
+        ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits,
+        ListedObject, Loop, LoopHeader, Masked, MaskedHeader, Message, Motion, MotionHeader,
+        Objects, ObjectsHeader, Pose, PoseHeader, Rotation, RotationHeader, Scan, ScanHeader, flag,
     };
 
     const LIMITS: Limits = Limits {
@@ -115,7 +115,6 @@ mod tests {
         assert!(is_it, "{start}: {violation:?}");
     }
 
-    /// The start of the sentence that refuses a header, and how to make it such.
     type Change<'a, H> = (&'a str, &'a dyn Fn(&mut H));
 
     /// Asserts that a header is accepted, that each of the changes makes it refused for its field,
@@ -140,124 +139,102 @@ mod tests {
         }
     }
 
-    #[test]
-    fn an_item_has_known_flags_and_follows_an_earlier_scan() {
-        each_is_refused::<Rotation>(
-            RotationHeader::default(),
-            &[],
-            &[
-                ("flags is 16", &|it| it.item.flags = 16),
-                ("previous_scan is 3", &|it| it.item.previous_scan = 3),
-                ("numbered_from is 2", &|it| it.item.numbered_from = 2),
-            ],
-        );
+    /// See [`each_is_refused`]: the start of each sentence, and the change that it refuses.
+    macro_rules! refused {
+        ($message:ty, $header:expr, $payload:expr; $($start:literal: $change:expr,)+) => {
+            each_is_refused::<$message>($header, $payload, &[$(($start, &$change)),+])
+        };
     }
 
     #[test]
-    fn a_rotation_is_an_angle_with_a_variance() {
-        each_is_refused::<Rotation>(
-            RotationHeader::default(),
-            &[],
-            &[
-                ("angle_rad is NaN", &|it| it.rotation.angle_rad = f64::NAN),
-                ("angle_rad is -3.5", &|it| it.rotation.angle_rad = -3.5),
-                ("variance_rad2 is -1", &|it| {
-                    it.rotation.variance_rad2 = -1.0
-                }),
-                ("score is inf", &|it| it.rotation.score = f64::INFINITY),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_motion_is_finite_and_as_long_as_a_search_can_find_it() {
-        each_is_refused::<Motion>(
-            MotionHeader::default(),
-            &[],
-            &[
-                ("x_m is NaN", &|it| it.motion.x_m = f64::NAN),
-                ("y_m is -61", &|it| it.motion.y_m = -61.0),
-                ("yaw_rad is 3.2", &|it| it.motion.yaw_rad = 3.2),
-                ("searched[0] is 6.5", &|it| it.motion.searched[0] = 6.5),
-                ("covariance", &|it| it.motion.covariance[1] = 1.0),
-                ("interval_ns is -1", &|it| it.motion.interval_ns = -1),
-                ("score is NaN", &|it| it.motion.score = f64::NAN),
-                ("angle_rad is 9", &|it| it.motion.rotation.angle_rad = 9.0),
-                ("outcome is 4", &|it| it.motion.refinement.outcome = 4),
-                ("overlap is NaN", &|it| {
-                    it.motion.refinement.overlap = f64::NAN
-                }),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_pose_is_finite_and_on_earth() {
-        each_is_refused::<Pose>(
-            PoseHeader::default(),
-            &[],
-            &[
-                ("x_m is NaN", &|it| it.x_m = f64::NAN),
-                ("y_m is 1000000000", &|it| it.y_m = 1e9),
-                ("covariance", &|it| it.covariance[0] = -1.0),
-                ("x_m is inf", &|it| it.motion.x_m = f64::INFINITY),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_loop_is_between_two_keyframes_within_reach_of_each_other() {
+    fn a_header_is_finite_and_within_its_bounds() {
+        refused! { Rotation, RotationHeader::default(), &[];
+            "flags is 16": |it| it.item.flags = 16,
+            "previous_scan is 3": |it| it.item.previous_scan = 3,
+            "numbered_from is 2": |it| it.item.numbered_from = 2,
+            "angle_rad is NaN": |it| it.rotation.angle_rad = f64::NAN,
+            "angle_rad is -3.5": |it| it.rotation.angle_rad = -3.5,
+            "variance_rad2 is -1": |it| it.rotation.variance_rad2 = -1.0,
+            "score is inf": |it| it.rotation.score = f64::INFINITY,
+        }
+        refused! { Motion, MotionHeader::default(), &[];
+            "x_m is NaN": |it| it.motion.x_m = f64::NAN,
+            "y_m is -61": |it| it.motion.y_m = -61.0,
+            "yaw_rad is 3.2": |it| it.motion.yaw_rad = 3.2,
+            "searched[0] is 6.5": |it| it.motion.searched[0] = 6.5,
+            "covariance": |it| it.motion.covariance[1] = 1.0,
+            "interval_ns is -1": |it| it.motion.interval_ns = -1,
+            "score is NaN": |it| it.motion.score = f64::NAN,
+            "angle_rad is 9": |it| it.motion.rotation.angle_rad = 9.0,
+            "outcome is 4": |it| it.motion.refinement.outcome = 4,
+            "overlap is NaN": |it| it.motion.refinement.overlap = f64::NAN,
+        }
+        refused! { Pose, PoseHeader::default(), &[];
+            "x_m is NaN": |it| it.x_m = f64::NAN,
+            "y_m is 1000000000": |it| it.y_m = 1e9,
+            "covariance": |it| it.covariance[0] = -1.0,
+            "x_m is inf": |it| it.motion.x_m = f64::INFINITY,
+        }
         let header = LoopHeader {
             later_seq: 9,
             earlier_seq: 2,
             loops: 1,
             ..LoopHeader::default()
         };
-        each_is_refused::<Loop>(
-            header,
-            &[],
-            &[
-                ("earlier_seq is 9", &|it| it.earlier_seq = 9),
-                ("x_m is 6.5", &|it| it.x_m = 6.5),
-                ("yaw_rad is NaN", &|it| it.yaw_rad = f64::NAN),
-                ("covariance", &|it| it.covariance[0] = -1.0),
-                ("correlation is 1.5", &|it| it.correlation = 1.5),
-                ("loops is 0", &|it| it.loops = 0),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_correction_is_finite_and_of_some_keyframes() {
+        refused! { Loop, header, &[];
+            "earlier_seq is 9": |it| it.earlier_seq = 9,
+            "x_m is 6.5": |it| it.x_m = 6.5,
+            "yaw_rad is NaN": |it| it.yaw_rad = f64::NAN,
+            "covariance": |it| it.covariance[0] = -1.0,
+            "correlation is 1.5": |it| it.correlation = 1.5,
+            "loops is 0": |it| it.loops = 0,
+        }
         let header = CorrectionHeader {
             keyframes: 1,
             ..CorrectionHeader::default()
         };
-        each_is_refused::<Correction>(
-            header,
-            &[],
-            &[
-                ("x_m is inf", &|it| it.x_m = f64::INFINITY),
-                ("yaw_rad is 4", &|it| it.yaw_rad = 4.0),
-                ("covariance", &|it| it.keyframe_covariance[0] = f64::NAN),
-                ("keyframes is 0", &|it| it.keyframes = 0),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_fix_is_finite_and_of_a_known_status() {
-        each_is_refused::<Fix>(
-            FixHeader::default(),
-            &[],
-            &[
-                ("y_m is inf", &|it| it.y_m = f64::INFINITY),
-                ("yaw_rad is 4", &|it| it.yaw_rad = 4.0),
-                ("covariance", &|it| it.covariance[0] = -1.0),
-                ("correlation is NaN", &|it| it.correlation = f64::NAN),
-                ("status is 4", &|it| it.status = 4),
-            ],
-        );
+        refused! { Correction, header, &[];
+            "x_m is inf": |it| it.x_m = f64::INFINITY,
+            "yaw_rad is 4": |it| it.yaw_rad = 4.0,
+            "covariance": |it| it.keyframe_covariance[0] = f64::NAN,
+            "keyframes is 0": |it| it.keyframes = 0,
+        }
+        refused! { Fix, FixHeader::default(), &[];
+            "y_m is inf": |it| it.y_m = f64::INFINITY,
+            "yaw_rad is 4": |it| it.yaw_rad = 4.0,
+            "covariance": |it| it.covariance[0] = -1.0,
+            "correlation is NaN": |it| it.correlation = f64::NAN,
+            "status is 4": |it| it.status = 4,
+        }
+        let car = ListedObject {
+            x_m: 20.0,
+            yaw_rad: 3.0,
+            length_m: 4.4,
+            width_m: 1.9,
+            ..ListedObject::default()
+        };
+        let mut header = ObjectsHeader {
+            objects: 2,
+            moving: 1,
+            listed: 2,
+            ..ObjectsHeader::default()
+        };
+        header.list[..2].fill(car);
+        refused! { Objects, header, &[];
+            "x_m": |it| it.x_m = f64::NAN,
+            "moving": |it| it.moving = 3,
+            "listed": |it| it.listed = 1,
+            "an object's y_m": |it| it.list[1].y_m = f64::INFINITY,
+            "an object's yaw_rad": |it| it.list[1].yaw_rad = 4.0,
+            "an object's vx_mps": |it| it.list[0].vx_mps = f64::NAN,
+            "an object's width_m": |it| it.list[1].width_m = -1.0,
+            "an object's covariance": |it| it.list[0].velocity_covariance[2] = f64::NAN,
+        }
+        // Unlisted entries are not checked.
+        header.list[2].y_m = f64::NAN;
+        assert_eq!(Objects::check(&header, &[], &LIMITS), Ok(()));
+        (header.objects, header.listed, header.list[2].y_m) = (100, 64, 0.0);
+        assert_eq!(Objects::check(&header, &[], &LIMITS), Ok(()));
     }
 
     #[test]
@@ -270,18 +247,14 @@ mod tests {
             ..MaskedHeader::default()
         };
         let payload = [FloatBlock::zeroed(); 4];
-        each_is_refused::<Masked>(
-            header,
-            &payload,
-            &[
-                ("n is 4", &|it| it.n = 4),
-                ("rasters is 2", &|it| it.rasters = 2),
-                ("cell_m is 0.5", &|it| it.cell_m = 0.5),
-                ("points is 3", &|it| it.points = 3),
-                ("mask is 3", &|it| it.mask = 3),
-                ("twist[1] is NaN", &|it| it.twist[1] = f32::NAN),
-            ],
-        );
+        refused! { Masked, header, &payload;
+            "n is 4": |it| it.n = 4,
+            "rasters is 2": |it| it.rasters = 2,
+            "cell_m is 0.5": |it| it.cell_m = 0.5,
+            "points is 3": |it| it.points = 3,
+            "mask is 3": |it| it.mask = 3,
+            "twist[1] is NaN": |it| it.twist[1] = f32::NAN,
+        }
         assert!(Masked::check(&header, &payload[..1], &LIMITS).is_err());
         let mut values = [0.0_f32; 64];
         values[16 + 5] = f32::NAN;
@@ -304,26 +277,16 @@ mod tests {
         let second_ns = 1_000_000_000;
         header.item.stamp_ns = second_ns;
         header.azimuth_stamp_ns[..4].fill(second_ns);
-        each_is_refused::<Scan>(
-            header,
-            &[ByteBlock::zeroed()],
-            &[
-                ("azimuths is 0", &|it| it.azimuths = 0),
-                ("azimuths is 9999", &|it| it.azimuths = 9999),
-                ("its payload of 64 bytes is shorter", &|it| it.bins = 17),
-                ("its payload of 64 bytes is shorter", &|it| {
-                    it.first_byte = u32::MAX
-                }),
-                ("the scan's range resolution", &|it| {
-                    it.range_resolution_m = f32::NAN
-                }),
-                ("the scan's stamp", &|it| it.item.stamp_ns = 12_000_000_000),
-                ("row 2: stamp", &|it| {
-                    it.azimuth_stamp_ns[2] = 12_000_000_000
-                }),
-                ("azimuth 3", &|it| it.azimuth_rad[3] = f32::INFINITY),
-            ],
-        );
+        refused! { Scan, header, &[ByteBlock::zeroed()];
+            "azimuths is 0": |it| it.azimuths = 0,
+            "azimuths is 9999": |it| it.azimuths = 9999,
+            "its payload of 64 bytes is shorter": |it| it.bins = 17,
+            "its payload of 64 bytes is shorter": |it| it.first_byte = u32::MAX,
+            "the scan's range resolution": |it| it.range_resolution_m = f32::NAN,
+            "the scan's stamp": |it| it.item.stamp_ns = 12_000_000_000,
+            "row 2: stamp": |it| it.azimuth_stamp_ns[2] = 12_000_000_000,
+            "azimuth 3": |it| it.azimuth_rad[3] = f32::INFINITY,
+        }
     }
 
     #[test]
@@ -338,17 +301,10 @@ mod tests {
         let mut payload = [ByteBlock::zeroed(); 3];
         let good = [1, 2].map(|ns| Sample::yaw_rate(ns, 0.5));
         header.set_samples(bytemuck::cast_slice_mut(&mut payload), &good, 0);
-        each_is_refused::<Scan>(
-            header,
-            &payload,
-            &[
-                ("samples is 3", &|it| it.samples = 3),
-                ("its payload of 192 bytes is shorter", &|header| {
-                    header.stride = 64;
-                    header.azimuths = 2;
-                }),
-            ],
-        );
+        refused! { Scan, header, &payload;
+            "samples is 3": |it| it.samples = 3,
+            "its payload of 192 bytes is shorter": |it| (it.stride, it.azimuths) = (64, 2),
+        }
         let unknown = Sample { kind: 9, ..good[1] };
         for (bad, expected) in [
             (Sample::yaw_rate(2, f64::NAN), "sample 1 is"),

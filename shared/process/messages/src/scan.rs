@@ -310,16 +310,10 @@ mod tests {
         assert_eq!(header.samples(bytes), Some(&samples[..2]));
         assert_eq!(header.read_samples(bytes), Some(samples[..2].to_vec()));
         assert_eq!(Scan::content_bytes(&header), Some(192));
-        assert!(
-            header
-                .view(bytes)
-                .is_some_and(|scan| scan.row(1) == [7; 10])
-        );
+        assert_eq!(header.view(bytes).map(|scan| scan.row(1)[9]), Some(7));
         header.shift_times(100, bytes);
-        let stamps = header
-            .samples(bytes)
-            .map(|it| [it[0].stamp_ns, it[1].stamp_ns]);
-        assert_eq!(stamps, Some([101, 102]));
+        let stamps = header.samples(bytes).unwrap_or_default().iter();
+        assert!(stamps.map(|it| it.stamp_ns).eq([101, 102]));
         assert_eq!(header.samples(&bytes[..191]), None);
         header.set_samples(&mut [], &samples, 0);
         assert_eq!((header.samples, header.samples_left_out), (0, 3));

@@ -130,15 +130,8 @@ mod tests {
                 published_ns: received_ns + 7000,
             }
         };
-        let hops = [
-            hop(0),
-            hop(1),
-            hop(2),
-            hop(3),
-            Hop::default(),
-            Hop::default(),
-            hop(4),
-        ];
+        let mut hops = [0, 1, 2, 3, 0, 0, 4].map(hop);
+        hops[4..6].fill(Hop::default());
         PoseHeader {
             item: Item {
                 due_ns,
@@ -168,20 +161,9 @@ mod tests {
         assert!(near(latency.sensor_to_pose.p50_us, 46.0));
         assert!(latency.stages["radar-replay"].transport.is_none());
         assert_eq!((latency.stages.len(), latency.overlap), (5, 0.0));
-    }
-
-    #[test]
-    fn scans_a_hop_apart_keep_two_stages_busy_at_once() {
+        // A hop apart they keep two stages busy at once.
         let latency = measured(&[pose(0), pose(10_000)]);
-        assert!(
-            near(latency.overlap, 4.0 * 5.0 / 55.0),
-            "{}",
-            latency.overlap
-        );
-    }
-
-    #[test]
-    fn percentiles_of_nothing_are_zero() {
+        assert!(near(latency.overlap, 4.0 * 5.0 / 55.0), "{latency:?}");
         assert_eq!(measured(&[]).sensor_to_pose, Percentiles::default());
     }
 }

@@ -58,8 +58,7 @@ impl Run {
                 raster_cells: 100,
                 cell_m: 1.0,
                 rasters: 1,
-                points: 0,
-                samples: 0,
+                ..Limits::default()
             },
             live: false,
             refines: false,

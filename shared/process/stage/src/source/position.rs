@@ -144,16 +144,19 @@ mod tests {
 
     #[test]
     fn a_sensor_goes_on_after_all_that_was_published() {
-        let position = |published| Position::after(&newest_pose(), published);
-        assert_eq!(position(0).published, 32);
-        assert_eq!(position(40).published, 40);
-        assert!(!position(40).item().is(flag::BREAK));
         let base = Item {
             flags: flag::BASE,
             ..newest_pose()
         };
-        assert!(Position::after(&base, 0).item().is(flag::BREAK));
-        assert_eq!(Position::after(&base, 0).published, 0);
+        for (newest, published, next) in [
+            (newest_pose(), 0, 32),
+            (newest_pose(), 40, 40),
+            (base, 0, 0),
+        ] {
+            let position = Position::after(&newest, published);
+            assert_eq!(position.published, next);
+            assert_eq!(position.item().is(flag::BREAK), next == 0);
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_messages::{Fix, Header, Item, Loop, Message};
+use gyre_messages::{Fix, Item, Loop, LoopHeader, Message};
 
 use super::{Run, WINDOW, node, writer};
 use crate::{
@@ -18,14 +18,17 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
     let loops = writer::<Loop>(&run.manifest);
     let kept = Loop::sizes(&WINDOW).history as u64;
     for seq in 0..kept + 5 {
-        let mut draft = loops.loan().unwrap();
-        let header = draft.header();
-        (header.later_seq, header.loops) = (seq + 1, seq + 1);
-        *header.item_mut() = Item {
+        let item = Item {
             seq,
             ..Item::default()
         };
-        loops.send_unchanged(draft).unwrap();
+        let header = LoopHeader {
+            item,
+            later_seq: seq + 1,
+            loops: seq + 1,
+            ..LoopHeader::default()
+        };
+        loops.publish(header, None).unwrap();
     }
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
     let mut observer = observed.observe::<Loop>().unwrap();

@@ -31,12 +31,8 @@ fn a_waiting_reader_is_woken_by_a_message() {
     });
     // Children of other tests may wake this process too.
     while waiting.head().unwrap().is_none() {
-        assert!(
-            !signals
-                .wait(&[waiting.listener()], None, LONG)
-                .unwrap()
-                .timed_out
-        );
+        let woken = signals.wait(&[waiting.listener()], None, LONG).unwrap();
+        assert!(!woken.timed_out);
     }
     let awake = Instant::now();
     received.send(()).unwrap();
