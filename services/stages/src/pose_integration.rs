@@ -141,10 +141,7 @@ impl Sink for Integration {
             self.wake_followers(LogId::Scans)?;
         }
         let end = PoseHeader {
-            item: Item {
-                flags: flag::END,
-                ..*item
-            },
+            item: item.flagged(flag::END),
             ..PoseHeader::default()
         };
         self.journal.append(&end).map_err(unusable)?;

@@ -92,10 +92,7 @@ mod tests {
     use super::*;
 
     fn scan(seq: u64) -> Item {
-        Item {
-            seq,
-            ..Item::default()
-        }
+        Item::numbered(seq)
     }
 
     #[test]
@@ -110,10 +107,7 @@ mod tests {
         };
         assert!(kept(1, 8, false) && !kept(1, 9, false));
         assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
-        let first = Item {
-            flags: flag::BREAK,
-            ..scan(0)
-        };
+        let first = scan(0).flagged(flag::BREAK);
         assert!(!serves_only_as_previous(&window(2), &first, None, false));
     }
 }

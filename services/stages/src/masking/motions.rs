@@ -132,11 +132,7 @@ mod tests {
     }
 
     fn item(seq: u64, flags: u32) -> Item {
-        Item {
-            seq,
-            flags,
-            ..Item::default()
-        }
+        Item::numbered(seq).flagged(flags)
     }
 
     #[test]

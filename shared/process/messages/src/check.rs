@@ -131,10 +131,7 @@ mod tests {
             let mut changed = header;
             change(&mut changed);
             is_refused::<M>(&changed, payload, field);
-            *crate::Header::item_mut(&mut changed) = Item {
-                flags: flag::END,
-                ..Item::default()
-            };
+            *crate::Header::item_mut(&mut changed) = Item::default().flagged(flag::END);
             assert_eq!(M::check(&changed, &[], &LIMITS), Ok(()), "{field}");
         }
     }

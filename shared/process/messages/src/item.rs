@@ -100,6 +100,20 @@ pub struct Item {
 }
 
 impl Item {
+    /// Returns an item that has a number alone.
+    pub fn numbered(seq: u64) -> Self {
+        Self {
+            seq,
+            ..Self::default()
+        }
+    }
+
+    /// Returns it with these flags in the place of its own.
+    #[must_use]
+    pub fn flagged(self, flags: u32) -> Self {
+        Self { flags, ..self }
+    }
+
     pub fn lost_azimuths(&self) -> LostAzimuths {
         LostAzimuths::of_gaps(self.lost)
     }

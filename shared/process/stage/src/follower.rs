@@ -115,10 +115,7 @@ impl<M: Message> Flow<M> {
         let has_ended = matches!(step, Step::Ended);
         if has_ended {
             follower.sync()?;
-            let end = Item {
-                seq: self.next_seq,
-                ..Item::default()
-            };
+            let end = Item::numbered(self.next_seq);
             self.output.end(end, None)?;
         }
         self.report.write(follower.progress(), has_ended)?;

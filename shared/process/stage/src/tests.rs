@@ -93,10 +93,6 @@ fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
 /// A pose is the smallest message.
 fn send(poses: &Writer<Pose>, seq: u64, flags: u32) {
     let mut draft = poses.loan().unwrap();
-    draft.header().item = Item {
-        seq,
-        flags,
-        ..Item::default()
-    };
+    draft.header().item = Item::numbered(seq).flagged(flags);
     poses.send(draft, StageId::PoseIntegration).unwrap();
 }

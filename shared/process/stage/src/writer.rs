@@ -114,10 +114,7 @@ impl TopicWriter {
 
     pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
         let mut loan = self.loan()?;
-        *loan.item() = Item {
-            flags: flag::END,
-            ..item
-        };
+        *loan.item() = item.flagged(flag::END);
         self.send(loan, hop)
     }
 

@@ -52,11 +52,7 @@ mod tests {
     use super::*;
 
     fn item(seq: u64, flags: u32) -> Item {
-        Item {
-            seq,
-            flags,
-            ..Item::default()
-        }
+        Item::numbered(seq).flagged(flags)
     }
 
     #[test]
@@ -122,10 +118,7 @@ mod tests {
         ] {
             assert_eq!(sequence.advance(&item), missed, "{item:?}");
         }
-        let end = Item {
-            flags: flag::END,
-            ..of(4, 8, 13)
-        };
+        let end = of(4, 8, 13).flagged(flag::END);
         assert_eq!(sequence.advance(&end), None);
         assert!(sequence.ended);
         assert_eq!(sequence.advance(&of(5, 13, 13)), Some(0));

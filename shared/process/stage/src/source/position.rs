@@ -135,19 +135,13 @@ mod tests {
         };
         assert_eq!(resumed(false), position(40, 31, Some(37)));
         assert_eq!(resumed(true), position(37, 30, None));
-        let base = Item {
-            flags: flag::BASE,
-            ..newest_pose()
-        };
+        let base = newest_pose().flagged(flag::BASE);
         assert_eq!(Position::resume(&base, 5, false), Position::start(5));
     }
 
     #[test]
     fn a_sensor_goes_on_after_all_that_was_published() {
-        let base = Item {
-            flags: flag::BASE,
-            ..newest_pose()
-        };
+        let base = newest_pose().flagged(flag::BASE);
         for (newest, published, next) in [
             (newest_pose(), 0, 32),
             (newest_pose(), 40, 40),

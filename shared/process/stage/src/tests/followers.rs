@@ -18,10 +18,7 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
     let loops = writer::<Loop>(&run.manifest);
     let kept = Loop::sizes(&WINDOW).history as u64;
     for seq in 0..kept + 5 {
-        let item = Item {
-            seq,
-            ..Item::default()
-        };
+        let item = Item::numbered(seq);
         let header = LoopHeader {
             item,
             later_seq: seq + 1,

@@ -96,10 +96,7 @@ fn gyre_receives_what_a_typed_publisher_sends() {
     publisher.update_connections().unwrap();
     let mut sample = publisher.loan_slice_uninit(elements).unwrap();
     let header = &mut sample.user_header_mut().0;
-    *header.item_mut() = Item {
-        seq: 7,
-        ..Item::default()
-    };
+    *header.item_mut() = Item::numbered(7);
     (header.n, header.rasters) = (limits.side() as u32, 1);
     header.cell_m = limits.cell_m;
     let sample = sample.write_from_fn(|block| TypedElement(bytemuck::cast([block as f32; 16])));
