@@ -1,6 +1,5 @@
 //! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
-//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map, whenever the
-//! keyframes arrive.
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
 
 use std::path::PathBuf;
 

@@ -6,11 +6,10 @@ use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    block::{ByteBlock, FloatBlock},
     check::{Violation, code, fields, finite, not_negative, of, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
-    message::{Message, Sender, header},
+    message::{ByteBlock, FloatBlock, Message, Sender, header},
 };
 
 /// The payload is one raster if the mask takes one scan, or two (this scan and the previous one,

@@ -1,14 +1,14 @@
 //! The contract of a message type: its topic, its header, the elements of its payload and the sizes
-//! of its queues.
+//! of its queues. Elements are blocks of 64 bytes, so that every payload starts on a cache line and
+//! is aligned for any vector unit; the transport would multiply an aligned slice of bytes.
 
 use std::fmt::Debug;
 
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 
 use crate::{
     check::Violation,
-    follower::FollowerId,
-    item::{Item, StageId, flag},
+    item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
 };
 
@@ -137,8 +137,40 @@ macro_rules! message {
             const READERS: usize = $readers;
             const HISTORY: $crate::limits::History = $crate::limits::History::$history;
             type Header = $header;
-            type Element = $crate::block::FloatBlock;
+            type Element = $crate::message::FloatBlock;
         }
     };
 }
 pub(crate) use message;
+
+/// 64 bytes of a polar scan.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct ByteBlock([u8; 64]);
+
+/// 16 values of a raster.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct FloatBlock([f32; 16]);
+
+/// Implements an element of as many values as `LEN`.
+macro_rules! block {
+    ($block:ty, $len:literal, $type_name:literal) => {
+        impl $block {
+            pub const LEN: usize = $len;
+
+            pub fn count(values: usize) -> usize {
+                values.div_ceil(Self::LEN)
+            }
+        }
+
+        impl Element for $block {
+            const TYPE_NAME: &'static str = $type_name;
+        }
+
+        const _: () = assert!(size_of::<$block>() == 64 && align_of::<$block>() == 64);
+    };
+}
+
+block!(ByteBlock, 64, "gyre_byte_block_v1");
+block!(FloatBlock, 16, "gyre_float_block_v1");

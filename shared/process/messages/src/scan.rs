@@ -7,11 +7,10 @@ use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 use crate::{
-    block::ByteBlock,
     check::{Violation, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
-    message::{Message, Sender, header},
+    message::{ByteBlock, Message, Sender, header},
 };
 
 /// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of

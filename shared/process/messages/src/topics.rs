@@ -1,21 +1,16 @@
-//! All topics, and the shared memory that they need.
+//! All topics, the shared memory that they need, and who numbers their items.
 
 use std::fmt;
 
 use serde::Serialize;
 
 use crate::{
-    closed_loop::Loop,
-    correction::Correction,
-    fix::Fix,
+    follower::{Correction, Fix, Loop, Objects},
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
     message::{Element, Header, Message, Sender},
-    motion::Motion,
-    objects::Objects,
+    motion::{Motion, Refined, Rotation},
     pose::Pose,
-    refined::Refined,
-    rotation::Rotation,
     scan::Scan,
 };
 
@@ -146,6 +141,40 @@ impl fmt::Display for Footprint {
         }
         write!(f, ")")
     }
+}
+
+crate::named! {
+    /// The process that numbers the items of a topic; its name is in the file of the generations.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum NumberedBy {
+        /// The source, on `scan`.
+        Source = "source",
+        /// Masking in live mode, on the topics of the other stages; otherwise they have the numbers
+        /// of the source.
+        Masking = "masking",
+        /// A follower, whose results are numbered.
+        Follower = "follower",
+    }
+}
+
+impl NumberedBy {
+    /// Returns who numbers the items of a topic.
+    pub fn of(name: &str) -> Self {
+        match topic(name).map(|topic| topic.sender) {
+            _ if name == Scan::TOPIC => Self::Source,
+            Some(Sender::Stage(_)) => Self::Masking,
+            _ => Self::Follower,
+        }
+    }
+}
+
+/// A generation of numbers: it gives the numbers from `first` on again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GivenAnew {
+    /// See [`Item::generation`](crate::Item::generation).
+    pub generation: u32,
+    /// See [`Item::numbered_from`](crate::Item::numbered_from).
+    pub first: u64,
 }
 
 #[cfg(test)]

@@ -138,7 +138,7 @@ gyre_messages::named! {
         Starting = "starting",
         Waiting = "waiting",
         Working = "working",
-        /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
+        /// It has not woken from a sleep that has ended: it is stopped, or not run by the system.
         Silent = "silent",
         /// It runs, and writes no heartbeat, as a replacement need not.
         Running = "running",

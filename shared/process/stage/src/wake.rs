@@ -1,6 +1,6 @@
-//! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed. The transport
-//! can lose a wake-up, rarely (a race between its datagram and its flag). So every wait has a limit
-//! after which the queues are read anyway, and each wake-up that was caught so is counted.
+//! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed. The
+//! transport can lose a wake-up, rarely (a race between its datagram and its flag). So every wait
+//! has a limit after which the queues are read anyway, and a wake-up that was caught so is counted.
 
 use std::{
     cell::{Cell, OnceCell},

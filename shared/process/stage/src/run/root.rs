@@ -1,6 +1,6 @@
-//! The place of a run in shared memory, `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the
-//! root of each run lies its lock, which its supervisor holds as long as the run lives. So a lock
-//! that is free belongs to a dead run, and whoever holds it may remove that run.
+//! The place of a run in shared memory, `/dev/shm/gyre-<uid>`, which is the user's alone. Beside
+//! the root of each run lies its lock, which its supervisor holds as long as the run lives. So a
+//! lock that is free belongs to a dead run, and whoever holds it may remove that run.
 
 use std::{
     collections::BTreeSet,
