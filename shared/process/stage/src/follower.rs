@@ -2,16 +2,14 @@
 //! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
 //! grown; as events can be lost, it looks every 200 ms.
 
-mod growth;
 mod progress;
 
 use std::{thread, time::Duration};
 
 use gyre_messages::{Header, Item, Message};
 
-pub use crate::log_id::LogId;
+pub use crate::log_id::{Growth, LogId};
 use crate::{Launch, Listener, StageCounters, StageError, counters::Work, wake, writer::Writer};
-pub use growth::Growth;
 use progress::ProgressWriter;
 pub use progress::{Progress, is_done, read as progress_of};
 

@@ -30,7 +30,6 @@ mod log_id;
 mod manifest;
 mod numbers;
 pub mod observer;
-mod outlet;
 pub mod python_function;
 pub mod reader;
 pub mod relay;

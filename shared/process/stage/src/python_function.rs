@@ -2,9 +2,8 @@
 //! of JSON and the arrays, and reads a line and the array that it returns. A scan of 1.5 MB takes
 //! about a millisecond. Any Python will do, its crash is not the stage's, and none is linked.
 
-mod interpreter;
-
 use std::{
+    env,
     io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write},
     path::{Path, PathBuf},
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
@@ -12,9 +11,8 @@ use std::{
 
 use crate::StageError;
 use ndarray::{Array2, ArrayViewD};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
-
-pub use interpreter::Interpreter;
 
 const PROGRAM: &str = include_str!("python_function/function.py");
 /// Room in the pipes, bytes: the most that a process may ask for without privileges.
@@ -73,7 +71,7 @@ impl Function {
         let file = absolute.ok_or_else(|| {
             StageError::Configuration(format!("there is no file {}", file.display()))
         })?;
-        let python = interpreter::name();
+        let python = interpreter();
         let of = file.display();
         let start = |error: std::io::Error| {
             let sentence = format!(
@@ -229,4 +227,48 @@ fn rows<T: bytemuck::Pod>(array: &ArrayViewD<'_, T>, out: &mut impl Write) -> st
         }
     }
     Ok(())
+}
+
+const VARIABLE: &str = "GYRE_PYTHON";
+const OLDEST: [u32; 2] = [3, 8];
+const PROBE: &str = "
+import json, sys
+try:
+    import numpy
+    version = numpy.__version__
+except ImportError:
+    version = None
+print(json.dumps({'executable': sys.executable, 'version': list(sys.version_info[:3]), 'numpy': version}))
+";
+
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Interpreter {
+    pub executable: String,
+    pub version: [u32; 3],
+    /// The version of numpy; `None`: it cannot be imported.
+    pub numpy: Option<String>,
+}
+
+fn interpreter() -> String {
+    env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
+}
+
+impl Interpreter {
+    pub fn find() -> Result<Self, String> {
+        let python = interpreter();
+        let mut command = Command::new(&python);
+        command.args(["-c", PROBE]).stdin(Stdio::null());
+        let output = command.output().map_err(|error| {
+            format!(
+                "cannot start {python}: {error}; install Python 3, or name one with GYRE_PYTHON"
+            )
+        })?;
+        let found: Option<Self> = serde_json::from_slice(&output.stdout).ok();
+        let [major, minor] = OLDEST;
+        found
+            .filter(|found| found.version[..2] >= OLDEST[..])
+            .ok_or_else(|| {
+                format!("{python} is no Python of version {major}.{minor} or newer: name one with GYRE_PYTHON")
+            })
+    }
 }

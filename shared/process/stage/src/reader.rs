@@ -6,10 +6,9 @@ use bytemuck::Pod;
 use gyre_messages::{Header, Item, Limits, Message, Topic};
 
 use crate::{
-    Launch, Manifest, StageError, clock,
-    outlet::RecordedMessage,
-    services,
+    Launch, Manifest, StageError, clock, services,
     transport::{Listener, Node, Notifier, Sample, Service, Subscriber},
+    writer::RecordedMessage,
 };
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.

@@ -8,7 +8,7 @@ use gyre_messages::{
 };
 
 use super::{Next, ObservedRun, Observer};
-use crate::{Listener, StageError, outlet::RecordedMessage};
+use crate::{Listener, StageError, writer::RecordedMessage};
 
 pub trait TopicObserver {
     fn topic(&self) -> &'static str;

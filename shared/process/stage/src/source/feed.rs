@@ -2,10 +2,10 @@
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{Hop, Item, StageId};
+use gyre_messages::{Hop, Item, Pose, StageId, flag};
 
 use crate::{
-    Launch, Listener, StageCounters, StageError, clock, schedule::ScheduleWriter, source::Credit,
+    Launch, Listener, StageCounters, StageError, clock, reader::Port, schedule::ScheduleWriter,
     wake, writer::TopicWriter,
 };
 
@@ -151,5 +151,45 @@ pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
         started_ns,
         finished_ns,
         published_ns: 0,
+    }
+}
+
+/// The progress of the run, from its poses.
+pub(crate) struct Credit {
+    pub poses: Port<Pose>,
+    /// Sequence number of the newest pose.
+    pub newest: Option<u64>,
+    /// The same at the source.
+    pub published: Option<u64>,
+    /// The newest pose of the trajectory at the last start of the sink.
+    pub resume_at: Option<Item>,
+    /// True if the sink has journalled the end of the stream.
+    pub has_ended: bool,
+}
+
+impl Credit {
+    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            poses: Port::open(launch)?,
+            newest: None,
+            published: None,
+            resume_at: None,
+            has_ended: false,
+        })
+    }
+
+    pub fn update(&mut self) -> Result<(), StageError> {
+        while let Some(pose) = self.poses.receive()? {
+            let item = pose.item();
+            self.has_ended |= item.is(flag::END);
+            if item.is(flag::SYNC) {
+                self.resume_at = Some(*item);
+            }
+            if !item.is(flag::BASE) && !item.is(flag::END) {
+                self.newest = self.newest.max(Some(item.seq));
+                self.published = self.published.max(Some(item.published));
+            }
+        }
+        Ok(())
     }
 }

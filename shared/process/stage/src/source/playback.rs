@@ -4,11 +4,7 @@ use gyre_messages::{Scan, ScanHeader};
 use gyre_radar::continues;
 
 use super::{
-    Feed, Source, Tolerance, Unreadable,
-    attempts::{Attempts, PAUSE},
-    hop,
-    pace::Pace,
-    position::Position,
+    Attempts, Feed, PAUSE, Source, Tolerance, Unreadable, hop, pace::Pace, position::Position,
 };
 use crate::{
     StageError, clock,

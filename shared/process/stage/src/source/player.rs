@@ -8,10 +8,8 @@ use gyre_messages::{Item, Scan, StageId, flag};
 
 use super::{Feed, Pace, hop};
 use crate::{
-    Launch, StageCounters, StageError, clock, counters,
-    outlet::{RecordedMessage, item_of},
-    wake,
-    writer::{TopicWriter, Writer},
+    Launch, StageCounters, StageError, clock, counters, wake,
+    writer::{RecordedMessage, TopicWriter, Writer, item_of},
 };
 
 /// The recorded messages of a run.
