@@ -3,8 +3,6 @@
 //! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
 //! ended, the poses are solved again, so that the last correction equals the results.
 
-mod live_fixes;
-
 use std::{
     mem,
     path::{Path, PathBuf},
@@ -12,6 +10,7 @@ use std::{
 
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
+use gyre_recording::{ReceivedFixes, received_fixes};
 use gyre_run::SourceConfig;
 use gyre_samples::GnssConfig;
 use gyre_slam::{
@@ -19,11 +18,9 @@ use gyre_slam::{
     TrajectoryEstimator, TrajectoryOptions,
 };
 use gyre_stage::{
-    Follower, Launch, StageCounters, StageError,
+    Follower, GnssReceiver, Launch, StageCounters, StageError,
     follower::{self, LogId, Progress, Step},
 };
-
-use live_fixes::LiveFixes;
 
 /// Runs the follower to the end of both logs, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
@@ -233,6 +230,58 @@ impl Follower for Trajectory {
             done: self.read[1] as u64,
             total: self.keyframes.len() as u64,
         }
+    }
+}
+
+/// The time to examine all fixes grows with their number. So during the run they are examined when
+/// one in so many is new: after ten hours at 20 Hz that is every 18 s.
+const NEW_SHARE: usize = 2000;
+
+/// Receives fixes, and reads the log of all that have arrived on.
+struct LiveFixes {
+    receiver: GnssReceiver,
+    config: GnssConfig,
+    received: ReceivedFixes,
+    examined: usize,
+}
+
+impl LiveFixes {
+    /// Begins to receive, in a run with its results in `out`.
+    fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
+        let log = received_fixes(out);
+        Ok(Self {
+            receiver: GnssReceiver::open(&config.listen, &log)?,
+            received: ReceivedFixes::new(&log),
+            examined: 0,
+            config,
+        })
+    }
+
+    /// Ends reception. Received fixes survive a power failure.
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.receiver.finish()
+    }
+
+    /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
+    /// With `is_last` nothing is received after this.
+    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
+        if is_last {
+            self.finish()?;
+        }
+        let received = &mut self.received;
+        let read = self.receiver.if_grown(|| received.read_on())?;
+        read.unwrap_or(Ok(())).map_err(StageError::input)?;
+        let new = self.received.count() - self.examined;
+        let least = if is_last {
+            1
+        } else {
+            self.examined / NEW_SHARE + 1
+        };
+        Ok((new >= least).then(|| {
+            self.examined += new;
+            let fixes = self.received.log().on_radar(&self.config);
+            Fixes::new(fixes, &self.config)
+        }))
     }
 }
 

@@ -4,9 +4,7 @@
 
 mod ask;
 mod connection;
-mod health_log;
 mod intake;
-mod parser;
 mod radar;
 mod read_delay;
 mod scan_assembly;
@@ -16,10 +14,9 @@ mod turn_counter;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};
-pub use connection::RadarSocket;
+pub use connection::{RadarParser, RadarSocket};
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
-pub use parser::RadarParser;
 pub use settings::{Settings, encoder_counts, silence};
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.

@@ -2,24 +2,24 @@
 //! compensation. [`gyre_masking::Masker`] does the work. The velocity by Doppler is measured here,
 //! where the rows of the scan are.
 
-mod azimuths;
 mod live;
 mod lossless;
 mod motions;
 mod python;
-mod queue;
 mod scans;
 
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
-use gyre_radar::{DopplerEstimator, PlacedRows, PointsConfig, RasterConfig};
+use gyre_radar::{
+    DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
+    lost::stale_rows,
+};
 use gyre_samples::DopplerConfig;
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
 };
 
-use azimuths::Azimuths;
 use scans::{ScanView, Scans};
 
 pub use python::python;
@@ -179,4 +179,49 @@ fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, S
         scan,
         twist,
     })
+}
+
+/// The lost azimuths of each scan, found from the scan before. A restarted masking continues from
+/// the record in the poses.
+#[derive(Default)]
+struct Azimuths {
+    finder: LostAzimuthFinder,
+    /// The scan that it has found them in last.
+    last: Option<(u64, LostAzimuths)>,
+}
+
+impl Azimuths {
+    /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
+    /// the finding of an earlier masking. Where a chain of motions `starts`, nothing is known of
+    /// the scan before.
+    fn lost(
+        &mut self,
+        sweep: &Sweep<'_>,
+        known: Option<LostAzimuths>,
+        starts: bool,
+    ) -> LostAzimuths {
+        if let Some((number, lost)) = self.last
+            && number == sweep.number
+        {
+            return lost;
+        }
+        if starts {
+            self.finder.reset();
+        }
+        // Another masking's finding about this scan, if it has found all.
+        let known = known.filter(|known| known.count() == stale_rows(&sweep.scan));
+        let lost = match known {
+            Some(known) => {
+                self.finder.set_previous(&sweep.scan, &known);
+                known
+            }
+            None => self.finder.find(&sweep.scan, sweep.twist),
+        };
+        self.last = Some((sweep.number, lost));
+        lost
+    }
+
+    fn last(&self) -> LostAzimuths {
+        self.last.map(|(_, lost)| lost).unwrap_or_default()
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_colossus::{Configuration, Event, Message};
+use gyre_colossus::{Configuration, Event, Health, HealthStatus, Message};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_stage::{
     StageError, clock,
@@ -11,9 +11,7 @@ use gyre_stage::{
 
 use crate::live_radar::{
     Intake, NoScans, Settings,
-    connection::{Connection, ReadResult},
-    health_log::HealthLog,
-    parser::RadarParser,
+    connection::{Connection, RadarParser, ReadResult},
 };
 
 /// The most reads between two checks for signals and new readers.
@@ -157,5 +155,39 @@ impl Sensor for Radar {
         counts.connections += self.connection.opened;
         counts.is_receiving = self.connection.receives_azimuths;
         counts
+    }
+}
+
+/// The radar's health in the log: each change is logged once.
+#[derive(Clone, Debug, Default)]
+struct HealthLog {
+    unhealthy: Vec<&'static str>,
+    is_silent: bool,
+}
+
+impl HealthLog {
+    /// Logs the readings that have become worse or better.
+    fn update(&mut self, health: &Health) {
+        for (name, reading) in health.readings() {
+            let (value, status) = (reading.value, reading.status);
+            let is_unhealthy = matches!(status, HealthStatus::Unhealthy | HealthStatus::Warning);
+            let logged = self.unhealthy.iter().position(|it| *it == name);
+            match (is_unhealthy, logged) {
+                (true, None) => {
+                    tracing::warn!("the radar says that its {name}, {value}, is {status}");
+                    self.unhealthy.push(name);
+                }
+                (false, Some(index)) => {
+                    tracing::info!("the radar says that its {name}, {value}, is {status} again");
+                    self.unhealthy.swap_remove(index);
+                }
+                _ => {}
+            }
+        }
+        let is_silent = health.transmitting == Some(false);
+        if is_silent && !self.is_silent {
+            tracing::warn!("the radar says that it does not transmit: its scans have no echoes");
+        }
+        self.is_silent = is_silent;
     }
 }

@@ -6,7 +6,7 @@ use gyre_colossus::{Address, BadAddress, Constants, Datagrams, Parser};
 use gyre_datasets::DatasetOptions;
 use gyre_run::SourceConfig;
 
-use crate::live_radar::parser::RadarParser;
+use crate::live_radar::connection::RadarParser;
 
 /// Encoder counts per turn of a radar that does not report them, unless `dataset.encoder_counts` is
 /// set.

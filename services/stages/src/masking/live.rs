@@ -14,7 +14,7 @@ use gyre_stage::{
     reader::{Port, Received},
 };
 
-use crate::masking::queue::Queue;
+use crate::masking::lossless::Queue;
 
 /// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower
 /// than its scans never is, and would have the latency of those that wait for ever.

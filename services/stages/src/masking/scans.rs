@@ -10,7 +10,11 @@ use gyre_stage::{
     reader::Received,
 };
 
-use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions, queue::Queue};
+use crate::masking::{
+    live::NewestOnly,
+    lossless::{InOrder, Queue},
+    motions::Motions,
+};
 
 pub struct Scans {
     queue: Box<dyn Queue>,
