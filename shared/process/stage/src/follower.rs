@@ -2,16 +2,12 @@
 //! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
 //! grown; as events can be lost, it looks every 200 ms.
 
-mod progress;
-
 use std::{thread, time::Duration};
 
 use gyre_messages::{Header, Item, Message};
 
 pub use crate::log_id::{Growth, LogId};
 use crate::{Launch, Listener, StageCounters, StageError, counters::Work, wake, writer::Writer};
-use progress::ProgressWriter;
-pub use progress::{Progress, is_done, read as progress_of};
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
@@ -54,7 +50,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     launch.begin_heartbeat()?;
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
-        report: ProgressWriter::create(&launch.manifest, &launch.name)?,
+        report: Numbers::open(&launch.manifest, &file_of(&launch.name), 0)?,
         delay: launch.delay(),
         next_seq: 0,
         counters: StageCounters::default(),
@@ -87,7 +83,8 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
 
 struct Flow<M: Message> {
     output: Writer<M>,
-    report: ProgressWriter,
+    /// [`Progress::done`], [`Progress::total`], and 1 at the end of the logs.
+    report: Numbers<3>,
     delay: Duration,
     next_seq: u64,
     counters: StageCounters,
@@ -113,10 +110,33 @@ impl<M: Message> Flow<M> {
         let has_ended = matches!(step, Step::Ended);
         if has_ended {
             follower.sync()?;
-            let end = Item::numbered(self.next_seq);
-            self.output.end(end, None)?;
+            self.output.end(Item::numbered(self.next_seq), None)?;
         }
-        self.report.write(follower.progress(), has_ended)?;
+        let Progress { done, total } = follower.progress();
+        self.report.write([done, total, has_ended.into()])?;
         Ok(step)
     }
+}
+
+/// The position of a follower. The supervisor learns from its file whether the follower has come to
+/// its end, which no exit code shows: a follower that was asked to end exits as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    pub done: u64,
+    pub total: u64,
+}
+
+/// Returns the progress of a follower and whether it has come to its end; `None` before its first
+/// step.
+pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
+    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)), 0)?;
+    Some((Progress { done, total }, ended == 1))
+}
+
+pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
+    progress_of(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
+}
+
+fn file_of(follower: &str) -> String {
+    format!("{follower}.progress")
 }

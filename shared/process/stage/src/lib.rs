@@ -34,7 +34,6 @@ pub mod python_function;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;
-mod reservation;
 pub mod run;
 pub mod schedule;
 pub mod services;

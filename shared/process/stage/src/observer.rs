@@ -4,28 +4,31 @@
 //! publisher once, when it attaches. The supervisor frees the places of killed observers.
 
 mod sequence;
-mod topic;
 
 use std::{
-    fs::{self, File},
+    fs::File,
     path::{Path, PathBuf},
     process, thread,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
+use gyre_messages::{
+    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, NumberedBy, Objects, Pose,
+    Refined, Rotation, Scan, Sender, Topic,
+};
 
 use crate::{
     Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
+    numbers::{self, Numbers},
     reader::{self, Received},
     run, services,
     sessions::not_running,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
+    writer::RecordedMessage,
 };
 pub use sequence::Sequence;
-pub use topic::TopicObserver;
 
 /// The name of the nodes and the subscribers of observers. The observers of a topic are counted by
 /// this name.
@@ -37,6 +40,9 @@ const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
 /// all busy each wake-up takes time from the stages; at hundreds of messages in a second that is
 /// more than what most observers do with them. The queue holds 9 meanwhile.
 const REST: Duration = Duration::from_millis(10);
+/// The file in the run's root where the recorder writes its process and the number of missed
+/// messages.
+const MISSED: &str = "recorder.missed";
 const RETRY: Duration = Duration::from_millis(100);
 
 /// A running run, seen from outside.
@@ -111,8 +117,8 @@ impl ObservedRun {
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
-        let text = format!("{} {missed}", process::id());
-        run::write(missed_file(&self.manifest.root), &text)
+        let mut file = Numbers::open(&self.manifest, MISSED, 0)?;
+        file.write([process::id().into(), missed])
     }
 
     pub fn has_ended(&self) -> bool {
@@ -187,19 +193,14 @@ pub fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
 }
 
-/// Returns the file in the run's root where the recorder writes its process and the number of
-/// missed messages.
-fn missed_file(root: &Path) -> PathBuf {
-    root.join("recorder.missed")
-}
-
 /// Returns the number of missed messages that the recorder, this process, has reported; 0 without a
 /// report.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
-    let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
-    // The recorder before has left its own.
-    let missed = told.strip_prefix(&format!("{recorder} "));
-    missed.and_then(|it| it.parse().ok()).unwrap_or_default()
+    match numbers::read(&root.join(MISSED), 0) {
+        Some([process, missed]) if process == u64::from(recorder) => missed,
+        // The recorder before has left its own.
+        _ => 0,
+    }
 }
 
 impl<M: Message> Observer<'_, M> {
@@ -269,4 +270,88 @@ pub fn wait_for_any(
         return Ok(true);
     }
     signals.sleep(REST)
+}
+
+/// An observer of a topic that is known by its name, whose messages are taken as bytes.
+pub trait TopicObserver {
+    fn topic(&self) -> &'static str;
+
+    /// Takes the next message that is there; `None` without a message. A message that breaks its
+    /// contract is an error and counts as missed.
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
+
+    /// Returns whether the end of the stream or of the run has been taken.
+    fn has_ended(&self) -> bool;
+
+    /// Returns the listener that the publisher notifies: see
+    /// [`wait_for_any`].
+    fn listener(&self) -> &Listener;
+
+    /// Counts as missed all items between `next` and the first received item: all before it is
+    /// known already, as from an observer that was there earlier, whose newest item had this
+    /// generation.
+    fn expect(&mut self, next: u64, generation: u32);
+
+    fn missed(&self) -> u64;
+
+    /// Returns, among the generations after `known` and before the item's, the one that reused the
+    /// smallest number.
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
+}
+
+impl ObservedRun {
+    /// Subscribes to the topic of this name; `None` for an unknown topic.
+    pub fn observe_topic(
+        &self,
+        topic: &str,
+    ) -> Result<Option<Box<dyn TopicObserver + '_>>, StageError> {
+        let observer: Box<dyn TopicObserver + '_> = match topic {
+            Scan::TOPIC => Box::new(self.observe::<Scan>()?),
+            Masked::TOPIC => Box::new(self.observe::<Masked>()?),
+            Rotation::TOPIC => Box::new(self.observe::<Rotation>()?),
+            Motion::TOPIC => Box::new(self.observe::<Motion>()?),
+            Refined::TOPIC => Box::new(self.observe::<Refined>()?),
+            Pose::TOPIC => Box::new(self.observe::<Pose>()?),
+            Loop::TOPIC => Box::new(self.observe::<Loop>()?),
+            Correction::TOPIC => Box::new(self.observe::<Correction>()?),
+            Fix::TOPIC => Box::new(self.observe::<Fix>()?),
+            Objects::TOPIC => Box::new(self.observe::<Objects>()?),
+            _ => return Ok(None),
+        };
+        Ok(Some(observer))
+    }
+}
+
+impl<M: Message> TopicObserver for Observer<'_, M> {
+    fn topic(&self) -> &'static str {
+        M::TOPIC
+    }
+
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        Ok(match self.next(Duration::ZERO)? {
+            Next::Message(message, _) => Some(message.to_bytes()),
+            Next::Idle | Next::Ended => None,
+        })
+    }
+
+    fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    fn listener(&self) -> &Listener {
+        &self.data
+    }
+
+    fn expect(&mut self, next: u64, generation: u32) {
+        self.sequence.expected = Some(next);
+        self.sequence.generation = generation;
+    }
+
+    fn missed(&self) -> u64 {
+        self.sequence.missed
+    }
+
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        self.skipped_by(known, item)
+    }
 }

@@ -3,10 +3,9 @@
 //! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
-mod publisher;
+mod port;
 mod sealed;
 mod service;
-mod subscriber;
 
 use std::{fmt::Debug, path::Path};
 
@@ -26,10 +25,9 @@ use sealed::Sealed;
 pub use event::Listener;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
-pub(crate) use event::{Event, EventSizes, Notifier};
-pub(crate) use publisher::{Loan, Publisher};
+pub(crate) use event::{Event, Notifier};
+pub(crate) use port::{Loan, Publisher, Sample, Subscriber};
 pub use service::Service;
-pub(crate) use subscriber::{Sample, Subscriber};
 
 type Ipc = ipc::Service;
 /// Stands for a header of any type. It has no bytes itself.

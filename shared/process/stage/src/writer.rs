@@ -1,11 +1,14 @@
 //! The publisher of a topic.
 
-use std::{marker::PhantomData, ops::Deref, slice};
+use std::{fs::File, marker::PhantomData, ops::Deref, path::Path, slice};
 
 use gyre_messages::{Item, Message, Pose, Sender, StageId, Topic, flag};
+use rustix::fs::{FallocateFlags, fallocate};
 
 use crate::{
-    Launch, Manifest, StageError, clock, reservation, services,
+    Launch, Manifest, StageError, clock,
+    run::{self, SHARED_MEMORY},
+    services,
     transport::{Listener, Loan, Node, Notifier, Publisher, Service},
 };
 
@@ -91,7 +94,7 @@ impl TopicWriter {
         // Last, since a publisher connects to all existing readers at once.
         let service = Service::open(node, topic)?;
         let publisher = Publisher::create(&service, &manifest.window, &manifest.limits)?;
-        reservation::reserve(manifest, topic.name, publisher.id())?;
+        reserve(manifest, topic.name, publisher.id())?;
         Ok(Self {
             topic: topic.name,
             handshake,
@@ -148,6 +151,28 @@ impl TopicWriter {
     pub fn listener(&self) -> &Listener {
         &self.handshake
     }
+}
+
+/// Allocates the segment of the publisher with this id. The transport creates segments without
+/// memory, and a first write to a page without memory kills the process. A dead process may have
+/// left memory that is about to be freed.
+fn reserve(manifest: &Manifest, topic: &str, publisher: u128) -> Result<(), StageError> {
+    let suffix = format!("_{publisher}.data");
+    let (path, segment) = run::own_files(Path::new(SHARED_MEMORY), &manifest.prefix)
+        .find(|(path, _)| path.to_string_lossy().ends_with(&suffix))
+        .ok_or_else(|| StageError::transport(format!("find the memory of {topic}"), publisher))?;
+    let file = File::options().write(true).open(path);
+    let allocated = file.and_then(|file| {
+        let whole = fallocate(&file, FallocateFlags::empty(), 0, segment.len());
+        whole.map_err(Into::into)
+    });
+    allocated.map_err(|error| {
+        StageError::Transient(format!(
+            "shared memory at {SHARED_MEMORY} has no room for the {:.1} MB of topic `{topic}` ({error}): free some, enlarge it \
+             (containers: --shm-size), or lower run.window or raster.n",
+            segment.len() as f64 / 1e6
+        ))
+    })
 }
 
 impl<M: Message> Draft<M> {

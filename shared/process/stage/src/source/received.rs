@@ -3,11 +3,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Manifest, StageCounters, StageError, numbers};
+use crate::{
+    Manifest, StageCounters, StageError,
+    numbers::{self, Numbers},
+};
 
 /// The name of the file: the numbers of [`Received`] in their order.
 const FILE: &str = "source.received";
-type Numbers = crate::numbers::Numbers<9>;
 
 /// Counts of the deliveries and losses of a live sensor since the start of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,7 +54,7 @@ impl Received {
         counters.reconnections = self.reconnections();
     }
 
-    fn to_numbers(self) -> [u64; 9] {
+    pub(super) fn to_numbers(self) -> [u64; 9] {
         let scan = self.last_scan.unwrap_or_default();
         [
             self.missing_azimuths,
@@ -100,16 +102,8 @@ pub fn read(manifest: &Manifest) -> Option<Received> {
     numbers::read(&manifest.root.join(FILE), 0).map(Received::of)
 }
 
-pub(super) struct ReceivedWriter(Numbers);
-
-impl ReceivedWriter {
-    pub fn open(manifest: &Manifest) -> Result<Self, StageError> {
-        Numbers::open(manifest, FILE, 0).map(Self)
-    }
-
-    pub fn write(&mut self, received: Received) -> Result<(), StageError> {
-        self.0.write(received.to_numbers())
-    }
+pub(super) fn open(manifest: &Manifest) -> Result<Numbers<9>, StageError> {
+    Numbers::open(manifest, FILE, 0)
 }
 
 #[cfg(test)]

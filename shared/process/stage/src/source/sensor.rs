@@ -10,11 +10,12 @@ use super::{
     Feed, hop,
     live_samples::LiveSensors,
     position::Position,
-    received::{self, Received, ReceivedWriter},
+    received::{self, Received},
 };
 use crate::{
     Generation, Launch, StageCounters, StageError, clock,
     counters::Work,
+    numbers::Numbers,
     wake,
     writer::{Draft, Writer},
 };
@@ -77,20 +78,21 @@ pub fn run_sensor(
     sensor.resume(received::read(&launch.manifest).unwrap_or_default());
     let open_scans = || Writer::open(&launch.node, &launch.manifest);
     let mut stream = Stream {
-        received: ReceivedWriter::open(&launch.manifest)?,
+        received: received::open(&launch.manifest)?,
         live: LiveSensors::open(launch)?,
         feed: Feed::open(launch, open_scans)?.never_late(),
     };
     let ended = stream.publish(sensor, scans);
     let received = sensor.received();
-    stream.received.write(received)?;
+    stream.received.write(received.to_numbers())?;
     received.count(&mut stream.feed.counters);
     stream.feed.finish(ended)
 }
 
 struct Stream<'a> {
     feed: Feed<'a, Writer<Scan>>,
-    received: ReceivedWriter,
+    /// The counts of [`Sensor::received`].
+    received: Numbers<9>,
     live: Option<LiveSensors>,
 }
 
@@ -113,7 +115,7 @@ impl Stream<'_> {
             // In this order a death in between leaves a number without a scan, which counts as
             // dropped, and no scan without a number.
             self.feed.schedule.has_published(position.published)?;
-            self.received.write(sensor.received())?;
+            self.received.write(sensor.received().to_numbers())?;
             self.feed.outputs.send(draft, S::HOP)?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.
@@ -143,7 +145,7 @@ impl Stream<'_> {
                     return Ok(work.started_ns);
                 }
                 Arrival::Nothing(limit) => {
-                    self.received.write(sensor.received())?;
+                    self.received.write(sensor.received().to_numbers())?;
                     self.feed.sleep_until(None, sensor.connection(), limit)?;
                 }
                 Arrival::Later(time) => self.feed.sleep(time)?,

@@ -28,13 +28,6 @@ pub(crate) fn bind_alone() -> MutexGuard<'static, ()> {
     BINDING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-#[derive(Clone, Copy)]
-pub(crate) struct EventSizes {
-    pub(crate) listeners: usize,
-    pub(crate) notifiers: usize,
-    pub(crate) nodes: usize,
-}
-
 /// An event. It exists as long as a process has it open.
 pub(crate) struct Event(Sealed<event::PortFactory<Ipc>>);
 
@@ -49,13 +42,19 @@ pub(crate) struct Notifier {
 }
 
 impl Event {
-    pub(crate) fn create(node: &Node, name: &str, sizes: EventSizes) -> Result<Self, StageError> {
+    /// Creates an event with room for listeners, notifiers, and the nodes of both.
+    pub(crate) fn create(
+        node: &Node,
+        name: &str,
+        [listeners, notifiers]: [usize; 2],
+        nodes: usize,
+    ) -> Result<Self, StageError> {
         node.0
             .service_builder(&service_name(name)?)
             .event()
-            .max_listeners(sizes.listeners + HEADROOM)
-            .max_notifiers(sizes.notifiers + HEADROOM)
-            .max_nodes(sizes.nodes)
+            .max_listeners(listeners + HEADROOM)
+            .max_notifiers(notifiers + HEADROOM)
+            .max_nodes(nodes)
             .event_id_max_value(1)
             .create()
             .map(|event| Self(Sealed::new(event)))
