@@ -102,7 +102,7 @@ impl Queue for InOrder {
     }
 
     fn duplicates(&self) -> u64 {
-        self.reader.duplicates()
+        self.reader.duplicates
     }
 }
 

@@ -1,5 +1,4 @@
-//! The section `[source]`: where scans come from, the topics that a recording can be played from, and
-//! the faults to inject into it.
+//! The section `[source]`: where scans come from, and the faults to inject into them.
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 

@@ -39,9 +39,7 @@ pub trait Inputs: Sized {
 }
 
 /// Two consecutive items of one topic.
-pub struct Pairs<M: Message> {
-    reader: Reader<M>,
-}
+pub type Pairs<M> = Reader<M>;
 
 pub struct PairView<'a, M: Message> {
     pub current: &'a Received<M>,
@@ -52,70 +50,64 @@ pub struct PairView<'a, M: Message> {
 impl<M: Message> PairView<'_, M> {
     /// Returns the time between the two scans, ns on the sensor's clock; 0 where the chain starts.
     pub fn interval_ns(&self) -> i64 {
-        let stamp_ns = self.current.item().stamp_ns;
+        let stamp_ns = |received: &Received<M>| received.item().stamp_ns;
         self.previous.map_or(0, |previous| {
-            stamp_ns.saturating_sub(previous.item().stamp_ns)
+            stamp_ns(self.current).saturating_sub(stamp_ns(previous))
         })
     }
 }
 
 impl PairView<'_, Masked> {
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
-        let previous = self
-            .previous
-            .map(|previous| (previous.header(), previous.values()));
+        let previous = self.previous.map(|it| (it.header(), it.values()));
         let pair = self.current.header().pair(self.current.values(), previous);
-        pair.ok_or_else(|| {
+        let malformed = || {
             self.current
                 .malformed("its rasters do not fit their headers")
-        })
+        };
+        pair.ok_or_else(malformed)
     }
 }
 
-impl<M: Message> Inputs for Pairs<M> {
+impl<M: Message> Inputs for Reader<M> {
     type View<'a> = PairView<'a, M>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        Ok(Self {
-            reader: Reader::open(launch, None)?,
-        })
+        Self::open(launch, None)
     }
 
     fn next_action(&mut self) -> Result<Action, StageError> {
-        let Some(head) = self.reader.head()? else {
+        let Some(head) = self.head()? else {
             return Ok(Action::Wait);
         };
         let (item, received_ns) = (*head.item(), head.received_ns);
-        Ok(action_for(
-            &item,
-            self.reader.previous().is_some(),
-            received_ns,
-        ))
+        let has_previous = self.previous().is_some();
+        Ok(action_for(&item, has_previous, received_ns))
     }
 
     fn view(&self) -> Option<PairView<'_, M>> {
         Some(PairView {
-            current: self.reader.current()?,
-            previous: self.reader.previous(),
+            current: self.current()?,
+            previous: self.previous(),
         })
     }
 
     fn advance(&mut self) {
-        self.reader.advance();
+        Self::advance(self);
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        vec![self.reader.listener()]
+        vec![self.listener()]
     }
 
     fn duplicates(&self) -> u64 {
-        self.reader.duplicates()
+        self.duplicates
     }
 }
 
 /// Two consecutive items of one topic, and the item of another topic for the later one.
 pub struct Joined<A: Message, B: Message> {
-    pairs: Reader<A>,
+    pairs: Pairs<A>,
     other: Reader<B>,
 }
 
@@ -150,11 +142,8 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
                     hops: other.hops,
                     ..item
                 };
-                return Ok(action_for(
-                    &item,
-                    self.pairs.previous().is_some(),
-                    received_ns,
-                ));
+                let has_previous = self.pairs.previous().is_some();
+                return Ok(action_for(&item, has_previous, received_ns));
             }
             // After a restart the history of the other topic may reach further back; its items are
             // of no use alone.
@@ -164,21 +153,15 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
 
     fn view(&self) -> Option<JoinedView<'_, A, B>> {
         Some(JoinedView {
-            pair: PairView {
-                current: self.pairs.current()?,
-                previous: self.pairs.previous(),
-            },
+            pair: self.pairs.view()?,
             other: self.other.current()?,
         })
     }
 
     fn advance(&mut self) {
-        let together = match (self.pairs.current(), self.other.current()) {
-            (Some(a), Some(b)) => a.item().seq == b.item().seq,
-            _ => false,
-        };
+        let seq = self.pairs.current().map(|it| it.item().seq);
         self.pairs.advance();
-        if together {
+        if seq.is_some() && seq == self.other.current().map(|it| it.item().seq) {
             self.other.release();
         }
     }
@@ -192,7 +175,7 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     }
 
     fn duplicates(&self) -> u64 {
-        self.pairs.duplicates() + self.other.duplicates()
+        self.pairs.duplicates + self.other.duplicates
     }
 }
 

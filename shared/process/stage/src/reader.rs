@@ -121,7 +121,8 @@ pub struct Reader<M: Message> {
     next: Option<u64>,
     head: Option<Received<M>>,
     previous: Option<Received<M>>,
-    duplicates: u64,
+    /// Items that were skipped because they had been received before.
+    pub duplicates: u64,
 }
 
 impl<M: Message> Reader<M> {
@@ -154,9 +155,7 @@ impl<M: Message> Reader<M> {
             let got = received.item().seq;
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
-                Some(next) if got > next => {
-                    return Err(StageError::gap(M::TOPIC, next, got));
-                }
+                Some(next) if got > next => return Err(StageError::gap(M::TOPIC, next, got)),
                 _ => self.head = Some(received),
             }
         }
@@ -194,11 +193,6 @@ impl<M: Message> Reader<M> {
         let message = self.head()?.map(Received::to_bytes);
         self.release();
         Ok(message)
-    }
-
-    /// Returns the number of items that were skipped because they had been received before.
-    pub fn duplicates(&self) -> u64 {
-        self.duplicates
     }
 
     pub fn listener(&self) -> &Listener {

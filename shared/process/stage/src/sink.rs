@@ -173,7 +173,7 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
     }
 
     fn duplicates(&self) -> u64 {
-        self.motions.duplicates() + self.scans.as_ref().map_or(0, Reader::duplicates)
+        self.motions.duplicates + self.scans.as_ref().map_or(0, |scans| scans.duplicates)
     }
 }
 

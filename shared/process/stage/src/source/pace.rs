@@ -11,17 +11,8 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// The pace that makes a scan that is complete at `first_ns` on the sensor's clock due now.
-    pub fn new(rate: f64, first_ns: i64) -> Self {
-        Self {
-            rate,
-            start_ns: clock::now_ns(),
-            first_ns,
-        }
-    }
-
-    /// The pace that a source before had, with its [`origin`](Self::origin).
-    pub fn resumed(rate: f64, (start_ns, first_ns): (i64, i64)) -> Self {
+    /// The pace with this [`origin`](Self::origin).
+    pub fn new(rate: f64, (start_ns, first_ns): (i64, i64)) -> Self {
         Self {
             rate,
             start_ns,

@@ -1,6 +1,6 @@
 //! Playing: which scan is next, when it is due, and when the window admits it.
 
-use gyre_messages::{Scan, ScanHeader};
+use gyre_messages::Scan;
 use gyre_radar::continues;
 
 use super::{
@@ -30,21 +30,24 @@ impl<S: Source> Playback<'_, S> {
         let masks_pairs = manifest.window.masks_pairs() && !live;
         let first = self.source.scans().start;
         let mut position = Position::resume(&newest_pose, first, masks_pairs);
-        let (mut pace, mut before) = (None, None);
+        let mut pace = None;
+        let mut before: Option<(i64, i64)> = None;
         while let Some(mut draft) = self.next_readable(&mut position)? {
-            let times = Times::of(draft.header());
-            let gap = before.filter(|before: &Times| !continues(before.stamp_ns, times.stamp_ns));
+            let header = draft.header();
+            let (stamp_ns, complete_ns) = (header.item.stamp_ns, header.span_ns()[1]);
+            let gap = before.filter(|(before_ns, _)| !continues(*before_ns, stamp_ns));
             if gap.is_some() {
                 position.break_chain();
-                position.identify(&mut draft.header().item);
+                position.identify(&mut header.item);
             }
-            let due_ns = self.due_ns(&mut pace, gap, &times, position.published)?;
+            let gap_ns = gap.map(|(_, before_ns)| before_ns);
+            let due_ns = self.due_ns(&mut pace, gap_ns, complete_ns, position.published)?;
             self.feed
                 .wait_for_admission(position.published, due_ns, live)?;
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
             self.feed.outputs.send(draft, S::HOP)?;
             self.feed.schedule.has_published(position.published)?;
-            before = Some(times);
+            before = Some((stamp_ns, complete_ns));
             position.advance();
             if let Some(pace) = pace {
                 if self.is_sensor() {
@@ -61,13 +64,13 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
-    /// Returns when a scan is due; `None` at the highest rate. `gap` has the times of the scan
-    /// before a break.
+    /// Returns when a scan is due that is complete at `complete_ns` of the sensor's clock; `None` at
+    /// the highest rate. `gap_ns`: when the scan before a break was complete.
     fn due_ns(
         &mut self,
         pace: &mut Option<Pace>,
-        gap: Option<Times>,
-        times: &Times,
+        gap_ns: Option<i64>,
+        complete_ns: i64,
         published: u64,
     ) -> Result<Option<i64>, StageError> {
         let Some(rate) = self.feed.launch.manifest.rate else {
@@ -75,22 +78,18 @@ impl<S: Source> Playback<'_, S> {
         };
         let pace = pace.get_or_insert_with(|| {
             let before = self.feed.schedule.origin.filter(|_| self.is_sensor());
-            before.map_or_else(
-                || Pace::new(rate, times.complete_ns),
-                |origin| Pace::resumed(rate, origin),
-            )
+            let origin = before.unwrap_or_else(|| (clock::now_ns(), complete_ns));
+            Pace::new(rate, origin)
         });
-        if let Some(before) = gap {
-            let period_ns = self.source.period_ns();
-            pace.resume(before.complete_ns, times.complete_ns, period_ns);
+        if let Some(before_ns) = gap_ns {
+            pace.resume(before_ns, complete_ns, self.source.period_ns());
         }
         if self.feed.launch.manifest.live && !self.source.drops_missed_scans() {
-            self.feed.counters.slipped_ns += pace.slip(times.complete_ns);
+            self.feed.counters.slipped_ns += pace.slip(complete_ns);
         }
         self.feed.schedule.is_paced_from(pace.origin())?;
-        Ok(Some(
-            pace.due_ns(self.burst_ns(times.complete_ns, published)),
-        ))
+        let burst_ns = self.burst_ns(complete_ns, published);
+        Ok(Some(pace.due_ns(burst_ns)))
     }
 
     /// Returns whether scans become due independently of this process, as a sensor's do.
@@ -206,22 +205,6 @@ impl<S: Source> Playback<'_, S> {
                 return Ok(());
             }
             self.feed.sleep(wait)?;
-        }
-    }
-}
-
-/// The times of a scan on the sensor's clock.
-struct Times {
-    stamp_ns: i64,
-    /// The time of its last azimuth, when the sweep was complete.
-    complete_ns: i64,
-}
-
-impl Times {
-    fn of(header: &ScanHeader) -> Self {
-        Self {
-            stamp_ns: header.item.stamp_ns,
-            complete_ns: header.span_ns()[1],
         }
     }
 }
