@@ -7,7 +7,13 @@ use std::{thread, time::Duration};
 use gyre_messages::{Header, Item, Message};
 
 pub use crate::log_id::{Growth, LogId};
-use crate::{Launch, Listener, StageCounters, StageError, counters::Work, wake, writer::Writer};
+use crate::{
+    Launch, Listener, Manifest, StageCounters, StageError,
+    counters::Work,
+    numbers::{self, Numbers},
+    wake,
+    writer::Writer,
+};
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
