@@ -85,22 +85,13 @@ impl Follower for Fixes {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read as u64,
-            total: self.keyframes.len() as u64,
-        }
+        Progress::of(self.read, self.keyframes.len())
     }
 }
 
 fn header(index: usize, keyframe: &Keyframe, found: &Localisation, map: &Map) -> FixHeader {
     let mut header = FixHeader {
-        item: Item {
-            seq: index as u64,
-            scan: keyframe.scan,
-            previous_scan: keyframe.scan,
-            stamp_ns: keyframe.stamp_ns,
-            ..Item::default()
-        },
+        item: Item::recorded(index as u64, keyframe.scan, keyframe.stamp_ns),
         keyframe_seq: keyframe.seq,
         status: match found.status {
             Status::Lost => fix_status::LOST,

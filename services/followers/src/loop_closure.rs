@@ -98,10 +98,7 @@ impl Follower for LoopClosing {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.queries.len() as u64,
-            total: self.keyframes.len() as u64,
-        }
+        Progress::of(self.queries.len(), self.keyframes.len())
     }
 }
 

@@ -110,13 +110,7 @@ impl Tracking {
 fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
     let [x_m, y_m, yaw_rad] = xy_yaw(&scan.pose);
     let mut header = ObjectsHeader {
-        item: Item {
-            seq: scan.seq,
-            scan: scan.scan,
-            previous_scan: scan.scan,
-            stamp_ns: scan.stamp_ns,
-            ..Item::default()
-        },
+        item: Item::recorded(scan.seq, scan.scan, scan.stamp_ns),
         x_m,
         y_m,
         yaw_rad,
@@ -155,9 +149,6 @@ impl Follower for Tracking {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read as u64,
-            total: self.scans.len() as u64,
-        }
+        Progress::of(self.read, self.scans.len())
     }
 }

@@ -173,14 +173,9 @@ impl Trajectory {
         let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
         let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
         let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
+        let seq = (keyframes + queries + usize::from(self.is_final)) as u64 - 1;
         Ok(Some(CorrectionHeader {
-            item: Item {
-                seq: (keyframes + queries + usize::from(self.is_final)) as u64 - 1,
-                scan: newest.scan,
-                previous_scan: newest.scan,
-                stamp_ns: newest.stamp_ns,
-                ..Item::default()
-            },
+            item: Item::recorded(seq, newest.scan, newest.stamp_ns),
             keyframe_seq: newest.seq,
             keyframes: keyframes as u64,
             loops: used.count() as u64,
@@ -226,10 +221,7 @@ impl Follower for Trajectory {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read[1] as u64,
-            total: self.keyframes.len() as u64,
-        }
+        Progress::of(self.read[1], self.keyframes.len())
     }
 }
 

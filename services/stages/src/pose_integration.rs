@@ -4,7 +4,6 @@
 
 use std::fmt::Display;
 
-use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal, JournalError,
     keyframes::{Keyframes, KeyframesError},
@@ -23,33 +22,31 @@ use gyre_stage::{
 };
 use gyre_storage::{LogError, continue_when_full, was_full};
 
+use crate::points;
+
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let out = &launch.manifest.out;
     if launch.manifest.live {
         continue_when_full();
     }
+    let slam: SlamConfig = launch.section("slam")?;
+    let objects: ObjectsConfig = launch.section("objects")?;
+    let growth = |is_on: bool, log| is_on.then(|| Growth::of(launch, log)).transpose();
     let mut integration = Integration {
         journal: Journal::open(&journal::path(out)).map_err(unusable)?,
         last: None,
-        slam: launch.section("slam")?,
-        objects: launch.section("objects")?,
+        keyframes_grown: growth(slam.is_on(), LogId::Keyframes)?,
+        scans_grown: growth(objects.is_on(), LogId::Scans)?,
+        slam,
+        objects,
         points: launch.manifest.limits.points,
         keyframes: None,
         scans: None,
-        growth: Vec::new(),
         // A stage that died on the full disk has left it.
         loss: sink::notice(&launch.manifest),
         manifest: launch.manifest.clone(),
     };
-    if integration.slam.is_on() {
-        let grown = Growth::of(launch, LogId::Keyframes)?;
-        integration.growth.push((LogId::Keyframes, grown));
-    }
-    if integration.objects.is_on() {
-        let grown = Growth::of(launch, LogId::Scans)?;
-        integration.growth.push((LogId::Scans, grown));
-    }
     let counters = match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
         false => sink::run::<Motion, _>(launch, &mut integration),
@@ -69,8 +66,9 @@ struct Integration {
     keyframes: Option<Keyframes>,
     /// Of a run with objects, likewise.
     scans: Option<Scans>,
-    /// Wakes the followers of the logs that the run has.
-    growth: Vec<(LogId, Growth)>,
+    /// Wake the followers of the logs that the run has.
+    keyframes_grown: Option<Growth>,
+    scans_grown: Option<Growth>,
     manifest: Manifest,
     /// The sentence about the poses that are not kept.
     loss: Option<String>,
@@ -111,12 +109,12 @@ impl Sink for Integration {
         if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
             let added = keyframes.add(&pose, points(scan)?);
             if added.map_err(unusable_keyframes)? {
-                self.wake_followers(LogId::Keyframes)?;
+                self.keyframes_grown.iter().try_for_each(Growth::notify)?;
             }
         }
         if let (Some(scans), Some(scan)) = (&mut self.scans, scan) {
             scans.add(&pose, points(scan)?).map_err(unusable_scans)?;
-            self.wake_followers(LogId::Scans)?;
+            self.scans_grown.iter().try_for_each(Growth::notify)?;
         }
         self.journal.append(&pose).map_err(unusable)?;
         if was_full() && self.loss.is_none() {
@@ -134,11 +132,11 @@ impl Sink for Integration {
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
         if let Some(keyframes) = &mut self.keyframes {
             keyframes.end().map_err(unusable_keyframes)?;
-            self.wake_followers(LogId::Keyframes)?;
+            self.keyframes_grown.iter().try_for_each(Growth::notify)?;
         }
         if let Some(scans) = &mut self.scans {
             scans.end().map_err(unusable_scans)?;
-            self.wake_followers(LogId::Scans)?;
+            self.scans_grown.iter().try_for_each(Growth::notify)?;
         }
         let end = PoseHeader {
             item: item.flagged(flag::END),
@@ -171,17 +169,6 @@ impl Integration {
         let seq = last.item.seq;
         Err(StageError::Input(format!("{loss}; the last pose is {seq}")))
     }
-
-    fn wake_followers(&self, log: LogId) -> Result<(), StageError> {
-        let mut grown = self.growth.iter().filter(|(of, _)| *of == log);
-        grown.try_for_each(|(_, growth)| growth.notify())
-    }
-}
-
-fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
-    scan.header()
-        .points(scan.values())
-        .ok_or_else(|| scan.malformed("its points do not fit its header"))
 }
 
 fn unusable(error: JournalError) -> StageError {

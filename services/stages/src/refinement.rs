@@ -1,6 +1,5 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
-use gyre_geometry::SparsePoint;
 use gyre_journal::{
     checkpoint::{self, Checkpoint, CheckpointError},
     continue_when_full,
@@ -12,10 +11,11 @@ use gyre_scan_matching::{RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView},
-    reader::Received,
     stage,
     writer::Draft,
 };
+
+use crate::points;
 
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
@@ -115,13 +115,6 @@ impl RefinementStage {
         }
         Ok(())
     }
-}
-
-fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
-    masked
-        .header()
-        .points(masked.values())
-        .ok_or_else(|| masked.malformed("its points do not fit its header"))
 }
 
 fn unusable(error: CheckpointError) -> StageError {

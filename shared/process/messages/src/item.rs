@@ -146,6 +146,16 @@ impl Item {
         }
     }
 
+    /// Returns the item of a record of a scan, which has no times of the run.
+    pub fn recorded(seq: u64, scan: u64, stamp_ns: i64) -> Self {
+        Self {
+            scan,
+            previous_scan: scan,
+            stamp_ns,
+            ..Self::numbered(seq)
+        }
+    }
+
     /// Returns it with these flags in the place of its own.
     #[must_use]
     pub fn flagged(self, flags: u32) -> Self {

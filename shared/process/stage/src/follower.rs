@@ -132,6 +132,13 @@ pub struct Progress {
     pub total: u64,
 }
 
+impl Progress {
+    pub fn of(done: usize, total: usize) -> Self {
+        let [done, total] = [done, total].map(|it| it as u64);
+        Self { done, total }
+    }
+}
+
 /// Returns the progress of a follower and whether it has come to its end; `None` before its first
 /// step.
 pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {

@@ -206,7 +206,7 @@ impl Reception {
         for line in lines {
             self.rows += 1;
             match self.rows <= MAX_ROWS && self.log.end < MAX_LOG {
-                true => rows += &row(line),
+                true => rows += row(line).as_deref().unwrap_or(UNREADABLE),
                 false => self.surplus += 1,
             }
         }
@@ -220,30 +220,26 @@ impl Reception {
 }
 
 /// Returns the row of a line: a stamp, ns, latitude and longitude, degrees (both empty without a
-/// fix), and the standard deviation, m, if the receiver knows it.
-fn row(line: &str) -> String {
+/// fix), and the standard deviation, m, if the receiver knows it. `None`: it is no fix.
+fn row(line: &str) -> Option<String> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let (stamp, numbers) = match fields[..] {
-        [stamp, "", ""] | [stamp, "", "", _] => (stamp, None),
-        [stamp, latitude, longitude] | [stamp, latitude, longitude, ""] => {
-            (stamp, Some([latitude, longitude, "0"]))
-        }
-        [stamp, latitude, longitude, sigma_m] => (stamp, Some([latitude, longitude, sigma_m])),
-        _ => return UNREADABLE.to_owned(),
+    let (stamp, position, sigma_m) = match fields[..] {
+        [stamp, latitude, longitude] => (stamp, [latitude, longitude], ""),
+        [stamp, latitude, longitude, sigma_m] => (stamp, [latitude, longitude], sigma_m),
+        _ => return None,
     };
-    let Ok(stamp_ns) = stamp.parse::<i64>() else {
-        return UNREADABLE.to_owned();
-    };
-    let Some(numbers) = numbers else {
-        return format!("{stamp_ns},,,0\n");
-    };
-    match numbers.map(str::parse::<f64>) {
-        // The shortest text that is read back as the same number.
-        [Ok(latitude), Ok(longitude), Ok(sigma_m)] => {
-            format!("{stamp_ns},{latitude},{longitude},{sigma_m}\n")
-        }
-        _ => UNREADABLE.to_owned(),
+    let stamp_ns: i64 = stamp.parse().ok()?;
+    if position == ["", ""] {
+        return Some(format!("{stamp_ns},,,0\n"));
     }
+    let sigma_m = if sigma_m.is_empty() { "0" } else { sigma_m };
+    let [latitude, longitude] = position;
+    let numbers = [latitude, longitude, sigma_m].map(str::parse::<f64>);
+    let [Ok(latitude), Ok(longitude), Ok(sigma_m)] = numbers else {
+        return None;
+    };
+    // The shortest text that is read back as the same number.
+    Some(format!("{stamp_ns},{latitude},{longitude},{sigma_m}\n"))
 }
 
 #[cfg(test)]
@@ -269,7 +265,8 @@ mod tests {
             ("stamp_ns,latitude_deg,longitude_deg", UNREADABLE),
             ("\"17", UNREADABLE),
         ] {
-            assert_eq!(row(line), expected, "{line}");
+            let row = row(line);
+            assert_eq!(row.as_deref().unwrap_or(UNREADABLE), expected, "{line}");
         }
     }
 
