@@ -14,7 +14,6 @@
 // sound.
 #![allow(unsafe_code)]
 
-mod allocations;
 pub mod clock;
 pub mod control;
 pub mod counters;
@@ -48,7 +47,7 @@ pub mod transport;
 pub mod wake;
 pub mod writer;
 
-pub use allocations::CountingAllocator;
+pub use counters::CountingAllocator;
 pub use error::StageError;
 pub use follower::Follower;
 pub use generation::Generation;

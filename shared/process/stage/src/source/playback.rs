@@ -64,8 +64,8 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
-    /// Returns when a scan is due that is complete at `complete_ns` of the sensor's clock; `None` at
-    /// the highest rate. `gap_ns`: when the scan before a break was complete.
+    /// Returns when a scan is due that is complete at `complete_ns` of the sensor's clock; `None`
+    /// at the highest rate. `gap_ns`: when the scan before a break was complete.
     fn due_ns(
         &mut self,
         pace: &mut Option<Pace>,
