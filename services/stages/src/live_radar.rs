@@ -58,7 +58,6 @@ impl Settings {
         })
     }
 
-    /// Returns a parser at the start of a stream, or of datagrams.
     pub(crate) fn parser(&self) -> RadarParser {
         match self.address.is_udp() {
             false => RadarParser::Stream(Parser::default()),

@@ -192,7 +192,6 @@ impl Drop for Connection {
     }
 }
 
-/// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
 pub enum RadarSocket {
     Tcp(TcpStream),

@@ -143,14 +143,12 @@ mod tests {
 
     #[test]
     fn the_turn_in_which_a_stream_begins_counts_if_it_is_whole() {
-        let mut whole = turns();
-        note(&mut whole, 0, 0.0);
-        whole.add(scan(1));
-        assert_eq!(whole.left_out(true), 1);
-        let mut cut = turns();
-        note(&mut cut, 0, 0.7);
-        cut.add(scan(1));
-        assert_eq!(cut.left_out(true), 0);
+        for (fraction, left_out) in [(0.0, 1), (0.7, 0)] {
+            let mut turns = turns();
+            note(&mut turns, 0, fraction);
+            turns.add(scan(1));
+            assert_eq!(turns.left_out(true), left_out);
+        }
     }
 
     #[test]

@@ -20,7 +20,6 @@ pub trait Queue {
         newest_pose: Option<u64>,
     ) -> Result<Action, StageError>;
 
-    /// Returns the current scan if one has been received.
     fn current(&self) -> Option<&Received<Scan>>;
 
     /// Returns the previous scan, if the mask takes two and the chain is unbroken.

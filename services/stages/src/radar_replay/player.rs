@@ -66,7 +66,6 @@ impl Player {
         })
     }
 
-    /// See [`Recording::damage`].
     pub fn damage(&self) -> Option<String> {
         self.recording.damage()
     }

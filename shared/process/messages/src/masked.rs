@@ -180,17 +180,14 @@ impl MaskedHeader {
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    /// The turn from the previous scan to this one by the gyro.
     pub fn turn(&self) -> Option<GyroTurn> {
         (self.has_gyro == 1).then_some(self.gyro)
     }
 
-    /// The distance from the previous scan to this one by the wheels.
     pub fn distance(&self) -> Option<WheelDistance> {
         (self.has_wheels == 1).then_some(self.wheels)
     }
 
-    /// The velocity by Doppler during this scan.
     pub fn velocity(&self) -> Option<DopplerVelocity> {
         (self.has_doppler == 1).then_some(self.doppler)
     }

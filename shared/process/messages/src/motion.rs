@@ -72,7 +72,6 @@ impl From<RotationEstimate> for RotationMatch {
     }
 }
 
-/// The header of `rotation`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RotationHeader {
@@ -202,7 +201,6 @@ impl MotionEstimate {
     }
 }
 
-/// The header of `motion` and `refined`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MotionHeader {

@@ -155,7 +155,6 @@ pub struct Control {
 }
 
 impl Control {
-    /// Returns the control of the run that writes its results to `out`.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         Self::at(run::root_of(&absolute), out.to_owned()).ok_or_else(|| not_running(out.to_owned()))

@@ -90,7 +90,6 @@ impl Launch {
         Ok(())
     }
 
-    /// Reports each wait of this process from here on.
     pub(crate) fn begin_heartbeat(&self) -> Result<(), StageError> {
         let heartbeat = HeartbeatWriter::create(&self.manifest, &self.name)?;
         self.signals.report_to(heartbeat);

@@ -162,7 +162,6 @@ impl<M: Message> Reader<M> {
         Ok(self.head.as_ref())
     }
 
-    /// Returns the current item if it has been received.
     pub fn current(&self) -> Option<&Received<M>> {
         self.head.as_ref()
     }

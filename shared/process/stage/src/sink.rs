@@ -177,7 +177,6 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
     }
 }
 
-/// The inputs of one pose.
 struct Input<'a> {
     motion: MotionHeader,
     scan: Option<&'a Received<Masked>>,

@@ -12,7 +12,6 @@ use crate::{
     writer::{RecordedMessage, TopicWriter, Writer, item_of},
 };
 
-/// The recorded messages of a run.
 pub trait Recorded {
     /// The topics to publish, in the order of the stream.
     fn topics(&self) -> &[&'static str];
