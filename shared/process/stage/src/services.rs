@@ -18,32 +18,21 @@ pub struct Services {
 impl Services {
     pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let (mut topics, mut events) = (Vec::new(), Vec::new());
+        let mut event = |name: &str, ports, nodes| -> Result<(), StageError> {
+            events.push(Event::create(node, name, ports, nodes)?);
+            Ok(())
+        };
         for topic in gyre_messages::topics(window) {
             let (name, sizes) = (topic.name, (topic.sizes)(window));
             let (subscribers, nodes) = (sizes.subscribers(), sizes.nodes());
-            events.push(Event::create(
-                node,
-                &data_event(name),
-                [subscribers, 1],
-                nodes,
-            )?);
-            events.push(Event::create(
-                node,
-                &handshake_event(name),
-                [1, subscribers],
-                nodes,
-            )?);
+            event(&data_event(name), [subscribers, 1], nodes)?;
+            event(&handshake_event(name), [1, subscribers], nodes)?;
             topics.push((topic, Service::create(node, topic, window)?));
         }
         if window.logs_points() {
             let nodes = Pose::sizes(window).nodes();
             for log in LogId::ALL {
-                events.push(Event::create(
-                    node,
-                    log.name(),
-                    [FollowerId::ALL.len(), 1],
-                    nodes,
-                )?);
+                event(log.name(), [FollowerId::ALL.len(), 1], nodes)?;
             }
         }
         Ok(Self {
