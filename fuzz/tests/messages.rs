@@ -269,7 +269,7 @@ fn motions_and_points() {
                 };
                 let pose = compose(Some(&PoseHeader::default()), &refined);
                 compose(Some(&pose), &header);
-                header.motion.searched().twist();
+                header.motion.searched_twist();
                 Ok(())
             });
         });

@@ -1,8 +1,5 @@
-//! Localisation of a run in the map of an earlier drive, while it drives.
-//!
-//! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place
-//! as a `fix`. It writes no file: its fixes depend only on the keyframes and the map, whenever the
-//! keyframes arrive.
+//! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
 
 use std::path::PathBuf;
 
@@ -22,16 +19,13 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;
-    let failed = |error: &dyn std::error::Error| StageError::Configuration(error.to_string());
-    let map = Map::open(&slam.map).map_err(|error| failed(&error))?;
+    let map = Map::open(&slam.map).map_err(StageError::configuration)?;
     let localiser = Localiser::new(map, &refinement, points.capacity);
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let out = launch.manifest.out.clone();
     let mut places = Fixes {
         keyframes: RecordReader::open(&out)?,
-        localiser: localiser.map_err(|error| failed(&error))?,
+        localiser: localiser.map_err(StageError::configuration)?,
         read: 0,
         out,
     };
@@ -39,7 +33,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 struct Fixes {
-    /// The folder of the results.
     out: PathBuf,
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
@@ -88,52 +81,30 @@ impl Follower for Fixes {
         })
     }
 
-    fn sync(&mut self) -> Result<(), StageError> {
-        Ok(())
-    }
-
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read as u64,
-            total: self.keyframes.len() as u64,
-        }
+        Progress::of(self.read, self.keyframes.len())
     }
 }
 
 fn header(index: usize, keyframe: &Keyframe, found: &Localisation, map: &Map) -> FixHeader {
-    let item = Item {
-        seq: index as u64,
-        scan: keyframe.scan,
-        previous_scan: keyframe.scan,
-        stamp_ns: keyframe.stamp_ns,
-        ..Item::default()
-    };
-    let status = match found.status {
-        Status::Lost => fix_status::LOST,
-        Status::Found => fix_status::FOUND,
-        Status::Tracked => fix_status::TRACKED,
-        // Away from the map a prediction is no place.
-        Status::Predicted if found.fix.is_none() => fix_status::LOST,
-        Status::Predicted => fix_status::PREDICTED,
-    };
-    let Some(fix) = &found.fix else {
-        return FixHeader {
-            item,
-            keyframe_seq: keyframe.seq,
-            status,
-            ..FixHeader::default()
-        };
-    };
-    let [x_m, y_m, yaw_rad] = xy_yaw(&fix.pose.motion);
-    FixHeader {
-        item,
+    let mut header = FixHeader {
+        item: Item::recorded(index as u64, keyframe.scan, keyframe.stamp_ns),
         keyframe_seq: keyframe.seq,
-        status,
-        place: map.keyframes()[fix.keyframe].scan,
-        x_m,
-        y_m,
-        yaw_rad,
-        covariance: covariance::pack(&fix.pose.covariance),
-        correlation: fix.correlation,
+        status: match found.status {
+            Status::Lost => fix_status::LOST,
+            Status::Found => fix_status::FOUND,
+            Status::Tracked => fix_status::TRACKED,
+            // Away from the map a prediction is no place.
+            Status::Predicted if found.fix.is_none() => fix_status::LOST,
+            Status::Predicted => fix_status::PREDICTED,
+        },
+        ..FixHeader::default()
+    };
+    if let Some(fix) = &found.fix {
+        header.place = map.keyframes()[fix.keyframe].scan;
+        [header.x_m, header.y_m, header.yaw_rad] = xy_yaw(&fix.pose.motion);
+        header.covariance = covariance::pack(&fix.pose.covariance);
+        header.correlation = fix.correlation;
     }
+    header
 }

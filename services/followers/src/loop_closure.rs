@@ -1,11 +1,8 @@
-//! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
-//! run.
-//!
-//! It follows `journal/keyframes.log`. It keeps the places of keyframes in `journal/places.log` and
-//! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
-//! logs. Both follow from the keyframes, whenever those come.
+//! Loop closing: follows `journal/keyframes.log`, and keeps the places of keyframes in
+//! `journal/places.log` and the verdicts on all candidates in `journal/loops.log`. A restarted
+//! process continues from both logs. Both follow from the keyframes, whenever those come.
 
-use std::{collections::VecDeque, path::PathBuf};
+use std::collections::VecDeque;
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
 use gyre_journal::loops::loop_header;
@@ -23,51 +20,48 @@ use gyre_stage::{
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
-    let settings = Settings {
-        out: launch.manifest.out.clone(),
-        slam: launch.section("slam")?,
-        refinement: launch.section("refinement")?,
-        points: launch.section("points")?,
+    launch.take_place()?;
+    let (slam, refinement, points): (SlamConfig, RefinementConfig, PointsConfig) = (
+        launch.section("slam")?,
+        launch.section("refinement")?,
+        launch.section("points")?,
+    );
+    let submap_reach_m = slam.submap_reach_m;
+    let new_closer = move || {
+        let closer = LoopCloser::new(submap_reach_m, &refinement, points.capacity);
+        closer.map_err(StageError::configuration)
     };
-    let growth = Growth::of(launch, LogId::Loops)?;
-    let mut state = State::open(&settings)?;
-    state.restore(None)?;
-    follower::run(
-        launch,
-        &mut LoopClosing {
-            settings,
-            growth,
-            state,
-        },
-    )
+    let out = &launch.manifest.out;
+    let mut closing = LoopClosing {
+        growth: Growth::of(launch, LogId::Loops)?,
+        keyframes: RecordReader::open(out)?,
+        places: RecordLog::open(out)?,
+        queries: RecordLog::open(out)?,
+        closer: new_closer()?,
+        new_closer: Box::new(new_closer),
+        submap_reach_m,
+        loops: 0,
+        pending: VecDeque::new(),
+        has_finished: false,
+    };
+    closing.restore(None)?;
+    follower::run(launch, &mut closing)
 }
 
+/// The logs, and what follows from the records read so far.
 struct LoopClosing {
-    settings: Settings,
+    /// Wakes the readers of the queries.
     growth: Growth,
-    state: State,
-}
-
-struct Settings {
-    /// The folder of the results.
-    out: PathBuf,
-    slam: SlamConfig,
-    refinement: RefinementConfig,
-    points: PointsConfig,
-}
-
-impl Settings {
-    fn closer(&self) -> Result<LoopCloser, StageError> {
-        LoopCloser::new(
-            self.slam.submap_reach_m,
-            &self.refinement,
-            self.points.capacity,
-        )
-        .map_err(|error| StageError::Configuration(error.to_string()))
-    }
+    keyframes: RecordReader<Keyframe>,
+    places: RecordLog<Place>,
+    queries: RecordLog<Query>,
+    closer: LoopCloser,
+    new_closer: Box<dyn Fn() -> Result<LoopCloser, StageError>>,
+    submap_reach_m: f64,
+    loops: u64,
+    pending: VecDeque<LoopHeader>,
+    /// True if the closer knows that no keyframes follow.
+    has_finished: bool,
 }
 
 impl Follower for LoopClosing {
@@ -75,63 +69,37 @@ impl Follower for LoopClosing {
     const LOGS: &'static [LogId] = &[LogId::Keyframes];
 
     fn step(&mut self) -> Result<Step<LoopHeader>, StageError> {
-        if let Some(unchanged) = self.state.look()? {
-            self.state.closer = self.settings.closer()?;
-            self.state.restore(Some(unchanged))?;
+        if let Some(unchanged) = self.look()? {
+            self.closer = (self.new_closer)()?;
+            self.restore(Some(unchanged))?;
         }
-        let step = self.state.step()?;
-        if self.state.has_appended {
-            self.state.has_appended = false;
-            self.growth.notify()?;
+        if let Some(found) = self.pending.pop_front() {
+            return Ok(Step::Worked(Some(found)));
         }
-        Ok(step)
+        let next = self.closer.keyframes();
+        if next < self.keyframes.len() {
+            let pushed = self.keyframes.read(next)?;
+            self.closer.push(&pushed).map_err(StageError::input)?;
+            return Ok(Step::Worked(None));
+        }
+        if self.keyframes.has_ended() && !self.has_finished {
+            self.closer.finish();
+            self.has_finished = true;
+        }
+        self.close()
     }
 
     fn sync(&mut self) -> Result<(), StageError> {
-        self.state.places.sync()?;
-        Ok(self.state.queries.sync()?)
+        self.places.sync()?;
+        Ok(self.queries.sync()?)
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.state.queries.len() as u64,
-            total: self.state.keyframes.len() as u64,
-        }
+        Progress::of(self.queries.len(), self.keyframes.len())
     }
 }
 
-/// The logs and the records read so far.
-struct State {
-    keyframes: RecordReader<Keyframe>,
-    places: RecordLog<Place>,
-    queries: RecordLog<Query>,
-    closer: LoopCloser,
-    submap_reach_m: f64,
-    /// Number of loops so far.
-    loops: u64,
-    /// Loops that are to be published.
-    pending: VecDeque<LoopHeader>,
-    /// True if the closer knows that no keyframes follow.
-    has_finished: bool,
-    /// True if the queries have grown.
-    has_appended: bool,
-}
-
-impl State {
-    fn open(settings: &Settings) -> Result<Self, StageError> {
-        Ok(Self {
-            keyframes: RecordReader::open(&settings.out)?,
-            places: RecordLog::open(&settings.out)?,
-            queries: RecordLog::open(&settings.out)?,
-            closer: settings.closer()?,
-            submap_reach_m: settings.slam.submap_reach_m,
-            loops: 0,
-            pending: VecDeque::new(),
-            has_finished: false,
-            has_appended: false,
-        })
-    }
-
+impl LoopClosing {
     /// Gives the places and queries that are there to a new closer, and cuts off those that
     /// keyframes which are no longer there have led to. `unchanged` is the number of keyframes that
     /// are as they were; `None`: none was cut off.
@@ -181,9 +149,8 @@ impl State {
         // A place follows from the keyframes around it.
         let first = places.saturating_sub(MAX_NEIGHBOURS + 1);
         let path_m = |index| Ok(self.keyframes.read(index)?.path_m);
-        let path_m: Vec<f64> = (first..keyframes)
-            .map(path_m)
-            .collect::<Result<_, StageError>>()?;
+        let path_m: Result<Vec<f64>, StageError> = (first..keyframes).map(path_m).collect();
+        let path_m = path_m?;
         let is_incomplete = |place: &usize| {
             first + neighbours(&path_m, place - first, self.submap_reach_m).end >= keyframes
         };
@@ -200,24 +167,6 @@ impl State {
         Ok(was_cut.then_some(unchanged))
     }
 
-    fn step(&mut self) -> Result<Step<LoopHeader>, StageError> {
-        if let Some(found) = self.pending.pop_front() {
-            return Ok(Step::Worked(Some(found)));
-        }
-        let next = self.closer.keyframes();
-        if next < self.keyframes.len() {
-            let pushed = self.keyframes.read(next)?;
-            self.closer.push(&pushed).map_err(input)?;
-            return Ok(Step::Worked(None));
-        }
-        if self.keyframes.has_ended() && !self.has_finished {
-            self.closer.finish();
-            self.has_finished = true;
-        }
-        self.close()
-    }
-
-    /// Describes or queries the next keyframe.
     fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
         let mut source = Points(&mut self.keyframes);
         if let Some(place) = self.closer.describe(&mut source).map_err(failed)? {
@@ -226,7 +175,7 @@ impl State {
         }
         if let Some(query) = self.closer.close(&mut source).map_err(failed)? {
             self.queries.append(&query)?;
-            self.has_appended = true;
+            self.growth.notify()?;
             self.note(&query)?;
             return Ok(Step::Worked(self.pending.pop_front()));
         }
@@ -234,7 +183,7 @@ impl State {
             return Ok(Step::Idle);
         }
         self.queries.end()?;
-        self.has_appended = true;
+        self.growth.notify()?;
         Ok(Step::Ended)
     }
 
@@ -265,10 +214,6 @@ impl KeyframeSource for Points<'_> {
 fn failed(error: ClosingError<StageError>) -> StageError {
     match error {
         ClosingError::Source(error) => error,
-        other => input(other),
+        other => StageError::input(other),
     }
-}
-
-fn input(error: impl std::error::Error) -> StageError {
-    StageError::Input(error.to_string())
 }

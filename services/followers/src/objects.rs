@@ -1,10 +1,6 @@
-//! Moving objects: tracks what moves around the vehicle, scan after scan.
-//!
-//! It follows `journal/scans.log`, which has each scan's points and pose. It keeps the objects of
-//! each scan in `journal/objects.log`, and `objects.csv` is made from that log. A restarted process
-//! works through the scans again from the first scan, since an identity can be as old as the run,
-//! and appends the records that the log lacks. Its records depend only on the scans, whenever the
-//! scans arrive.
+//! Moving objects: follows `journal/scans.log`, and keeps the objects of each scan in
+//! `journal/objects.log`. A restarted process works through the scans from the first one, since an
+//! identity can be as old as the run, and appends the records that the log lacks.
 
 use std::path::PathBuf;
 
@@ -24,9 +20,7 @@ use gyre_stage::{
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let config: ObjectsConfig = launch.section("objects")?;
     let masking: MaskingConfig = launch.section("masking")?;
     let out = launch.manifest.out.clone();
@@ -49,13 +43,11 @@ pub fn tracker(
     masking: &MaskingConfig,
 ) -> Result<ObjectTracker, StageError> {
     let library = Library::find(masking);
-    let library = library.map_err(|error| StageError::Configuration(error.to_string()))?;
-    ObjectTracker::new(config, library.onnx_runtime())
-        .map_err(|error| StageError::Configuration(error.to_string()))
+    let library = library.map_err(StageError::configuration)?;
+    ObjectTracker::new(config, library.onnx_runtime()).map_err(StageError::configuration)
 }
 
 struct Tracking {
-    /// The folder of the results.
     out: PathBuf,
     config: ObjectsConfig,
     masking: MaskingConfig,
@@ -98,7 +90,7 @@ impl Tracking {
         let objects = self
             .tracker
             .update(&placed, &scan.points)
-            .map_err(|error| StageError::Input(error.to_string()))?;
+            .map_err(StageError::input)?;
         let known = self.read < self.tracked.len();
         self.read += 1;
         if known {
@@ -115,17 +107,10 @@ impl Tracking {
     }
 }
 
-/// Returns the message about the objects of a scan.
 fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
     let [x_m, y_m, yaw_rad] = xy_yaw(&scan.pose);
     let mut header = ObjectsHeader {
-        item: Item {
-            seq: scan.seq,
-            scan: scan.scan,
-            previous_scan: scan.scan,
-            stamp_ns: scan.stamp_ns,
-            ..Item::default()
-        },
+        item: Item::recorded(scan.seq, scan.scan, scan.stamp_ns),
         x_m,
         y_m,
         yaw_rad,
@@ -164,9 +149,6 @@ impl Follower for Tracking {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read as u64,
-            total: self.scans.len() as u64,
-        }
+        Progress::of(self.read, self.scans.len())
     }
 }

@@ -1,21 +1,16 @@
-//! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
-//! them and the fixes of GNSS.
-//!
-//! It follows `journal/keyframes.log` and `journal/loops.log`. The log of the fixes is complete
-//! when it starts, or grows: fixes of a live receiver are written to `journal/gnss.csv` here, until
-//! both other logs have ended. A fix counts once both keyframes around it have come.
-//!
-//! During the run, new loops and fixes update the standing estimate, which may depend a little on
-//! their time of arrival. When both logs have ended, the poses are solved again. The last
-//! correction is then a function of the logs alone, and so equals the results that the supervisor
-//! makes from the same logs.
+//! The trajectory that agrees with the loops: follows `journal/keyframes.log` and
+//! `journal/loops.log`, and the fixes of GNSS, which for a live receiver are written to
+//! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
+//! ended, the poses are solved again, so that the last correction equals the results.
 
-mod live_fixes;
-
-use std::path::PathBuf;
+use std::{
+    mem,
+    path::{Path, PathBuf},
+};
 
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
+use gyre_recording::{ReceivedFixes, received_fixes};
 use gyre_run::SourceConfig;
 use gyre_samples::GnssConfig;
 use gyre_slam::{
@@ -23,17 +18,13 @@ use gyre_slam::{
     TrajectoryEstimator,
 };
 use gyre_stage::{
-    Follower, Launch, StageCounters, StageError,
+    Follower, GnssReceiver, Launch, StageCounters, StageError,
     follower::{self, LogId, Progress, Step},
 };
 
-use live_fixes::LiveFixes;
-
 /// Runs the follower to the end of both logs, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
         StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
@@ -52,13 +43,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
     let source: SourceConfig = launch.section("source")?;
     let out = &launch.manifest.out;
-    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(input)?;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(StageError::input)?;
     let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
     Ok(Fixes::new(fixes, config))
 }
 
 struct Trajectory {
-    /// The folder of the results.
     out: PathBuf,
     kind: EstimatorKind,
     /// The fixes that are later than all keyframes.
@@ -68,9 +58,7 @@ struct Trajectory {
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
-    /// The newest keyframe that was read.
     newest: Option<Keyframe>,
-    /// Keyframes and queries that were read.
     read: [usize; 2],
     /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
     /// corrected no pose yet.
@@ -82,7 +70,7 @@ struct Trajectory {
 }
 
 impl Trajectory {
-    fn open(out: &std::path::Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
+    fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
         Ok(Self {
             out: out.to_owned(),
             kind,
@@ -105,12 +93,8 @@ impl Trajectory {
         self.keyframes.refresh()?;
         self.queries.refresh()?;
         let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
-        let was_cut = self
-            .read
-            .iter()
-            .zip(unchanged)
-            .any(|(read, unchanged)| unchanged < *read);
-        if was_cut {
+        let mut read = self.read.iter().zip(unchanged);
+        if read.any(|(read, unchanged)| unchanged < *read) {
             *self = Self {
                 live_fixes: self.live_fixes.take(),
                 ..Self::open(&self.out.clone(), self.kind, self.fixes.clone())?
@@ -125,7 +109,7 @@ impl Trajectory {
         if keyframes < self.keyframes.len() {
             let keyframe = self.keyframes.read_without_points(keyframes)?;
             let fixes = self.estimator.fixes().settled();
-            self.estimator.push(&keyframe).map_err(input)?;
+            self.estimator.push(&keyframe).map_err(StageError::input)?;
             // Without a new loop or fix the poses before stay where they are.
             let standing = self.corrected.map(|last| last.then(&keyframe.motion));
             self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
@@ -140,7 +124,7 @@ impl Trajectory {
             if query.loops().next().is_some() {
                 self.corrected = None;
             }
-            self.estimator.close(&query).map_err(input)?;
+            self.estimator.close(&query).map_err(StageError::input)?;
             self.read[1] += 1;
         } else {
             return Ok(false);
@@ -163,7 +147,6 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Corrects the poses by all that was read.
     fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
         let Some(newest) = &self.newest else {
             return Ok(None);
@@ -173,10 +156,12 @@ impl Trajectory {
             Some(corrected) => corrected,
             None => {
                 match self.is_final {
-                    true => self.estimator.solve().map_err(input)?,
-                    false => self.estimator.update().map_err(input)?,
+                    true => self.estimator.solve().map_err(StageError::input)?,
+                    false => self.estimator.update().map_err(StageError::input)?,
                 }
-                self.estimator.pose(keyframes - 1).map_err(input)?
+                self.estimator
+                    .pose(keyframes - 1)
+                    .map_err(StageError::input)?
             }
         };
         self.corrected = Some(corrected);
@@ -184,14 +169,9 @@ impl Trajectory {
         let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
         let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
         let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
+        let seq = (keyframes + queries + usize::from(self.is_final)) as u64 - 1;
         Ok(Some(CorrectionHeader {
-            item: Item {
-                seq: (keyframes + queries + usize::from(self.is_final)) as u64 - 1,
-                scan: newest.scan,
-                previous_scan: newest.scan,
-                stamp_ns: newest.stamp_ns,
-                ..Item::default()
-            },
+            item: Item::recorded(seq, newest.scan, newest.stamp_ns),
             keyframe_seq: newest.seq,
             keyframes: keyframes as u64,
             loops: used.count() as u64,
@@ -221,8 +201,7 @@ impl Follower for Trajectory {
             (self.has_changed, self.corrected) = (true, None);
         }
         self.is_final = has_ended;
-        if self.has_changed {
-            self.has_changed = false;
+        if mem::take(&mut self.has_changed) {
             self.take_live_fixes()?;
             return Ok(Step::Worked(self.correct()?));
         }
@@ -238,15 +217,60 @@ impl Follower for Trajectory {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            done: self.read[1] as u64,
-            total: self.keyframes.len() as u64,
-        }
+        Progress::of(self.read[1], self.keyframes.len())
     }
 }
 
-fn input(error: impl std::error::Error) -> StageError {
-    StageError::Input(error.to_string())
+/// The time to examine all fixes grows with their number. So during the run they are examined when
+/// one in so many is new: after ten hours at 20 Hz that is every 18 s.
+const NEW_SHARE: usize = 2000;
+
+/// Receives fixes, and reads the log of all that have arrived on.
+struct LiveFixes {
+    receiver: GnssReceiver,
+    config: GnssConfig,
+    received: ReceivedFixes,
+    examined: usize,
+}
+
+impl LiveFixes {
+    /// Begins to receive, in a run with its results in `out`.
+    fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
+        let log = received_fixes(out);
+        Ok(Self {
+            receiver: GnssReceiver::open(&config.listen, &log)?,
+            received: ReceivedFixes::new(&log),
+            examined: 0,
+            config,
+        })
+    }
+
+    /// Ends reception. Received fixes survive a power failure.
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.receiver.finish()
+    }
+
+    /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
+    /// With `is_last` nothing is received after this.
+    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
+        if is_last {
+            self.finish()?;
+        }
+        let received = &mut self.received;
+        let read = self.receiver.if_grown(|| received.read_on())?;
+        read.unwrap_or(Ok(())).map_err(StageError::input)?;
+        let new = self.received.count() - self.examined;
+        let least = if is_last {
+            1
+        } else {
+            self.examined / NEW_SHARE + 1
+        };
+        Ok((new >= least).then(|| {
+            self.examined += new;
+            let fixes = self.received.log().on_radar(&self.config);
+            Fixes::new(fixes, &self.config)
+        }))
+    }
 }
 
 #[cfg(test)]

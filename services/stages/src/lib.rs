@@ -1,8 +1,17 @@
 //! The stages of the pipeline, a module for each.
 
+use gyre_geometry::SparsePoint;
+use gyre_messages::Masked;
+use gyre_stage::{StageError, reader::Received};
+
 pub mod live_radar;
 pub mod masking;
 pub mod pose_integration;
 pub mod radar_replay;
 pub mod refinement;
 pub mod search;
+
+fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
+    let points = scan.header().points(scan.values());
+    points.ok_or_else(|| scan.malformed("its points do not fit its header"))
+}

@@ -1,32 +1,80 @@
 //! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as
 //! ASTERIX CAT-240 by UDP, and publishes each sweep on `scan`, written directly into shared memory.
-//!
-//! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
-//! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
-//! (the completion time of a scan).
+//! [`Intake`] makes scans of azimuths, whatever the transport.
 
 mod ask;
 mod connection;
-mod health_log;
 mod intake;
-mod parser;
 mod radar;
 mod read_delay;
 mod scan_assembly;
-mod settings;
 mod turn_counter;
 
+use std::time::Duration;
+
+use gyre_colossus::{Address, BadAddress, Constants, Datagrams, Parser};
+use gyre_datasets::DatasetOptions;
+use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};
-pub use connection::RadarSocket;
+pub use connection::{RadarParser, RadarSocket};
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
-pub use parser::RadarParser;
-pub use settings::{Settings, encoder_counts, silence};
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
+}
+
+/// Encoder counts per turn of a radar that does not report them, unless `dataset.encoder_counts` is
+/// set.
+const ENCODER_COUNTS: u16 = 5600;
+
+/// The address of a radar, and the properties that it does not send.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    pub address: Address,
+    /// Encoder counts per turn, for rounding the angles of a radar that sends by UDP.
+    pub encoder_counts: u16,
+    /// Time without an azimuth after which the run reconnects.
+    pub silence: Duration,
+    /// Scans to receive; `None`: without end.
+    pub scans: Option<u64>,
+    pub constants: Constants,
+}
+
+impl Settings {
+    /// Returns the settings of the section `[source]`, with the constants of the section
+    /// `[dataset]`.
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, BadAddress> {
+        Ok(Self {
+            address: Address::parse(&source.address, &source.interface)?,
+            encoder_counts: encoder_counts(options),
+            silence: silence(source),
+            scans: source.scans.map(|scans| scans as u64),
+            constants: options.into(),
+        })
+    }
+
+    pub(crate) fn parser(&self) -> RadarParser {
+        match self.address.is_udp() {
+            false => RadarParser::Stream(Parser::default()),
+            true => RadarParser::Datagrams(Datagrams::new(self.encoder_counts)),
+        }
+    }
+}
+
+/// Returns the encoder counts per turn of a radar that does not report them.
+pub fn encoder_counts(options: &DatasetOptions) -> u16 {
+    options.encoder_counts.unwrap_or(ENCODER_COUNTS)
+}
+
+/// Returns the time without a byte or a message after which something is done about it.
+pub fn silence(source: &SourceConfig) -> Duration {
+    match Duration::try_from_secs_f64(source.silence_s) {
+        Ok(silence) if !silence.is_zero() => silence,
+        _ => Duration::MAX,
+    }
 }

@@ -1,12 +1,7 @@
 //! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion
-//! compensation.
-//!
-//! [`gyre_masking::Masker`] does the work, with a function of Python where one is given (`python`).
-//! `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of taking scans
-//! from the queue; `azimuths` finds those that were lost. The velocity by Doppler is measured here,
+//! compensation. [`gyre_masking::Masker`] does the work. The velocity by Doppler is measured here,
 //! where the rows of the scan are.
 
-mod azimuths;
 mod live;
 mod lossless;
 mod motions;
@@ -16,18 +11,19 @@ mod scans;
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
-use gyre_radar::{DopplerEstimator, PlacedRows, PointsConfig, RasterConfig};
+use gyre_radar::{
+    DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
+    lost::stale_rows,
+};
 use gyre_samples::DopplerConfig;
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
 };
 
-use azimuths::Azimuths;
 use scans::{ScanView, Scans};
 
 pub use python::python;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     work(launch, launch.section("masking")?, None)
 }
@@ -65,7 +61,7 @@ fn work(
     let mut masking = Masking {
         raster,
         config,
-        masker: masker.map_err(|error| StageError::Configuration(error.to_string()))?,
+        masker: masker.map_err(StageError::configuration)?,
         azimuths: Azimuths::default(),
         doppler: doppler.is_used().then(DopplerEstimator::default),
         min_range_m: points.min_range_m,
@@ -82,7 +78,6 @@ struct Masking {
     doppler: Option<DopplerEstimator>,
     /// Nearer echoes are of the vehicle itself.
     min_range_m: f32,
-    /// Of the scan and of the previous one.
     rows: [PlacedRows; 2],
 }
 
@@ -97,7 +92,7 @@ impl Stage for Masking {
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
         let failed = |error: MaskError| match error {
-            MaskError::Function(reason) => StageError::Function(reason),
+            MaskError::Function(reason) => StageError::Transient(reason),
             error => input.scan.malformed(error.to_string()),
         };
         let [rows, previous_rows] = &mut self.rows;
@@ -184,4 +179,49 @@ fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, S
         scan,
         twist,
     })
+}
+
+/// The lost azimuths of each scan, found from the scan before. A restarted masking continues from
+/// the record in the poses.
+#[derive(Default)]
+struct Azimuths {
+    finder: LostAzimuthFinder,
+    /// The scan that it has found them in last.
+    last: Option<(u64, LostAzimuths)>,
+}
+
+impl Azimuths {
+    /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
+    /// the finding of an earlier masking. Where a chain of motions `starts`, nothing is known of
+    /// the scan before.
+    fn lost(
+        &mut self,
+        sweep: &Sweep<'_>,
+        known: Option<LostAzimuths>,
+        starts: bool,
+    ) -> LostAzimuths {
+        if let Some((number, lost)) = self.last
+            && number == sweep.number
+        {
+            return lost;
+        }
+        if starts {
+            self.finder.reset();
+        }
+        // Another masking's finding about this scan, if it has found all.
+        let known = known.filter(|known| known.count() == stale_rows(&sweep.scan));
+        let lost = match known {
+            Some(known) => {
+                self.finder.set_previous(&sweep.scan, &known);
+                known
+            }
+            None => self.finder.find(&sweep.scan, sweep.twist),
+        };
+        self.last = Some((sweep.number, lost));
+        lost
+    }
+
+    fn last(&self) -> LostAzimuths {
+        self.last.map(|(_, lost)| lost).unwrap_or_default()
+    }
 }

@@ -1,11 +1,9 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
-//! pose before it is published.
-//!
-//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled;
-//! with objects it logs each scan. In live mode poses continue when the disk is full, and are not
-//! kept from then on.
+//! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
+//! poses continue when the disk is full, and are not kept from then on.
 
-use gyre_geometry::SparsePoint;
+use std::fmt::Display;
+
 use gyre_journal::{
     self as journal, Journal, JournalError,
     keyframes::{Keyframes, KeyframesError},
@@ -24,36 +22,31 @@ use gyre_stage::{
 };
 use gyre_storage::{LogError, continue_when_full, was_full};
 
-/// Runs the stage until SIGTERM.
+use crate::points;
+
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let out = &launch.manifest.out;
     if launch.manifest.live {
         continue_when_full();
     }
+    let slam: SlamConfig = launch.section("slam")?;
+    let objects: ObjectsConfig = launch.section("objects")?;
+    let growth = |is_on: bool, log| is_on.then(|| Growth::of(launch, log)).transpose();
     let mut integration = Integration {
         journal: Journal::open(&journal::path(out)).map_err(unusable)?,
         last: None,
-        slam: launch.section("slam")?,
-        objects: launch.section("objects")?,
+        keyframes_grown: growth(slam.is_on(), LogId::Keyframes)?,
+        scans_grown: growth(objects.is_on(), LogId::Scans)?,
+        slam,
+        objects,
         points: launch.manifest.limits.points,
         keyframes: None,
         scans: None,
-        growth: Vec::new(),
         // A stage that died on the full disk has left it.
         loss: sink::notice(&launch.manifest),
         manifest: launch.manifest.clone(),
     };
-    if integration.slam.is_on() {
-        let grown = Growth::of(launch, LogId::Keyframes)?;
-        integration.growth.push((LogId::Keyframes, grown));
-    }
-    if integration.objects.is_on() {
-        let grown = Growth::of(launch, LogId::Scans)?;
-        integration.growth.push((LogId::Scans, grown));
-    }
     let counters = match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
         false => sink::run::<Motion, _>(launch, &mut integration),
@@ -68,14 +61,14 @@ struct Integration {
     last: Option<PoseHeader>,
     slam: SlamConfig,
     objects: ObjectsConfig,
-    /// The most points of a scan.
     points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
     /// Of a run with objects, likewise.
     scans: Option<Scans>,
-    /// Wakes the followers of the logs that the run has.
-    growth: Vec<(LogId, Growth)>,
+    /// Wake the followers of the logs that the run has.
+    keyframes_grown: Option<Growth>,
+    scans_grown: Option<Growth>,
     manifest: Manifest,
     /// The sentence about the poses that are not kept.
     loss: Option<String>,
@@ -96,10 +89,8 @@ impl Sink for Integration {
         let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
         if self.slam.is_on() {
             let keyframes = Keyframes::open(&self.manifest.out, known, ended);
-            let keyframes = self
-                .keyframes
-                .insert(keyframes.map_err(unusable_keyframes)?);
-            keyframes.reserve(self.points);
+            let keyframes = keyframes.map_err(unusable_keyframes)?;
+            self.keyframes.insert(keyframes).reserve(self.points);
         }
         if self.objects.is_on() {
             let scans = Scans::open(&self.manifest.out, known, ended).map_err(unusable_scans)?;
@@ -118,14 +109,14 @@ impl Sink for Integration {
         if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
             let added = keyframes.add(&pose, points(scan)?);
             if added.map_err(unusable_keyframes)? {
-                self.wake_followers(LogId::Keyframes)?;
+                self.keyframes_grown.iter().try_for_each(Growth::notify)?;
             }
         }
         if let (Some(scans), Some(scan)) = (&mut self.scans, scan) {
             scans.add(&pose, points(scan)?).map_err(unusable_scans)?;
-            self.wake_followers(LogId::Scans)?;
+            self.scans_grown.iter().try_for_each(Growth::notify)?;
         }
-        self.write(&pose)?;
+        self.journal.append(&pose).map_err(unusable)?;
         if was_full() && self.loss.is_none() {
             let (out, seq) = (self.manifest.out.display(), pose.item.seq);
             let loss = format!(
@@ -141,19 +132,17 @@ impl Sink for Integration {
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
         if let Some(keyframes) = &mut self.keyframes {
             keyframes.end().map_err(unusable_keyframes)?;
-            self.wake_followers(LogId::Keyframes)?;
+            self.keyframes_grown.iter().try_for_each(Growth::notify)?;
         }
         if let Some(scans) = &mut self.scans {
             scans.end().map_err(unusable_scans)?;
-            self.wake_followers(LogId::Scans)?;
+            self.scans_grown.iter().try_for_each(Growth::notify)?;
         }
-        self.write(&PoseHeader {
-            item: Item {
-                flags: flag::END,
-                ..*item
-            },
+        let end = PoseHeader {
+            item: item.flagged(flag::END),
             ..PoseHeader::default()
-        })?;
+        };
+        self.journal.append(&end).map_err(unusable)?;
         self.require_kept()?;
         // Once the end is published, the run is complete.
         self.sync()
@@ -164,16 +153,15 @@ impl Integration {
     /// Waits until all that was written survives a power failure: a failure is found by nobody
     /// after this process.
     fn sync(&self) -> Result<(), StageError> {
-        let keyframes = self.keyframes.as_ref();
-        keyframes
-            .map_or(Ok(()), Keyframes::sync)
-            .map_err(unusable_keyframes)?;
-        let scans = self.scans.as_ref();
-        scans.map_or(Ok(()), Scans::sync).map_err(unusable_scans)?;
+        if let Some(keyframes) = &self.keyframes {
+            keyframes.sync().map_err(unusable_keyframes)?;
+        }
+        if let Some(scans) = &self.scans {
+            scans.sync().map_err(unusable_scans)?;
+        }
         self.journal.sync().map_err(unusable)
     }
 
-    /// Reports the poses that are not kept.
     fn require_kept(&self) -> Result<(), StageError> {
         let (Some(loss), Some(last)) = (&self.loss, self.last) else {
             return Ok(());
@@ -181,48 +169,26 @@ impl Integration {
         let seq = last.item.seq;
         Err(StageError::Input(format!("{loss}; the last pose is {seq}")))
     }
-
-    fn wake_followers(&self, log: LogId) -> Result<(), StageError> {
-        let mut grown = self.growth.iter().filter(|(of, _)| *of == log);
-        grown.try_for_each(|(_, growth)| growth.notify())
-    }
-
-    fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
-        self.journal.append(pose).map_err(unusable)
-    }
-}
-
-fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
-    scan.header()
-        .points(scan.values())
-        .ok_or_else(|| scan.malformed("its points do not fit its header"))
 }
 
 fn unusable(error: JournalError) -> StageError {
-    match error {
-        JournalError::Busy(_) => busy("open the journal", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    failed(matches!(error, JournalError::Busy(_)), "journal", &error)
 }
 
 fn unusable_keyframes(error: KeyframesError) -> StageError {
-    match error {
-        KeyframesError::Log(LogError::Busy(_)) => busy("open the keyframes", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    let is_busy = matches!(error, KeyframesError::Log(LogError::Busy(_)));
+    failed(is_busy, "keyframes", &error)
 }
 
 fn unusable_scans(error: ScansError) -> StageError {
-    match error {
-        ScansError::Log(LogError::Busy(_)) => busy("open the scans", &error),
-        _ => StageError::Input(error.to_string()),
-    }
+    let is_busy = matches!(error, ScansError::Log(LogError::Busy(_)));
+    failed(is_busy, "scans", &error)
 }
 
-/// The error for a file of a process that was killed, and is not gone yet.
-fn busy(action: &str, error: &impl ToString) -> StageError {
-    StageError::Transport {
-        action: action.to_owned(),
-        reason: error.to_string(),
+/// The error for a file: a process that was killed, and is not gone yet, may have it.
+fn failed(is_busy: bool, file: &str, error: &dyn Display) -> StageError {
+    match is_busy {
+        true => StageError::Transient(format!("cannot open the {file}: {error}")),
+        false => StageError::Input(error.to_string()),
     }
 }

@@ -6,7 +6,6 @@
 mod faults;
 mod listing;
 mod player;
-mod turns;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duration};
 
@@ -22,7 +21,6 @@ use gyre_stage::{
 use faults::Faults;
 pub use listing::Listing;
 pub use player::{Player, play_recorded};
-use turns::Turns;
 
 /// A playback with a longer delay is reported, s.
 const NOTABLE_SLIP_S: f64 = 0.01;
@@ -48,19 +46,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     // options too: a dataset.toml that is changed during a run does not change the run.
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
-    match source::open(launch, &tolerance(&config), open)? {
-        Some(mut dataset) => {
-            let gyro: GyroConfig = launch.section("gyro")?;
-            let wheels: WheelsConfig = launch.section("wheels")?;
-            let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
-            let samples = samples.map_err(|error| StageError::Input(error.to_string()))?;
-            play(launch, dataset, samples, Pace::Sensor)
-        }
-        None => Ok(StageCounters::default()),
-    }
+    let mut dataset = source::open(launch, &tolerance(&config), open)?;
+    let (gyro, wheels): (GyroConfig, WheelsConfig) =
+        (launch.section("gyro")?, launch.section("wheels")?);
+    let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
+    let samples = samples.map_err(StageError::input)?;
+    play(launch, dataset, samples, Pace::Sensor)
 }
 
-/// Returns the limits on input that cannot be read.
 pub fn tolerance(config: &SourceConfig) -> Tolerance {
     Tolerance {
         retry: Duration::try_from_secs_f64(config.retry_s).unwrap_or(Duration::MAX),
@@ -116,7 +109,6 @@ pub fn play(
     Ok(counters)
 }
 
-/// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
     samples: ScanSamples,
@@ -170,5 +162,58 @@ impl Source for Replay {
         header.set_samples(bytes, &samples, 0);
         header.shift_times(shift_ns, bytes);
         Ok(())
+    }
+}
+
+/// The turns of a part of a recording. Each turn continues in time where the one before ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Turns {
+    once: Range<usize>,
+    /// Duration of a turn, ns: from its first scan to the first one of the next turn.
+    turn_ns: i64,
+}
+
+impl Turns {
+    /// The turns of these scans. Where their times are not known without decoding, a turn lasts a
+    /// period for each scan.
+    fn of(once: Range<usize>, dataset: &dyn Dataset) -> Self {
+        let stamp_ns = |scan| dataset.nominal_stamp_ns(scan);
+        let ends = || Some(stamp_ns(once.end.checked_sub(1)?)? - stamp_ns(once.start)?);
+        let period_ns = dataset.period_ns();
+        let turn_ns = match ends() {
+            Some(span_ns) if span_ns >= 0 => span_ns + period_ns,
+            _ => once.len() as i64 * period_ns,
+        };
+        Self { once, turn_ns }
+    }
+
+    /// Returns the index in the recording of scan `index` of the stream, and the offset to add to
+    /// its times, ns.
+    fn place(&self, index: usize) -> (usize, i64) {
+        let (scans, after) = (self.once.len(), index.saturating_sub(self.once.start));
+        // Without a turn there is nothing to play; the reader reports it.
+        if scans == 0 || after < scans {
+            return (index, 0);
+        }
+        let turn = (after / scans) as i64;
+        let shift_ns = self.turn_ns.saturating_mul(turn);
+        (self.once.start + after % scans, shift_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scans_of_later_turns_are_the_same_and_their_times_go_on() {
+        let turns = Turns {
+            once: 5..8,
+            turn_ns: 750,
+        };
+        let places: Vec<_> = (5..12).map(|index| turns.place(index)).collect();
+        assert_eq!(places[..3], [(5, 0), (6, 0), (7, 0)]);
+        assert_eq!(places[3..6], [(5, 750), (6, 750), (7, 750)]);
+        assert_eq!(places[6], (5, 1500));
     }
 }

@@ -1,6 +1,5 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
-use gyre_geometry::SparsePoint;
 use gyre_journal::{
     checkpoint::{self, Checkpoint, CheckpointError},
     continue_when_full,
@@ -12,12 +11,12 @@ use gyre_scan_matching::{Aiding, RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView},
-    reader::Received,
     stage,
     writer::Draft,
 };
 
-/// Runs the stage until SIGTERM.
+use crate::points;
+
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
@@ -25,11 +24,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let wheels: WheelsConfig = launch.section("wheels")?;
     let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
-        .map_err(|error| StageError::Configuration(error.to_string()))?
+        .map_err(StageError::configuration)?
         .with_sensors(&gyro, &wheels, &doppler);
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let manifest = &launch.manifest;
     if manifest.live {
         continue_when_full();
@@ -46,7 +43,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut stage)
 }
 
-/// The refiner and the checkpoint of its state.
 struct RefinementStage {
     refiner: Refiner,
     checkpoint: Checkpoint,
@@ -100,7 +96,6 @@ impl Stage for RefinementStage {
 }
 
 impl RefinementStage {
-    /// Restores the state of the refiner before this item.
     fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
         let starts_chain = item.is(flag::BREAK);
         if self.next != Some(item.seq) {
@@ -120,20 +115,12 @@ impl RefinementStage {
     }
 }
 
-fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
-    masked
-        .header()
-        .points(masked.values())
-        .ok_or_else(|| masked.malformed("its points do not fit its header"))
-}
-
 fn unusable(error: CheckpointError) -> StageError {
     match error {
         // A process that was killed, and is not gone yet.
-        CheckpointError::Busy(_) => StageError::Transport {
-            action: "open the checkpoint".to_owned(),
-            reason: error.to_string(),
-        },
+        CheckpointError::Busy(_) => {
+            StageError::Transient(format!("cannot open the checkpoint: {error}"))
+        }
         _ => StageError::Input(error.to_string()),
     }
 }

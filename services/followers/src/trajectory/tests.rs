@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used)]
 
-use std::{net::UdpSocket, path::Path};
+use std::{f64::consts::TAU, iter::successors, net::UdpSocket};
 
-use gyre_geometry::{Twist, UncertainMotion, pose};
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{Geographic, GnssFix, GnssKind, LocalPlane};
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
@@ -18,8 +18,8 @@ fn uncertain(x_m: f64, y_m: f64, yaw_rad: f64) -> UncertainMotion {
 
 /// Laps of 40 keyframes whose odometry turns too little.
 fn keyframe(index: usize) -> Keyframe {
-    let motion = uncertain(3.0, 0.0, std::f64::consts::TAU / 40.0 - 0.0005);
-    let poses = std::iter::successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
+    let motion = uncertain(3.0, 0.0, TAU / 40.0 - 0.0005);
+    let poses = successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
     let [x_m, y_m, yaw_rad] = poses.skip(index).map(|at| xy_yaw(&at)).next().unwrap();
     Keyframe {
         seq: 2 * index as u64,
@@ -46,13 +46,10 @@ fn query(keyframe: usize) -> Query {
         chi_square: 1.0,
         outcome: LoopOutcome::Accepted,
     };
+    let candidates = keyframe.checked_sub(40).map(candidate);
     Query {
         keyframe,
-        candidates: keyframe
-            .checked_sub(40)
-            .map(candidate)
-            .into_iter()
-            .collect(),
+        candidates: candidates.into_iter().collect(),
     }
 }
 
@@ -83,6 +80,17 @@ impl Logs {
         }
     }
 
+    /// Ends the logs. The last correction is the same as after a restart.
+    fn end_and_compare(&mut self, trajectory: &mut Trajectory) -> CorrectionHeader {
+        self.keyframes.end().unwrap();
+        self.queries.end().unwrap();
+        let (correction, has_ended) = follow(trajectory);
+        assert!(has_ended);
+        let (restarted, _) = follow(&mut self.trajectory());
+        assert_eq!(text(restarted), text(correction));
+        correction.unwrap()
+    }
+
     fn trajectory(&self) -> Trajectory {
         Trajectory::open(self.out.path(), EstimatorKind::Graph, self.fixes.clone()).unwrap()
     }
@@ -100,8 +108,8 @@ fn follow(trajectory: &mut Trajectory) -> (Option<CorrectionHeader>, bool) {
     }
 }
 
-fn bytes(correction: Option<CorrectionHeader>) -> Vec<u8> {
-    format!("{:?}", correction.unwrap()).into_bytes()
+fn text(correction: Option<CorrectionHeader>) -> String {
+    format!("{:?}", correction.unwrap())
 }
 
 #[test]
@@ -111,14 +119,8 @@ fn without_loops_odometry_is_not_corrected() {
     let (correction, has_ended) = follow(&mut logs.trajectory());
     let correction = correction.unwrap();
     let identity = xy_yaw(&correction.map_from_odometry());
-    assert!(
-        identity.iter().all(|value| value.abs() < 1e-9),
-        "{identity:?}"
-    );
-    assert_eq!(
-        (correction.keyframes, correction.loops, has_ended),
-        (30, 0, false)
-    );
+    assert!(identity.iter().all(|it| it.abs() < 1e-9), "{identity:?}");
+    assert!(!has_ended && correction.loops == 0 && correction.keyframes == 30);
     assert_eq!((correction.item.scan, correction.keyframe_seq), (145, 58));
 }
 
@@ -133,22 +135,13 @@ fn the_last_correction_is_the_same_whenever_the_logs_were_read() {
     }
     logs.append(120, 120);
     let standing = follow(&mut trajectory).0.unwrap().map_from_odometry();
-    let restarted = follow(&mut logs.trajectory())
-        .0
-        .unwrap()
-        .map_from_odometry();
-    let apart = standing.inv_mul(&restarted);
+    let restarted = follow(&mut logs.trajectory()).0.unwrap();
+    let apart = standing.inv_mul(&restarted.map_from_odometry());
     assert!(apart.translation.vector.norm() < 0.001, "{apart}");
     assert!(apart.rotation.angle().abs() < 1e-5, "{apart}");
-    logs.keyframes.end().unwrap();
-    logs.queries.end().unwrap();
-    let (correction, has_ended) = follow(&mut trajectory);
-    assert!(has_ended);
-    assert_eq!(correction.unwrap().item.seq, 240);
-    assert!(correction.unwrap().loops > 0);
-    assert!(correction.unwrap().yaw_rad.abs() > 0.001);
-    let (restarted, _) = follow(&mut logs.trajectory());
-    assert_eq!(bytes(restarted), bytes(correction));
+    let correction = logs.end_and_compare(&mut trajectory);
+    assert_eq!(correction.item.seq, 240);
+    assert!(correction.loops > 0 && correction.yaw_rad.abs() > 0.001);
 }
 
 #[test]
@@ -162,21 +155,24 @@ fn what_is_cut_off_the_logs_is_taken_back() {
     logs.append(81, 70);
     let (correction, _) = follow(&mut trajectory);
     let (restarted, _) = follow(&mut logs.trajectory());
-    assert_eq!(bytes(correction), bytes(restarted));
+    assert_eq!(text(correction), text(restarted));
     assert_eq!(correction.unwrap().keyframes, 81);
 }
 
-/// A fix at each keyframe of the laps as they are, without the error of odometry.
+/// The poses of the laps as they are, without the error of odometry.
+fn laps(first: Pose) -> impl Iterator<Item = (i64, Pose)> {
+    let step = pose(3.0, 0.0, TAU / 40.0);
+    (0..120).zip(successors(Some(first), move |at| Some(at * step)))
+}
+
 fn fixes() -> Fixes {
-    let step = pose(3.0, 0.0, std::f64::consts::TAU / 40.0);
-    let poses = std::iter::successors(Some(pose(70.0, -20.0, 1.0)), |at| Some(at * step));
-    let fix = |(index, at): (i64, gyre_geometry::Pose)| GnssFix {
+    let fix = |(index, at): (i64, Pose)| GnssFix {
         stamp_ns: 7 * index,
         east_m: at.translation.x,
         north_m: at.translation.y,
         sigma_m: 0.1,
     };
-    let fixes = (0..120).zip(poses).map(fix).collect();
+    let fixes = laps(pose(70.0, -20.0, 1.0)).map(fix).collect();
     Fixes::new(fixes, &GnssConfig::default())
 }
 
@@ -191,21 +187,11 @@ fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_result
         logs.append(keyframes, 0);
         follow(&mut trajectory);
     }
-    let turned = |correction: Option<CorrectionHeader>| correction.unwrap().yaw_rad;
     logs.append(120, 120);
-    let standing = follow(&mut trajectory).0;
+    let turned_rad = follow(&mut trajectory).0.unwrap().yaw_rad;
     // Odometry turns by 0.0005 rad too little at each keyframe.
-    assert!(
-        (turned(standing) - 0.06).abs() < 0.02,
-        "{}",
-        turned(standing)
-    );
-    logs.keyframes.end().unwrap();
-    logs.queries.end().unwrap();
-    let (correction, has_ended) = follow(&mut trajectory);
-    assert!(has_ended);
-    let (restarted, _) = follow(&mut logs.trajectory());
-    assert_eq!(bytes(restarted), bytes(correction));
+    assert!((turned_rad - 0.06).abs() < 0.02, "{turned_rad}");
+    logs.end_and_compare(&mut trajectory);
 }
 
 /// The lines that a live receiver sends of the same fixes.
@@ -215,14 +201,12 @@ fn lines() -> String {
         longitude_deg: -1.26,
     };
     let plane = LocalPlane::new(place, 0.0);
-    let step = pose(3.0, 0.0, std::f64::consts::TAU / 40.0);
-    let poses = std::iter::successors(Some(pose(0.0, 0.0, 1.0)), |at| Some(at * step));
-    let line = |(index, at): (i64, gyre_geometry::Pose)| {
+    let line = |(index, at): (i64, Pose)| {
         let place = plane.place([at.translation.x, at.translation.y]);
         let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
         format!("{},{latitude},{longitude},0.1\n", 7 * index)
     };
-    (0..120).zip(poses).map(line).collect()
+    laps(pose(0.0, 0.0, 1.0)).map(line).collect()
 }
 
 #[test]
@@ -257,5 +241,5 @@ fn fixes_that_arrive_are_logged_and_the_last_correction_is_that_of_the_log() {
     assert_eq!((log.fixes.len(), log.faults.unreadable), (120, 1));
     logs.fixes = Fixes::new(log.on_radar(&config), &config);
     let (restarted, _) = follow(&mut logs.trajectory());
-    assert_eq!(bytes(restarted), bytes(correction));
+    assert_eq!(text(restarted), text(correction));
 }

@@ -40,9 +40,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
     let manifest = &launch.manifest;
     let topics = config.cut.topics(manifest.refines, manifest.window.slam);

@@ -1,85 +1,62 @@
 //! The configuration of a radar, before a run.
 
 use std::{
-    io::ErrorKind,
+    io::{self, ErrorKind},
     thread::sleep,
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{
-    Address, BadConfiguration, Configuration, Damage, Event, Message, Request, SweepAssembler,
-};
+use gyre_colossus::{Address, Configuration, Event, Message, Request, SweepAssembler};
 use gyre_radar::ScanLimits;
 use thiserror::Error;
 
 use crate::live_radar::{Settings, connection::RadarSocket};
 
-/// The longest wait for an answer.
 const MAX_WAIT: Duration = Duration::from_secs(5);
-/// Time between two polls for the answer.
 const POLL: Duration = Duration::from_millis(10);
 
-/// A radar that cannot be used.
+/// A radar that cannot be used: a sentence.
 #[derive(Debug, Error)]
-pub enum AskError {
-    #[error(
-        "no radar answers at {address} ({source}): check source.address, and that the radar is on and in reach"
-    )]
-    NoAnswer {
-        /// The address of the radar.
-        address: String,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    #[error(
-        "{address} sent no configuration of a radar within {} s: is it a Navtech radar, and has it less than three clients?",
-        MAX_WAIT.as_secs()
-    )]
-    NoConfiguration {
-        /// The address of the radar.
-        address: String,
-    },
-    #[error(
-        "nothing arrives at {address} within {} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network",
-        MAX_WAIT.as_secs()
-    )]
-    NoDatagrams {
-        /// The destination of the datagrams.
-        address: String,
-    },
-    #[error("what arrives at {address} are no scans: {source}")]
-    NoScans {
-        /// The destination of the datagrams.
-        address: String,
-        source: Damage,
-    },
-    #[error("the radar at {address} cannot be used: {source}")]
-    Unusable {
-        /// The address of the radar.
-        address: String,
-        source: BadConfiguration,
-    },
+#[error("{sentence}")]
+pub struct AskError {
+    sentence: String,
+    may_pass: bool,
 }
 
 impl AskError {
+    fn passing(sentence: String) -> Self {
+        Self {
+            sentence,
+            may_pass: true,
+        }
+    }
+
+    fn lasting(sentence: String) -> Self {
+        Self {
+            sentence,
+            may_pass: false,
+        }
+    }
+
+    fn no_answer(address: &str, error: &io::Error) -> Self {
+        let text = error.to_string();
+        let is_unknown_name = text.contains("lookup address") && !text.contains("emporary");
+        Self {
+            sentence: format!(
+                "no radar answers at {address} ({text}): check source.address, and that the radar is on and in reach"
+            ),
+            may_pass: !is_unknown_name && error.kind() != ErrorKind::InvalidInput,
+        }
+    }
+
     /// Returns whether the radar may answer later: it or its network is not there yet.
     pub fn may_pass(&self) -> bool {
-        match self {
-            Self::NoAnswer { source, .. } => {
-                let text = source.to_string();
-                let is_unknown_name = text.contains("lookup address") && !text.contains("emporary");
-                !is_unknown_name && source.kind() != ErrorKind::InvalidInput
-            }
-            Self::NoConfiguration { .. } | Self::NoDatagrams { .. } => true,
-            Self::NoScans { .. } | Self::Unusable { .. } => false,
-        }
+        self.may_pass
     }
 }
 
-/// The sizes of a radar's scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Time of a turn, ns.
     pub period_ns: i64,
     pub limits: ScanLimits,
 }
@@ -93,20 +70,16 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
             period_ns: configuration.period_ns(),
             limits: assembler.limits(),
         }),
-        Err(source) => Err(AskError::Unusable {
-            address: settings.address.to_string(),
-            source,
-        }),
+        Err(error) => Err(AskError::lasting(format!(
+            "the radar at {} cannot be used: {error}",
+            settings.address
+        ))),
     }
 }
 
-/// Waits for the radar's description of itself.
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let address = settings.address.to_string();
-    let no_answer = |source| AskError::NoAnswer {
-        address: address.clone(),
-        source,
-    };
+    let no_answer = |error| AskError::no_answer(&address, &error);
     // No azimuths: a recording that is played as a radar begins with the first request for them.
     let requests = [Request::RequestConfiguration];
     let mut radar = RadarSocket::open(&settings.address, &requests).map_err(no_answer)?;
@@ -129,30 +102,34 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
             }
         }
     }
+    let limit_s = MAX_WAIT.as_secs();
     Err(match (&settings.address, damage.filter(|_| !understood)) {
-        (_, Some(source)) => AskError::NoScans { address, source },
-        (Address::Tcp(_), None) => AskError::NoConfiguration { address },
-        (Address::Udp { .. }, None) => AskError::NoDatagrams { address },
+        (_, Some(damage)) => {
+            AskError::lasting(format!("what arrives at {address} are no scans: {damage}"))
+        }
+        (Address::Tcp(_), None) => AskError::passing(format!(
+            "{address} sent no configuration of a radar within {limit_s} s: is it a Navtech radar, and has it less than three clients?"
+        )),
+        (Address::Udp { .. }, None) => AskError::passing(format!(
+            "nothing arrives at {address} within {limit_s} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network"
+        )),
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io;
-
     use super::*;
 
     #[test]
     fn a_radar_that_is_not_there_yet_is_told_apart_from_a_wrong_name() {
         let lookup = |why| io::Error::other(format!("failed to lookup address information: {why}"));
-        for (source, may_pass) in [
+        for (error, may_pass) in [
             (ErrorKind::ConnectionRefused.into(), true),
             (lookup("Temporary failure in name resolution"), true),
             (lookup("Name or service not known"), false),
             (ErrorKind::InvalidInput.into(), false),
         ] {
-            let address = "radar:6317".to_owned();
-            let error = AskError::NoAnswer { address, source };
+            let error = AskError::no_answer("radar:6317", &error);
             assert_eq!(error.may_pass(), may_pass, "{error}");
         }
     }

@@ -9,25 +9,24 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Address, Request, write_request};
+use gyre_colossus::{Address, Datagrams, Event, Parser, Request, write_request};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, socket_with, sockopt};
 
-use crate::live_radar::{Settings, parser::RadarParser};
+use crate::live_radar::Settings;
 
-/// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Pauses between attempts to connect: the first pause, which doubles up to the second.
 const RETRY_PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
-/// Bytes of other messages, more than wait for a stage that was held up, after which a radar that
-/// sends no azimuths is left although it never falls silent.
-const OTHER_BYTES: usize = 16 << 20;
+const REQUESTS: [Request; 3] = [
+    Request::RequestConfiguration,
+    Request::StartFft,
+    Request::StartHealth,
+];
 /// Buffer for datagrams that are not read yet, as far as the system allows: one scan.
 const RECEIVE_BYTES: usize = 4 << 20;
 
-/// The result of reading from a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadResult {
-    /// Bytes were read, and are in the parser.
     Bytes,
     Opened,
     /// Nothing was read; try again after this time.
@@ -36,7 +35,6 @@ pub enum ReadResult {
     Closed(Duration),
 }
 
-/// A connection to a radar.
 #[derive(Debug)]
 pub struct Connection {
     address: Address,
@@ -44,27 +42,21 @@ pub struct Connection {
     socket: Option<RadarSocket>,
     /// The time of the last azimuth, or of the opening.
     last_azimuth: Instant,
-    /// Bytes received since then.
-    without_azimuth: usize,
     /// True from the first azimuth after the opening on.
-    receives_azimuths: bool,
+    pub receives_azimuths: bool,
     retry_at: Instant,
     pause: Duration,
-    /// The sender of the last datagram.
     from: Option<SocketAddr>,
     /// The only sender whose datagrams are taken.
     sender: Option<SocketAddr>,
     /// The address of the radar once it has sent a scan, kept while it is silent: another radar of
     /// the same group has another address.
     radar: Option<IpAddr>,
-    /// The number of connections so far.
     pub opened: u64,
-    /// The number of datagrams of other senders.
     pub foreign: u64,
 }
 
 impl Connection {
-    /// Creates a connection that is opened when it is first read from.
     pub fn new(settings: &Settings) -> Self {
         let now = Instant::now();
         Self {
@@ -72,7 +64,6 @@ impl Connection {
             silence: settings.silence,
             socket: None,
             last_azimuth: now,
-            without_azimuth: 0,
             receives_azimuths: false,
             retry_at: now,
             pause: RETRY_PAUSES[0],
@@ -84,7 +75,6 @@ impl Connection {
         }
     }
 
-    /// Returns the socket, while it is open.
     pub fn socket(&self) -> Option<BorrowedFd<'_>> {
         self.socket.as_ref().map(RadarSocket::as_fd)
     }
@@ -99,19 +89,14 @@ impl Connection {
                 self.from = from;
                 if !self.is_foreign() {
                     messages.filled(count);
-                    self.without_azimuth += count;
                 }
-                let floods = self.without_azimuth > OTHER_BYTES;
-                match floods && self.last_azimuth.elapsed() > self.silence {
-                    true => self.close_deaf(),
-                    false => ReadResult::Bytes,
-                }
+                ReadResult::Bytes
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => ReadResult::Bytes,
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
                 match self.silence.checked_sub(self.last_azimuth.elapsed()) {
                     Some(left) if !left.is_zero() => ReadResult::Nothing(left),
-                    _ => self.close_deaf(),
+                    _ => self.close(format!("it sent no azimuth for {:?}", self.silence)),
                 }
             }
             Err(error) => self.close(error),
@@ -122,13 +107,8 @@ impl Connection {
     /// without powers.
     pub fn note_azimuth(&mut self) {
         self.last_azimuth = Instant::now();
-        self.without_azimuth = 0;
         self.receives_azimuths = true;
         self.pause = RETRY_PAUSES[0];
-    }
-
-    pub fn receives_azimuths(&self) -> bool {
-        self.receives_azimuths
     }
 
     /// Takes from now on only datagrams of the sender of the last one.
@@ -151,8 +131,8 @@ impl Connection {
         let Some(from) = self.from else {
             return false;
         };
-        let is_other = self.sender.is_some_and(|sender| sender != from);
-        if !is_other && self.radar.is_none_or(|radar| radar == from.ip()) {
+        let is_known = self.sender.is_none_or(|sender| sender == from);
+        if is_known && self.radar.is_none_or(|radar| radar == from.ip()) {
             return false;
         }
         self.foreign += 1;
@@ -171,28 +151,17 @@ impl Connection {
         if !left.is_zero() {
             return ReadResult::Nothing(left);
         }
-        let requests = [
-            Request::RequestConfiguration,
-            Request::StartFft,
-            Request::StartHealth,
-        ];
-        match RadarSocket::open(&self.address, &requests) {
+        match RadarSocket::open(&self.address, &REQUESTS) {
             Ok(socket) => {
                 tracing::info!(address = %self.address, "connected to the radar");
                 self.socket = Some(socket);
                 self.last_azimuth = Instant::now();
-                self.without_azimuth = 0;
                 self.receives_azimuths = false;
                 self.opened += 1;
                 ReadResult::Opened
             }
             Err(error) => self.close(error),
         }
-    }
-
-    fn close_deaf(&mut self) -> ReadResult {
-        let silence = self.silence;
-        self.close(format_args!("it sent no azimuth for {silence:?}"))
     }
 
     /// Closes the connection, to be opened again after a pause.
@@ -223,11 +192,9 @@ impl Drop for Connection {
     }
 }
 
-/// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
 pub enum RadarSocket {
     Tcp(TcpStream),
-    /// A socket that receives datagrams.
     Udp(UdpSocket),
 }
 
@@ -299,4 +266,64 @@ fn connect(address: &str, requests: &[Request]) -> io::Result<TcpStream> {
         }
     }
     Err(last.unwrap_or_else(|| ErrorKind::AddrNotAvailable.into()))
+}
+
+/// Bytes to read of a stream at once: some ten azimuths.
+const CHUNK: usize = 1 << 16;
+
+#[derive(Debug)]
+pub enum RadarParser {
+    Stream(Parser),
+    Datagrams(Datagrams),
+}
+
+impl RadarParser {
+    pub fn space(&mut self) -> &mut [u8] {
+        match self {
+            Self::Stream(parser) => parser.space(CHUNK),
+            Self::Datagrams(parser) => parser.space(),
+        }
+    }
+
+    /// Adds the bytes that were read into the space, or the one datagram.
+    pub fn filled(&mut self, bytes: usize) {
+        match self {
+            Self::Stream(parser) => parser.filled(bytes),
+            Self::Datagrams(parser) => parser.filled(bytes),
+        }
+    }
+
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "a message borrows the parser"
+    )]
+    pub fn next(&mut self) -> Option<Event<'_>> {
+        match self {
+            Self::Stream(parser) => parser.next(),
+            Self::Datagrams(parser) => parser.next(),
+        }
+    }
+
+    /// Discards the radar's description that was returned last, and the datagram that has it.
+    pub fn refuse_description(&mut self) {
+        if let Self::Datagrams(parser) = self {
+            parser.refuse_description();
+        }
+    }
+
+    /// Returns whether a part of an azimuth has arrived in a datagram since the last call.
+    pub fn take_part(&mut self) -> bool {
+        match self {
+            Self::Stream(_) => false,
+            Self::Datagrams(parser) => parser.take_part(),
+        }
+    }
+
+    /// Returns the bytes of a stream since the last event: they grow while it is not Colossus.
+    pub fn skipped_bytes(&self) -> usize {
+        match self {
+            Self::Stream(parser) => parser.skipped_bytes(),
+            Self::Datagrams(_) => 0,
+        }
+    }
 }

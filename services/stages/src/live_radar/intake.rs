@@ -15,10 +15,8 @@ pub struct Intake {
     /// `None` until the radar has sent its configuration.
     scans: Option<ScanAssembly>,
     turns: TurnCounter,
-    /// The counts of the source process before this one, if it died.
-    before: Received,
-    missing: u64,
-    damaged: u64,
+    /// The counts since the start of the run, those of the turns and connections not included.
+    counts: Received,
     due_ns: Option<i64>,
 }
 
@@ -30,24 +28,16 @@ pub enum NoScans {
     #[error(
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]
-    TooLarge {
-        /// The bytes of a scan.
-        bytes: usize,
-        /// The bytes that the run has for a scan.
-        room: usize,
-    },
+    TooLarge { bytes: usize, room: usize },
 }
 
 impl Intake {
-    /// Creates an intake without a configuration.
     pub fn new(constants: Constants) -> Self {
         Self {
             constants,
             scans: None,
             turns: TurnCounter::resume(None, 0),
-            before: Received::default(),
-            missing: 0,
-            damaged: 0,
+            counts: Received::default(),
             due_ns: None,
         }
     }
@@ -67,7 +57,6 @@ impl Intake {
         Ok(true)
     }
 
-    /// Returns whether there is a configuration.
     pub fn is_configured(&self) -> bool {
         self.scans.is_some()
     }
@@ -89,19 +78,18 @@ impl Intake {
         let scans = self.scans.as_mut();
         let scan =
             scans.and_then(|scans| scans.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
-        if let Some(scan) = scan {
-            self.missing += scan.missing as u64;
-            self.due_ns = scan.due_ns;
+        if let Some((missing, due_ns)) = scan {
+            self.counts.missing_azimuths += missing as u64;
+            self.due_ns = due_ns;
         }
         scan.is_some()
     }
 
-    /// Counts a message that cannot be used.
     pub fn damaged(&mut self, reason: impl Display, skipped_bytes: usize) {
-        self.damaged += 1;
+        self.counts.damaged_messages += 1;
+        let so_far = self.counts.damaged_messages;
         // There may be thousands in a second.
-        if self.damaged.is_power_of_two() {
-            let so_far = self.damaged;
+        if so_far.is_power_of_two() {
             tracing::warn!(
                 skipped_bytes,
                 so_far,
@@ -124,18 +112,16 @@ impl Intake {
     /// Continues the counts of a source process that has died.
     pub fn resume(&mut self, before: Received) {
         self.turns = TurnCounter::resume(before.last_scan, before.scans_left_out);
-        self.before = before;
+        self.counts = before;
     }
 
     /// Returns the counts since the start of the run, connections not included.
     pub fn received(&self) -> Received {
         let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
         Received {
-            missing_azimuths: self.before.missing_azimuths + self.missing,
             scans_left_out: self.turns.left_out(is_open),
-            damaged_messages: self.before.damaged_messages + self.damaged,
             last_scan: self.turns.last(),
-            ..self.before
+            ..self.counts
         }
     }
 }

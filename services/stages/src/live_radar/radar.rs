@@ -2,7 +2,7 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_colossus::{Configuration, Event, Message};
+use gyre_colossus::{Configuration, Event, Health, HealthStatus, Message};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_stage::{
     StageError, clock,
@@ -11,9 +11,7 @@ use gyre_stage::{
 
 use crate::live_radar::{
     Intake, NoScans, Settings,
-    connection::{Connection, ReadResult},
-    health_log::HealthLog,
-    parser::RadarParser,
+    connection::{Connection, RadarParser, ReadResult},
 };
 
 /// The most reads between two checks for signals and new readers.
@@ -21,28 +19,23 @@ const MAX_READS: usize = 64;
 /// Bytes without a message after which the other end does not count as a radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;
 
-/// A radar on the network.
 pub struct Radar {
     settings: Settings,
     connection: Connection,
     messages: RadarParser,
     intake: Intake,
-    /// The counts of the source process before this one, if it died.
-    before: Counts,
     /// Descriptions of scans that do not fit into the run.
     refused: u64,
     health: HealthLog,
 }
 
 impl Radar {
-    /// Creates a radar that is connected to when it is first read.
     pub fn new(settings: Settings) -> Self {
         Self {
             connection: Connection::new(&settings),
             messages: settings.parser(),
             intake: Intake::new(settings.constants),
             settings,
-            before: Counts::default(),
             refused: 0,
             health: HealthLog::default(),
         }
@@ -154,16 +147,47 @@ impl Sensor for Radar {
 
     fn resume(&mut self, before: Counts) {
         self.intake.resume(before);
-        self.before = before;
     }
 
     fn received(&self) -> Counts {
-        let (before, connection) = (&self.before, &self.connection);
-        Counts {
-            foreign_messages: before.foreign_messages + connection.foreign + self.refused,
-            connections: before.connections + connection.opened,
-            is_receiving: connection.receives_azimuths(),
-            ..self.intake.received()
+        let mut counts = self.intake.received();
+        counts.foreign_messages += self.connection.foreign + self.refused;
+        counts.connections += self.connection.opened;
+        counts.is_receiving = self.connection.receives_azimuths;
+        counts
+    }
+}
+
+/// The radar's health in the log: each change is logged once.
+#[derive(Clone, Debug, Default)]
+struct HealthLog {
+    unhealthy: Vec<&'static str>,
+    is_silent: bool,
+}
+
+impl HealthLog {
+    /// Logs the readings that have become worse or better.
+    fn update(&mut self, health: &Health) {
+        for (name, reading) in health.readings() {
+            let (value, status) = (reading.value, reading.status);
+            let is_unhealthy = matches!(status, HealthStatus::Unhealthy | HealthStatus::Warning);
+            let logged = self.unhealthy.iter().position(|it| *it == name);
+            match (is_unhealthy, logged) {
+                (true, None) => {
+                    tracing::warn!("the radar says that its {name}, {value}, is {status}");
+                    self.unhealthy.push(name);
+                }
+                (false, Some(index)) => {
+                    tracing::info!("the radar says that its {name}, {value}, is {status} again");
+                    self.unhealthy.swap_remove(index);
+                }
+                _ => {}
+            }
         }
+        let is_silent = health.transmitting == Some(false);
+        if is_silent && !self.is_silent {
+            tracing::warn!("the radar says that it does not transmit: its scans have no echoes");
+        }
+        self.is_silent = is_silent;
     }
 }

@@ -48,11 +48,9 @@ impl ReadDelay {
         }
         self.scans += 1;
         let difference_ns = read_ns.saturating_sub(stamp_ns);
-        let smallest_ns = self.smallest_ns.into_iter().flatten().min();
-        let smallest_ns = smallest_ns.map_or(difference_ns, |it| it.min(difference_ns));
-        self.smallest_ns[1] = Some(
-            self.smallest_ns[1].map_or(difference_ns, |smallest_ns| smallest_ns.min(difference_ns)),
-        );
+        let smallest = |of: Option<i64>| of.map_or(difference_ns, |it| it.min(difference_ns));
+        let smallest_ns = smallest(self.smallest_ns.into_iter().flatten().min());
+        self.smallest_ns[1] = Some(smallest(self.smallest_ns[1]));
         let pace = self.pace()?;
         let is_alike = (pace - 1.0).abs() <= MAX_PACE_ERROR;
         is_alike.then(|| stamp_ns.saturating_add(smallest_ns))

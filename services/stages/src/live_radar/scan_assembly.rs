@@ -8,34 +8,20 @@ use gyre_colossus::{
 use gyre_messages::ScanHeader;
 use gyre_stage::{clock, source::LastScan};
 
-use crate::live_radar::{
-    read_delay::ReadDelay,
-    turn_counter::{AzimuthTime, TurnCounter},
-};
+use crate::live_radar::{read_delay::ReadDelay, turn_counter::TurnCounter};
 
 /// The most azimuths that are read at once. The buffers of sockets hold many more.
 const BATCH: f64 = 10.0;
 /// The part of the azimuths up to the end of a turn: the radar may turn faster than configured.
 const BATCH_SHARE: f64 = 0.5;
 
-/// Assembles the azimuths of one connection to scans.
 pub struct ScanAssembly {
     radar: Configuration,
     clock: RadarClock,
     assembler: SweepAssembler,
     delay: ReadDelay,
-    /// True once the kind of the clock is logged.
     is_clock_logged: bool,
-    /// True once it is logged that the delay of reception is not known.
     is_delay_logged: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CompleteScan {
-    /// The number of missing azimuths.
-    pub missing: usize,
-    /// The time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: unknown.
-    pub due_ns: Option<i64>,
 }
 
 impl ScanAssembly {
@@ -50,7 +36,6 @@ impl ScanAssembly {
         })
     }
 
-    /// Returns the bytes of a scan.
     pub fn bytes(&self) -> usize {
         self.assembler.limits().bytes
     }
@@ -60,7 +45,9 @@ impl ScanAssembly {
         self.assembler.is_open()
     }
 
-    /// Adds an azimuth with its time of arrival, ns since 1970; returns the completed scan.
+    /// Adds an azimuth with its time of arrival, ns since 1970. Returns, for a completed scan, its
+    /// missing azimuths and the time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns,
+    /// where that is known.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
@@ -68,18 +55,13 @@ impl ScanAssembly {
         turns: &mut TurnCounter,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Option<CompleteScan> {
+    ) -> Option<(usize, Option<i64>)> {
         let at_ns = clock::now_ns();
         let mut complete = None;
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
             let is_start = self.assembler.is_first(azimuth.encoder);
-            let time = AzimuthTime {
-                fraction: fraction.fract(),
-                stamp_ns,
-                at_ns,
-            };
-            turns.note(time, is_start);
+            turns.note(LastScan { stamp_ns, at_ns }, fraction.fract(), is_start);
             complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
             if complete.is_some() {
                 break;
@@ -99,10 +81,7 @@ impl ScanAssembly {
             stamp_ns: sweep.geometry.stamp_ns,
             at_ns,
         });
-        Some(CompleteScan {
-            missing: sweep.missing,
-            due_ns,
-        })
+        Some((sweep.missing, due_ns))
     }
 
     /// Returns when a scan was complete by its last azimuth's stamp, read at `at_ns`.
@@ -121,7 +100,6 @@ impl ScanAssembly {
         due_ns
     }
 
-    /// Logs once which clock the stamps are of.
     fn log_clock(&mut self) {
         if let (false, Some(found)) = (self.is_clock_logged, self.clock.found()) {
             self.is_clock_logged = true;
@@ -136,34 +114,25 @@ impl ScanAssembly {
 
     /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
     pub fn pause(&self) -> Option<Duration> {
-        match self.clock.found() {
-            // Stamps are the times of arrival: each azimuth is read when it arrives.
-            None | Some(FoundClock::Arrival) => return None,
-            Some(_) => {}
-        }
+        // Where stamps are the times of arrival, each azimuth is read when it arrives.
+        self.clock.found().filter(|it| *it != FoundClock::Arrival)?;
         let azimuths = (self.assembler.azimuths_left()? * BATCH_SHARE).min(BATCH);
         let per_azimuth_ns = self.radar.period_ns() as f64 / f64::from(self.radar.azimuth_samples);
         (azimuths >= 2.0).then(|| Duration::from_nanos((azimuths * per_azimuth_ns) as u64))
     }
 
-    /// Returns whether a configuration makes the same scans.
     pub fn is_of(&self, radar: &Configuration) -> bool {
-        is_same(&self.radar, radar)
+        let scans = |of: &Configuration| {
+            let counts = [
+                of.azimuth_samples,
+                of.range_in_bins,
+                of.encoder_size,
+                of.rotation_mhz,
+            ];
+            (counts, of.range_resolution_m().to_bits())
+        };
+        scans(&self.radar) == scans(radar)
     }
-}
-
-/// Returns whether two configurations make the same scans.
-fn is_same(one: &Configuration, other: &Configuration) -> bool {
-    let scans = |of: &Configuration| {
-        let counts = [
-            of.azimuth_samples,
-            of.range_in_bins,
-            of.encoder_size,
-            of.rotation_mhz,
-        ];
-        (counts, of.range_resolution_m().to_bits())
-    };
-    scans(one) == scans(other)
 }
 
 #[cfg(test)]
@@ -176,18 +145,6 @@ mod tests {
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
 
-    fn scans() -> ScanAssembly {
-        let radar = Configuration {
-            azimuth_samples: AZIMUTHS,
-            bin_size: 438,
-            range_in_bins: 16,
-            encoder_size: 5600,
-            rotation_mhz: 4000,
-            ..Configuration::default()
-        };
-        ScanAssembly::new(radar, Constants::default()).unwrap()
-    }
-
     /// The assembly of scans in the memory of one scan.
     struct Source {
         scans: ScanAssembly,
@@ -198,10 +155,18 @@ mod tests {
 
     impl Source {
         fn new() -> Self {
+            let radar = Configuration {
+                azimuth_samples: AZIMUTHS,
+                bin_size: 438,
+                range_in_bins: 16,
+                encoder_size: 5600,
+                rotation_mhz: 4000,
+                ..Configuration::default()
+            };
             let mut turns = TurnCounter::resume(None, 0);
             turns.configure(250_000_000);
             Self {
-                scans: scans(),
+                scans: ScanAssembly::new(radar, Constants::default()).unwrap(),
                 turns,
                 header: ScanHeader::default(),
                 bytes: vec![0; 400 * 16],
@@ -220,7 +185,7 @@ mod tests {
             };
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);
-            scan.map(|scan| scan.missing)
+            scan.map(|(missing, _)| missing)
         }
 
         /// Adds a turn, in whose middle the clock is set by `step_ns`.
@@ -266,17 +231,18 @@ mod tests {
 
     #[test]
     fn a_configuration_that_differs_in_unused_numbers_is_the_same() {
-        let radar = scans().radar;
+        let scans = Source::new().scans;
+        let radar = scans.radar;
         let unused = Configuration {
             range_gain: f32::NAN,
             packet_rate: 9,
             ..radar
         };
-        assert!(is_same(&radar, &unused));
+        assert!(scans.is_of(&unused));
         let other = Configuration {
             range_in_bins: 17,
             ..radar
         };
-        assert!(!is_same(&radar, &other));
+        assert!(!scans.is_of(&other));
     }
 }

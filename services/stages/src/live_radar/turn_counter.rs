@@ -11,17 +11,6 @@ const MIN_TURNS: f64 = 0.25;
 /// The weight of one more turn in the mean duration of a turn.
 const WEIGHT: f64 = 1.0 / 16.0;
 
-/// The angle and the times of an azimuth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AzimuthTime {
-    /// Part of the turn, from 0 to 1.
-    pub fraction: f64,
-    /// The time on the radar's clock, ns.
-    pub stamp_ns: i64,
-    /// The time of reading, `CLOCK_MONOTONIC`, ns.
-    pub at_ns: i64,
-}
-
 /// Counts the turns between scans by time, also across connections and restarts.
 ///
 /// The turn of the first azimuth is not counted if it had begun before that azimuth.
@@ -31,7 +20,8 @@ pub struct TurnCounter {
     turn_ns: f64,
     configured_ns: i64,
     last: Option<LastScan>,
-    newest: Option<AzimuthTime>,
+    /// The times of the newest azimuth, and its part of the turn, from 0 to 1.
+    newest: Option<(LastScan, f64)>,
     left_out: u64,
 }
 
@@ -47,7 +37,6 @@ impl TurnCounter {
         }
     }
 
-    /// Sets the configured duration of a turn.
     pub fn configure(&mut self, period_ns: i64) {
         if self.configured_ns != period_ns {
             self.configured_ns = period_ns;
@@ -55,15 +44,16 @@ impl TurnCounter {
         }
     }
 
-    /// Notes an azimuth. The first of all may be in a turn that began before.
-    pub fn note(&mut self, azimuth: AzimuthTime, is_start: bool) {
-        self.newest = Some(azimuth);
+    /// Notes an azimuth by its times and its part of the turn. The first of all may be in a turn
+    /// that began before.
+    pub fn note(&mut self, at: LastScan, fraction: f64, is_start: bool) {
+        self.newest = Some((at, fraction));
         if self.last.is_none() {
-            let turns = 0.5 - azimuth.fraction - if is_start { 1.0 } else { 0.0 };
+            let turns = 0.5 - fraction - if is_start { 1.0 } else { 0.0 };
             let ns = (turns * self.turn_ns) as i64;
             self.last = Some(LastScan {
-                stamp_ns: azimuth.stamp_ns.saturating_add(ns),
-                at_ns: azimuth.at_ns.saturating_add(ns),
+                stamp_ns: at.stamp_ns.saturating_add(ns),
+                at_ns: at.at_ns.saturating_add(ns),
             });
         }
     }
@@ -87,15 +77,11 @@ impl TurnCounter {
 
     /// Returns the turns without a scan; the newest does not count if it `is_open`.
     pub fn left_out(&self, is_open: bool) -> u64 {
-        let (Some(last), Some(newest)) = (self.last, self.newest) else {
+        let (Some(last), Some((here, fraction))) = (self.last, self.newest) else {
             return self.left_out;
         };
-        let here = LastScan {
-            stamp_ns: newest.stamp_ns,
-            at_ns: newest.at_ns,
-        };
         // Scans have the time of their middle.
-        let turns = (self.since(last, here) - newest.fraction + 0.5).round();
+        let turns = (self.since(last, here) - fraction + 0.5).round();
         let turns = if turns > 0.0 { turns as u64 } else { 0 };
         self.left_out + turns.saturating_sub(is_open.into())
     }
@@ -121,22 +107,21 @@ mod tests {
 
     const TURN_NS: i64 = 250_000_000;
 
-    /// The scan of a turn, by a radar whose clock is ahead by `set_ns`.
-    fn scan(turn: i64, set_ns: i64) -> LastScan {
-        let at_ns = turn * TURN_NS + TURN_NS / 2;
+    /// A time in a turn, by a radar whose clock is ahead by `set_ns`.
+    fn at(turn: i64, fraction: f64, set_ns: i64) -> LastScan {
+        let at_ns = turn * TURN_NS + (fraction * TURN_NS as f64) as i64;
         LastScan {
             stamp_ns: at_ns + set_ns,
             at_ns,
         }
     }
 
-    fn azimuth(turn: i64, fraction: f64) -> AzimuthTime {
-        let at_ns = turn * TURN_NS + (fraction * TURN_NS as f64) as i64;
-        AzimuthTime {
-            fraction,
-            stamp_ns: at_ns,
-            at_ns,
-        }
+    fn scan(turn: i64) -> LastScan {
+        at(turn, 0.5, 0)
+    }
+
+    fn note(turns: &mut TurnCounter, turn: i64, fraction: f64) {
+        turns.note(at(turn, fraction, 0), fraction, fraction == 0.0);
     }
 
     fn turns() -> TurnCounter {
@@ -148,48 +133,46 @@ mod tests {
     #[test]
     fn turns_without_a_scan_are_counted_whatever_their_number() {
         let mut turns = turns();
-        turns.note(azimuth(0, 0.0), true);
+        note(&mut turns, 0, 0.0);
         for (turn, left_out) in [(0, 0), (1, 0), (2, 0), (4, 1), (18, 14), (19, 14)] {
-            turns.note(azimuth(turn, 0.999), false);
-            turns.add(scan(turn, 0));
+            note(&mut turns, turn, 0.999);
+            turns.add(scan(turn));
             assert_eq!(turns.left_out(false), left_out, "turn {turn}");
         }
     }
 
     #[test]
     fn the_turn_in_which_a_stream_begins_counts_if_it_is_whole() {
-        let mut whole = turns();
-        whole.note(azimuth(0, 0.0), true);
-        whole.add(scan(1, 0));
-        assert_eq!(whole.left_out(true), 1);
-        let mut cut = turns();
-        cut.note(azimuth(0, 0.7), false);
-        cut.add(scan(1, 0));
-        assert_eq!(cut.left_out(true), 0);
+        for (fraction, left_out) in [(0.0, 1), (0.7, 0)] {
+            let mut turns = turns();
+            note(&mut turns, 0, fraction);
+            turns.add(scan(1));
+            assert_eq!(turns.left_out(true), left_out);
+        }
     }
 
     #[test]
     fn the_turn_of_the_newest_azimuth_is_left_out_once_it_cannot_be_completed() {
         let mut turns = turns();
-        turns.note(azimuth(0, 0.0), true);
-        turns.add(scan(0, 0));
+        note(&mut turns, 0, 0.0);
+        turns.add(scan(0));
         for fraction in [0.0, 0.5, 0.999] {
-            turns.note(azimuth(1, fraction), false);
+            note(&mut turns, 1, fraction);
             assert_eq!((turns.left_out(true), turns.left_out(false)), (0, 1));
         }
-        turns.note(azimuth(4, 0.3), false);
+        note(&mut turns, 4, 0.3);
         assert_eq!((turns.left_out(true), turns.left_out(false)), (3, 4));
-        turns.add(scan(4, 0));
+        turns.add(scan(4));
         assert_eq!(turns.left_out(false), 3);
     }
 
     #[test]
     fn a_source_goes_on_with_the_count_of_the_one_before() {
-        let mut turns = TurnCounter::resume(Some(scan(7, 0)), 3);
+        let mut turns = TurnCounter::resume(Some(scan(7)), 3);
         turns.configure(TURN_NS);
-        turns.note(azimuth(9, 0.6), false);
+        note(&mut turns, 9, 0.6);
         assert_eq!(turns.left_out(false), 5);
-        turns.add(scan(10, 0));
+        turns.add(scan(10));
         assert_eq!(turns.left_out(false), 5);
     }
 
@@ -197,12 +180,10 @@ mod tests {
     fn a_clock_that_is_set_loses_no_turn() {
         for set_ns in [-3_600_000_000_000, -700_000_000, 3_600_000_000_000] {
             let mut turns = turns();
-            turns.note(azimuth(0, 0.0), true);
+            note(&mut turns, 0, 0.0);
             for (turn, set_ns) in [(0, 0), (1, set_ns), (2, set_ns)] {
-                let end = azimuth(turn, 0.999);
-                let stamp_ns = end.stamp_ns + set_ns;
-                turns.note(AzimuthTime { stamp_ns, ..end }, false);
-                turns.add(scan(turn, set_ns));
+                turns.note(at(turn, 0.999, set_ns), 0.999, false);
+                turns.add(at(turn, 0.5, set_ns));
             }
             assert_eq!(turns.left_out(false), 0, "{set_ns}");
         }

@@ -1,9 +1,7 @@
-//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers,
-//! so no later stage sees a gap; the gaps in the source's own count are the dropped scans.
-//!
-//! After a start scans are processed in order until masking has caught up, and as many may wait as
-//! the window has room for: so a restart that is shorter than that drops none of those that came
-//! meanwhile.
+//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers;
+//! the gaps in the source's own count are the dropped scans. After a start scans are processed in
+//! order until masking has caught up, and as many may wait as the window has room for: so a restart
+//! that is shorter than that drops none of those that came meanwhile.
 
 use std::{collections::VecDeque, mem};
 
@@ -16,16 +14,16 @@ use gyre_stage::{
     reader::{Port, Received},
 };
 
+use crate::masking::lossless::Queue;
+
 /// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower
 /// than its scans never is, and would have the latency of those that wait for ever.
 const WINDOWS_IN_ORDER: usize = 8;
 
-/// The queue of masking in live mode.
 pub struct NewestOnly {
     port: Port<Scan>,
     /// The current scan and the ones received since; at the start, the history of the source.
     queue: VecDeque<Received<Scan>>,
-    /// The previous scan, if the mask takes two.
     previous: Option<Received<Scan>>,
     window: Window,
     /// The run, where the generation and its numbers begin together.
@@ -33,7 +31,6 @@ pub struct NewestOnly {
     chain: Option<Chain>,
     /// Scans that may still be processed in order after a start; 0: the newest scan alone.
     in_order: usize,
-    /// Samples of the scans that were dropped since the last one.
     dropped: Vec<Sample>,
 }
 
@@ -65,57 +62,6 @@ impl NewestOnly {
             chain: None,
             in_order: window.scans * WINDOWS_IN_ORDER,
             dropped: Vec::new(),
-        })
-    }
-
-    pub fn receive(&mut self) -> Result<(), StageError> {
-        while let Some(received) = self.port.receive()? {
-            if self
-                .chain
-                .is_some_and(|chain| chain.has_passed(received.item()))
-            {
-                continue;
-            }
-            self.queue.push_back(received);
-            if self.chain.is_some_and(|chain| !chain.repeats) {
-                self.drop_the_oldest();
-            }
-        }
-        let has_begun = self.chain.is_some_and(|chain| chain.published.is_some());
-        if has_begun && self.scans() <= 1 {
-            self.in_order = 0;
-        }
-        Ok(())
-    }
-
-    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the
-    /// last start of the sink, `newest_pose` the number of the newest pose now.
-    pub fn next_action(
-        &mut self,
-        resume_at: &Item,
-        newest_pose: Option<u64>,
-    ) -> Result<Action, StageError> {
-        let chain = match self.chain {
-            None => self.resume(resume_at)?,
-            chain => chain,
-        };
-        let Some(chain) = chain else {
-            return Ok(Action::Wait);
-        };
-        self.chain = Some(chain);
-        if !chain.repeats {
-            self.drop_the_oldest();
-        }
-        let Some(front) = self.queue.front() else {
-            return Ok(Action::Wait);
-        };
-        let item = chain.number(front.item());
-        Ok(match () {
-            // The end of the stream occupies a slot in every history like any item, so it waits for
-            // credit too.
-            () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
-            () if item.is(flag::END) => Action::End(item),
-            () => Action::Process(item, front.received_ns),
         })
     }
 
@@ -166,19 +112,70 @@ impl NewestOnly {
         }
     }
 
-    /// Returns the samples of the scans that were dropped since the last one.
-    pub fn take_dropped(&mut self) -> Vec<Sample> {
-        mem::take(&mut self.dropped)
-    }
-
     /// Returns the number of scans in the queue, without the end of the stream.
     fn scans(&self) -> usize {
         let is_end = |last: &Received<Scan>| last.item().is(flag::END);
         self.queue.len() - usize::from(self.queue.back().is_some_and(is_end))
     }
 
-    /// Advances to the next scan.
-    pub fn advance(&mut self) {
+    fn keep(&mut self, done: Option<Received<Scan>>) {
+        if self.window.masks_pairs() {
+            self.previous = done;
+        }
+    }
+}
+
+impl Queue for NewestOnly {
+    fn receive(&mut self) -> Result<(), StageError> {
+        while let Some(received) = self.port.receive()? {
+            if self
+                .chain
+                .is_some_and(|chain| chain.has_passed(received.item()))
+            {
+                continue;
+            }
+            self.queue.push_back(received);
+            if self.chain.is_some_and(|chain| !chain.repeats) {
+                self.drop_the_oldest();
+            }
+        }
+        let has_begun = self.chain.is_some_and(|chain| chain.published.is_some());
+        if has_begun && self.scans() <= 1 {
+            self.in_order = 0;
+        }
+        Ok(())
+    }
+
+    fn next_action(
+        &mut self,
+        resume_at: &Item,
+        newest_pose: Option<u64>,
+    ) -> Result<Action, StageError> {
+        let chain = match self.chain {
+            None => self.resume(resume_at)?,
+            chain => chain,
+        };
+        let Some(chain) = chain else {
+            return Ok(Action::Wait);
+        };
+        self.chain = Some(chain);
+        if !chain.repeats {
+            self.drop_the_oldest();
+        }
+        let Some(front) = self.queue.front() else {
+            return Ok(Action::Wait);
+        };
+        let item = chain.number(front.item());
+        Ok(match () {
+            // The end of the stream occupies a slot in every history like any item, so it waits for
+            // credit too.
+            () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
+            () if item.is(flag::END) => Action::End(item),
+            () => Action::Process(item, front.received_ns),
+        })
+    }
+
+    fn advance(&mut self) {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
             let (scan, published) = (done.item().scan, done.item().published);
@@ -197,19 +194,17 @@ impl NewestOnly {
         self.keep(done);
     }
 
-    /// Returns the current scan if one has been received.
-    pub fn current(&self) -> Option<&Received<Scan>> {
+    fn current(&self) -> Option<&Received<Scan>> {
         self.queue.front()
     }
 
-    /// Returns the listener that the source notifies.
-    pub fn listener(&self) -> &Listener {
+    fn listener(&self) -> &Listener {
         self.port.listener()
     }
 
-    /// Returns the previous scan; `None` at the start of a chain. The source may have lost it when
-    /// all stages were restarted; the current scan is then masked as at the start of a chain.
-    pub fn previous(&self) -> Option<&Received<Scan>> {
+    /// The source may have lost it when all stages were restarted; the current scan is then masked
+    /// as at the start of a chain.
+    fn previous(&self) -> Option<&Received<Scan>> {
         let item = self.chain?.number(self.queue.front()?.item());
         let expected = (!item.is(flag::BREAK)).then_some(item.previous_scan);
         self.previous
@@ -217,10 +212,8 @@ impl NewestOnly {
             .filter(|previous| Some(previous.item().scan) == expected)
     }
 
-    fn keep(&mut self, done: Option<Received<Scan>>) {
-        if self.window.masks_pairs() {
-            self.previous = done;
-        }
+    fn take_dropped(&mut self) -> Vec<Sample> {
+        mem::take(&mut self.dropped)
     }
 }
 
@@ -249,7 +242,6 @@ impl Chain {
         }
     }
 
-    /// Returns whether a scan has been processed or dropped already.
     fn has_passed(&self, item: &Item) -> bool {
         !item.is(flag::END)
             && self
@@ -257,7 +249,6 @@ impl Chain {
                 .is_some_and(|published| item.published <= published)
     }
 
-    /// Numbers a scan in the chain of motions.
     fn number(&self, item: &Item) -> Item {
         let is_continuous = |before_ns| continues(before_ns, item.stamp_ns);
         let previous_scan = self
@@ -302,17 +293,15 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_chain_repeats_the_scan_of_the_newest_pose_with_its_number() {
-        let item = Chain::resume(&scan(31), &newest_pose()).number(&scan(31));
-        assert_eq!(
-            (item.seq, item.scan, item.previous_scan, item.flags),
-            (9, 40, 37, 0)
-        );
-    }
-
-    #[test]
-    fn a_chain_without_its_last_scan_starts_again_with_the_next_number() {
-        let item = Chain::resume(&scan(35), &newest_pose()).number(&scan(35));
+    fn a_resumed_chain_repeats_the_scan_of_the_newest_pose_or_starts_again_with_the_next_number() {
+        let numbered = |published| {
+            let scan = scan(published);
+            Chain::resume(&scan, &newest_pose()).number(&scan)
+        };
+        let item = numbered(31);
+        let numbers = [item.seq, item.scan, item.previous_scan, item.flags.into()];
+        assert_eq!(numbers, [9, 40, 37, 0]);
+        let item = numbered(35);
         assert_eq!((item.seq, item.previous_scan), (10, item.scan));
         assert!(item.is(flag::BREAK));
     }
@@ -335,23 +324,14 @@ mod tests {
 
     #[test]
     fn scans_before_the_newest_pose_never_start_a_chain() {
-        assert!(
-            Chain::precedes(&scan(30), &newest_pose())
-                && !Chain::precedes(&scan(31), &newest_pose())
-        );
-        assert!(!Chain::precedes(
-            &scan(0),
-            &Item {
-                flags: flag::BASE,
-                ..newest_pose()
-            }
-        ));
-        assert!(!Chain::precedes(
-            &Item {
-                flags: flag::END,
-                ..scan(0)
-            },
-            &newest_pose()
-        ));
+        let flagged = |item, flags| Item { flags, ..item };
+        for (item, newest, precedes) in [
+            (scan(30), newest_pose(), true),
+            (scan(31), newest_pose(), false),
+            (scan(0), flagged(newest_pose(), flag::BASE), false),
+            (flagged(scan(0), flag::END), newest_pose(), false),
+        ] {
+            assert_eq!(Chain::precedes(&item, &newest), precedes, "{item:?}");
+        }
     }
 }

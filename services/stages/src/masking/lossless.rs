@@ -1,13 +1,46 @@
-//! Lossless mode: every scan, in order.
+//! The queue of masking, and lossless mode: every scan, in order.
 
 use gyre_messages::{Item, Scan, Window, flag};
+use gyre_samples::Sample;
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::Action,
     reader::{Reader, Received},
 };
 
-/// The queue of masking in lossless mode.
+/// The queue in lossless or in live mode.
+pub trait Queue {
+    fn receive(&mut self) -> Result<(), StageError>;
+
+    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the
+    /// last start of the sink, `newest_pose` the number of the newest pose now.
+    fn next_action(
+        &mut self,
+        resume_at: &Item,
+        newest_pose: Option<u64>,
+    ) -> Result<Action, StageError>;
+
+    fn current(&self) -> Option<&Received<Scan>>;
+
+    /// Returns the previous scan, if the mask takes two and the chain is unbroken.
+    fn previous(&self) -> Option<&Received<Scan>>;
+
+    fn advance(&mut self);
+
+    /// Returns the listener that the source notifies.
+    fn listener(&self) -> &Listener;
+
+    /// Returns the number of scans that were skipped because they had been received before.
+    fn duplicates(&self) -> u64 {
+        0
+    }
+
+    /// Takes the samples of the scans that were dropped since the last call.
+    fn take_dropped(&mut self) -> Vec<Sample> {
+        Vec::new()
+    }
+}
+
 pub struct InOrder {
     reader: Reader<Scan>,
     window: Window,
@@ -24,14 +57,14 @@ impl InOrder {
             started: false,
         })
     }
+}
 
-    pub fn receive(&mut self) -> Result<(), StageError> {
+impl Queue for InOrder {
+    fn receive(&mut self) -> Result<(), StageError> {
         self.reader.head().map(drop)
     }
 
-    /// Returns what to do with the current scan when `newest_pose` is the number of the newest
-    /// pose.
-    pub fn next_action(&mut self, newest_pose: Option<u64>) -> Result<Action, StageError> {
+    fn next_action(&mut self, _: &Item, newest_pose: Option<u64>) -> Result<Action, StageError> {
         let Some(head) = self.reader.head()? else {
             return Ok(Action::Wait);
         };
@@ -48,32 +81,27 @@ impl InOrder {
         Ok(Action::Process(item, received_ns))
     }
 
-    /// Returns the current scan if one has been received.
-    pub fn current(&self) -> Option<&Received<Scan>> {
+    fn current(&self) -> Option<&Received<Scan>> {
         self.reader.current()
     }
 
-    /// Returns the previous scan, if the mask takes two and the chain is unbroken.
-    pub fn previous(&self) -> Option<&Received<Scan>> {
+    fn previous(&self) -> Option<&Received<Scan>> {
         self.reader.previous()
     }
 
-    /// Advances to the next scan.
-    pub fn advance(&mut self) {
+    fn advance(&mut self) {
         match self.window.masks_pairs() {
             true => self.reader.advance(),
             false => self.reader.release(),
         }
     }
 
-    /// Returns the listener that the source notifies.
-    pub fn listener(&self) -> &Listener {
+    fn listener(&self) -> &Listener {
         self.reader.listener()
     }
 
-    /// Returns the number of scans that were skipped because they had been received before.
-    pub fn duplicates(&self) -> u64 {
-        self.reader.duplicates()
+    fn duplicates(&self) -> u64 {
+        self.reader.duplicates
     }
 }
 
@@ -96,33 +124,22 @@ mod tests {
     use super::*;
 
     fn scan(seq: u64) -> Item {
-        Item {
-            seq,
-            ..Item::default()
-        }
+        Item::numbered(seq)
     }
 
     #[test]
     fn a_restart_begins_with_the_newest_poses_scan_or_the_previous_one_if_masks_take_two() {
         let window = |look_back| Window {
             scans: 4,
-            lag: 2,
             look_back,
-            live_depth: 0,
-            observers: 0,
-            slam: false,
-            localises: false,
-            objects: false,
+            ..Window::default()
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)
         };
         assert!(kept(1, 8, false) && !kept(1, 9, false));
         assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
-        let first = Item {
-            flags: flag::BREAK,
-            ..scan(0)
-        };
+        let first = scan(0).flagged(flag::BREAK);
         assert!(!serves_only_as_previous(&window(2), &first, None, false));
     }
 }

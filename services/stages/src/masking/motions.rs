@@ -1,28 +1,26 @@
-//! The motions for motion compensation, by sequence number.
-//!
-//! Masking receives a motion twice: from the search, and with its journalled pose. It uses the
-//! first one, so both must be equal. Therefore only the searched motion is used, which refinement
-//! passes on unchanged. After a restart the motions up to the newest pose come from the journal;
-//! the search finds later ones again.
+//! The motions for motion compensation, by sequence number. Masking receives a motion twice: from
+//! the search, and with its journalled pose. So only the searched motion is used, which refinement
+//! passes on unchanged. After a restart the motions up to the newest pose come from the journal.
 
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 
-use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
+use gyre_geometry::Twist;
+use gyre_messages::{Item, Motion, MotionEstimate, Pose, flag};
 use gyre_radar::LostAzimuths;
 use gyre_stage::{Launch, Listener, StageError, reader::Port};
 
 /// Number of motions kept: more than any window and lag need.
 const KEPT: usize = 256;
 
-/// The known motions, and the newest pose.
 pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
     known: KnownMotions,
-    /// Where azimuths of scans with poses were lost, by number; the oldest are dropped.
-    lost: VecDeque<(u64, LostAzimuths)>,
-    resume_at: Option<Item>,
-    newest_pose: Option<u64>,
+    /// Where azimuths of scans with poses were lost, by number.
+    lost: BTreeMap<u64, LostAzimuths>,
+    /// The item of the newest pose as the sink reported it.
+    pub resume_at: Option<Item>,
+    pub newest_pose: Option<u64>,
 }
 
 impl Motions {
@@ -31,17 +29,16 @@ impl Motions {
             motions: Port::open(launch)?,
             poses: Port::open(launch)?,
             known: KnownMotions::default(),
-            lost: VecDeque::new(),
+            lost: BTreeMap::new(),
             resume_at: None,
             newest_pose: None,
         })
     }
 
-    /// Receives the new motions and poses.
     pub fn update(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.motions.receive()? {
             self.known
-                .receive(received.item(), received.header().motion.searched());
+                .receive(received.item(), &received.header().motion);
         }
         while let Some(received) = self.poses.receive()? {
             let item = *received.item();
@@ -49,13 +46,10 @@ impl Motions {
                 continue;
             }
             if !item.is(flag::BASE) {
-                self.known
-                    .receive(&item, received.header().motion.searched());
+                self.known.receive(&item, &received.header().motion);
                 self.newest_pose = self.newest_pose.max(Some(item.seq));
-                self.lost.push_back((item.seq, item.lost_azimuths()));
-                if self.lost.len() > KEPT {
-                    self.lost.pop_front();
-                }
+                self.lost.insert(item.seq, item.lost_azimuths());
+                drop_the_oldest(&mut self.lost);
             }
             if item.is(flag::SYNC) {
                 self.resume_at = Some(item);
@@ -69,26 +63,15 @@ impl Motions {
         self.known.insert(seq, None);
     }
 
-    /// Returns the motion of the item `lag` items before item `seq`: `None` while it is unknown,
+    /// Returns the velocity of the item `lag` items before item `seq`: `None` while it is unknown,
     /// `Some(None)` if the chain starts there or later.
-    pub fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
+    pub fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
         self.known.before(seq, lag)
     }
 
     /// Returns where azimuths of an item were lost, if it has a pose.
     pub fn lost(&self, seq: u64) -> Option<LostAzimuths> {
-        let known = self.lost.iter().rev().find(|(known, _)| *known == seq);
-        known.map(|(_, lost)| *lost)
-    }
-
-    /// Returns the item of the newest pose as the sink reported it; `None` before the first report.
-    pub fn resume_at(&self) -> Option<&Item> {
-        self.resume_at.as_ref()
-    }
-
-    /// Returns the number of the newest pose; `None` before the first.
-    pub fn newest_pose(&self) -> Option<u64> {
-        self.newest_pose
+        self.lost.get(&seq).copied()
     }
 
     pub fn listeners(&self) -> [&Listener; 2] {
@@ -96,31 +79,30 @@ impl Motions {
     }
 }
 
-/// Motions in order of their numbers; the oldest are dropped.
+fn drop_the_oldest<T>(known: &mut BTreeMap<u64, T>) {
+    if known.len() > KEPT {
+        known.pop_first();
+    }
+}
+
+/// The velocities of motions by their numbers; `None` where the chain starts.
 #[derive(Default)]
-struct KnownMotions(VecDeque<(u64, Option<SearchedMotion>)>);
+struct KnownMotions(BTreeMap<u64, Option<Twist>>);
 
 impl KnownMotions {
-    fn receive(&mut self, item: &Item, motion: SearchedMotion) {
+    fn receive(&mut self, item: &Item, motion: &MotionEstimate) {
         if !item.is(flag::END) {
-            // Where the chain starts there is no motion.
-            self.insert(item.seq, (!item.is(flag::BREAK)).then_some(motion));
+            let starts = item.is(flag::BREAK);
+            self.insert(item.seq, (!starts).then(|| motion.searched_twist()));
         }
     }
 
-    fn insert(&mut self, seq: u64, motion: Option<SearchedMotion>) {
-        if self.of(seq).is_some() {
-            return;
-        }
-        let place = self.0.partition_point(|(known, _)| *known < seq);
-        self.0.insert(place, (seq, motion));
-        if self.0.len() > KEPT {
-            self.0.pop_front();
-        }
+    fn insert(&mut self, seq: u64, twist: Option<Twist>) {
+        self.0.entry(seq).or_insert(twist);
+        drop_the_oldest(&mut self.0);
     }
 
-    /// See [`Motions::before`].
-    fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
+    fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
         let Some(first) = seq.checked_sub(lag) else {
             return Some(None);
         };
@@ -130,16 +112,13 @@ impl KnownMotions {
         }
     }
 
-    fn of(&self, seq: u64) -> Option<Option<SearchedMotion>> {
-        let known = self.0.iter().rev().find(|(known, _)| *known == seq);
-        known.map(|(_, motion)| *motion)
+    fn of(&self, seq: u64) -> Option<Option<Twist>> {
+        self.0.get(&seq).copied()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::MotionEstimate;
-
     use super::*;
 
     /// A motion with 1.5 m forward as the result of the search, refined to `x_m`.
@@ -153,23 +132,18 @@ mod tests {
     }
 
     fn item(seq: u64, flags: u32) -> Item {
-        Item {
-            seq,
-            flags,
-            ..Item::default()
-        }
+        Item::numbered(seq).flagged(flags)
     }
 
     #[test]
     fn a_motion_is_the_searched_one_whether_it_is_received_from_the_search_or_with_its_pose() {
-        let searched = refined_to(1.5).searched();
+        let searched = refined_to(1.5).searched_twist();
         for order in [[1.5, 1.75], [1.75, 1.5]] {
             let mut known = KnownMotions::default();
             for x_m in order {
-                known.receive(&item(7, 0), refined_to(x_m).searched());
+                known.receive(&item(7, 0), &refined_to(x_m));
             }
-            assert_eq!(known.of(7), Some(Some(searched)));
-            assert_eq!(known.of(8), None);
+            assert_eq!((known.of(7), known.of(8)), (Some(Some(searched)), None));
         }
     }
 
@@ -178,7 +152,7 @@ mod tests {
         let mut known = KnownMotions::default();
         for seq in 0..KEPT as u64 + 3 {
             let flags = if seq == 5 { flag::BREAK } else { 0 };
-            known.receive(&item(seq, flags), refined_to(1.5).searched());
+            known.receive(&item(seq, flags), &refined_to(1.5));
         }
         assert_eq!((known.of(2), known.of(5)), (None, Some(None)));
         assert_eq!(known.0.len(), KEPT);
@@ -187,21 +161,12 @@ mod tests {
     #[test]
     fn no_motion_of_an_earlier_chain_is_used() {
         let mut known = KnownMotions::default();
-        (0..10).for_each(|seq| known.receive(&item(seq, 0), refined_to(1.5).searched()));
-        let searched = Some(refined_to(1.5).searched());
-        assert_eq!(
-            (known.before(9, 2), known.before(10, 2)),
-            (Some(searched), Some(searched))
-        );
+        (0..10).for_each(|seq| known.receive(&item(seq, 0), &refined_to(1.5)));
+        let searched = Some(Some(refined_to(1.5).searched_twist()));
+        assert_eq!([9, 10].map(|seq| known.before(seq, 2)), [searched; 2]);
         known.insert(10, None);
-        assert_eq!(
-            (known.before(10, 2), known.before(11, 2)),
-            (Some(None), Some(None))
-        );
-        assert_eq!(
-            (known.before(12, 2), known.before(13, 2)),
-            (Some(None), None)
-        );
+        let expected = [Some(None), Some(None), Some(None), None];
+        assert_eq!([10, 11, 12, 13].map(|seq| known.before(seq, 2)), expected);
         assert_eq!(known.before(1, 2), Some(None), "before the first");
     }
 }

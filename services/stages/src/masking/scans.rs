@@ -1,7 +1,7 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
 use gyre_geometry::Twist;
-use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
+use gyre_messages::{Item, Scan, Window, flag};
 use gyre_radar::LostAzimuths;
 use gyre_samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
 use gyre_stage::{
@@ -10,26 +10,23 @@ use gyre_stage::{
     reader::Received,
 };
 
-use crate::masking::{live::NewestOnly, lossless::InOrder, motions::Motions};
+use crate::masking::{
+    live::NewestOnly,
+    lossless::{InOrder, Queue},
+    motions::Motions,
+};
 
-/// The scans, in lossless or in live mode, and the motions.
 pub struct Scans {
-    queue: Queue,
+    queue: Box<dyn Queue>,
     motions: Motions,
     gyro: Gyro,
     wheels: Wheels,
-    /// The scan whose samples it has taken last.
     sampled: Option<u64>,
     window: Window,
-    /// The motions for the current and for the previous scan.
-    found: [Option<SearchedMotion>; 2],
+    /// The velocities for the current and for the previous scan.
+    found: [Option<Twist>; 2],
     /// Where azimuths of both were lost, if they have poses.
     lost: [Option<LostAzimuths>; 2],
-}
-
-enum Queue {
-    Lossless(Box<InOrder>),
-    Live(Box<NewestOnly>),
 }
 
 pub struct ScanView<'a> {
@@ -37,9 +34,8 @@ pub struct ScanView<'a> {
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
-    /// The turn since the scan before by the gyro.
+    /// The turn and the distance since the scan before.
     pub turn: Option<GyroTurn>,
-    /// The distance since the scan before by the wheels.
     pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
     pub lost: Option<LostAzimuths>,
@@ -47,12 +43,9 @@ pub struct ScanView<'a> {
     pub previous: Option<PreviousScan<'a>>,
 }
 
-/// The scan before the one to mask.
 pub struct PreviousScan<'a> {
     pub scan: &'a Received<Scan>,
-    /// The velocity used for motion compensation.
     pub twist: Option<Twist>,
-    /// Where its azimuths were lost, if it has a pose.
     pub lost: Option<LostAzimuths>,
 }
 
@@ -61,9 +54,9 @@ impl Inputs for Scans {
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
         let motions = Motions::open(launch)?;
-        let queue = match launch.manifest.live {
-            false => Queue::Lossless(Box::new(InOrder::open(launch)?)),
-            true => Queue::Live(Box::new(NewestOnly::open(launch)?)),
+        let queue: Box<dyn Queue> = match launch.manifest.live {
+            false => Box::new(InOrder::open(launch)?),
+            true => Box::new(NewestOnly::open(launch)?),
         };
         Ok(Self {
             queue,
@@ -78,54 +71,36 @@ impl Inputs for Scans {
     }
 
     fn next_action(&mut self) -> Result<Action, StageError> {
-        match &mut self.queue {
-            Queue::Lossless(queue) => queue.receive()?,
-            Queue::Live(queue) => queue.receive()?,
-        }
+        self.queue.receive()?;
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
         // resumes.
-        let Some(resume_at) = self.motions.resume_at().copied() else {
+        let Some(resume_at) = self.motions.resume_at else {
             return Ok(Action::Wait);
         };
-        let newest_pose = self.motions.newest_pose();
-        let action = match &mut self.queue {
-            Queue::Lossless(queue) => queue.next_action(newest_pose)?,
-            Queue::Live(queue) => queue.next_action(&resume_at, newest_pose)?,
-        };
+        let newest_pose = self.motions.newest_pose;
+        let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
-            Action::Process(item, _) if !self.find_motions(&item) => Ok(Action::Wait),
-            Action::Process(item, _) => {
-                self.take_samples(item.is(flag::BREAK))?;
-                Ok(action)
-            }
-            Action::Keep => {
-                self.take_samples(false)?;
-                Ok(action)
-            }
-            action => Ok(action),
+            Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
+            Action::Process(item, _) => self.take_samples(item.is(flag::BREAK))?,
+            Action::Keep => self.take_samples(false)?,
+            _ => {}
         }
+        Ok(action)
     }
 
     fn view(&self) -> Option<ScanView<'_>> {
-        let (scan, previous) = match &self.queue {
-            Queue::Lossless(queue) => (queue.current(), queue.previous()),
-            Queue::Live(queue) => (queue.current(), queue.previous()),
-        };
         let [motion, previous_motion] = self.found;
         let [previous_rate, rate] = self.gyro.sweep_rates_radps();
-        let twist = |motion: Option<SearchedMotion>, rate| {
-            with_yaw_rate(motion.map(|motion| motion.twist()), rate)
-        };
         let [lost, previous_lost] = self.lost;
-        let previous = previous.map(|scan| PreviousScan {
+        let previous = self.queue.previous().map(|scan| PreviousScan {
             scan,
-            twist: twist(previous_motion, previous_rate),
+            twist: with_yaw_rate(previous_motion, previous_rate),
             lost: previous_lost,
         });
         Some(ScanView {
-            scan: scan?,
-            twist: twist(motion, rate),
+            scan: self.queue.current()?,
+            twist: with_yaw_rate(motion, rate),
             turn: self.gyro.turn(),
             distance: self.wheels.distance(),
             lost,
@@ -134,19 +109,13 @@ impl Inputs for Scans {
     }
 
     fn advance(&mut self) {
-        match &mut self.queue {
-            Queue::Lossless(queue) => queue.advance(),
-            Queue::Live(queue) => queue.advance(),
-        }
+        self.queue.advance();
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        let (scans, lacks_scan) = match &self.queue {
-            Queue::Lossless(queue) => (queue.listener(), queue.current().is_none()),
-            Queue::Live(queue) => (queue.listener(), queue.current().is_none()),
-        };
+        let scans = self.queue.listener();
         // Motions and poses are read when a scan comes.
-        if lacks_scan && self.motions.resume_at().is_some() {
+        if self.queue.current().is_none() && self.motions.resume_at.is_some() {
             return vec![scans];
         }
         let [motions, poses] = self.motions.listeners();
@@ -154,10 +123,7 @@ impl Inputs for Scans {
     }
 
     fn duplicates(&self) -> u64 {
-        match &self.queue {
-            Queue::Lossless(queue) => queue.duplicates(),
-            Queue::Live(_) => 0,
-        }
+        self.queue.duplicates()
     }
 }
 
@@ -183,13 +149,8 @@ impl Scans {
     /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
     /// since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
-        let (scans, dropped) = match &mut self.queue {
-            Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),
-            Queue::Live(queue) => {
-                let dropped = queue.take_dropped();
-                ([queue.previous(), queue.current()], dropped)
-            }
-        };
+        let dropped = self.queue.take_dropped();
+        let scans = [self.queue.previous(), self.queue.current()];
         let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
         let [previous, current] = scans.map(|scan| scan.filter(is_new));
         let Some(current) = current else {
@@ -217,7 +178,7 @@ impl Scans {
         Ok(())
     }
 
-    fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+    fn motion_for(&self, seq: u64) -> Option<Option<Twist>> {
         match self.window.lag {
             0 => Some(None),
             lag => self.motions.before(seq, lag as u64),

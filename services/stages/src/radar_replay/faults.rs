@@ -6,7 +6,6 @@ use gyre_run::{PlayedFault, PlayedFaultKind};
 use gyre_samples::{Sample, SampleKind};
 use gyre_stage::StageError;
 
-/// The faults of a turn of a recording.
 #[derive(Clone, Debug)]
 pub struct Faults {
     faults: Vec<PlayedFault>,
@@ -15,7 +14,6 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Faults of a turn whose first scan has this stamp.
     pub fn of(faults: Vec<PlayedFault>, first_ns: Option<i64>) -> Result<Self, StageError> {
         match (first_ns, faults.is_empty()) {
             (None, false) => Err(StageError::Input(
@@ -29,7 +27,6 @@ impl Faults {
         }
     }
 
-    /// Puts them into the samples of logs.
     pub fn put_into(&self, samples: ScanSamples) -> Result<ScanSamples, StageError> {
         let is_of_samples = |fault: &PlayedFault| fault.kind != PlayedFaultKind::RadarBlind;
         if !self.faults.iter().any(is_of_samples) {

@@ -14,7 +14,6 @@ use gyre_datasets::{Dataset, FileList, Format};
 /// The file in the run's root: the name of the format, then the paths, each with a NUL behind it.
 const FILE: &str = "recording.list";
 
-/// The format and the files of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listing {
     pub format: Format,
@@ -22,7 +21,6 @@ pub struct Listing {
 }
 
 impl Listing {
-    /// Returns the listing of an open dataset.
     pub fn of(dataset: &dyn Dataset) -> Self {
         Self {
             format: dataset.format(),
@@ -30,7 +28,6 @@ impl Listing {
         }
     }
 
-    /// Writes it into the root of a run.
     pub fn write(&self, root: &Path) -> io::Result<()> {
         let format = self.format.name().as_bytes();
         fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))

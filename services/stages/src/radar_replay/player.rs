@@ -18,7 +18,6 @@ pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
     run_player(launch, &mut player)
 }
 
-/// The messages of a recording that a run plays.
 pub struct Player {
     recording: Recording,
     topics: Vec<&'static str>,
@@ -67,7 +66,6 @@ impl Player {
         })
     }
 
-    /// See [`Recording::damage`].
     pub fn damage(&self) -> Option<String> {
         self.recording.damage()
     }

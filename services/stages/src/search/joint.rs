@@ -12,12 +12,11 @@ use gyre_stage::{
     writer::Draft,
 };
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;
     let search = ExhaustiveSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(|error| StageError::Configuration(error.to_string()))?;
+        .map_err(StageError::configuration)?;
     stage::run(launch, &mut JointStage { search })
 }
 

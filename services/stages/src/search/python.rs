@@ -93,13 +93,13 @@ fn call<const N: usize>(
 ) -> Result<[f64; N], StageError> {
     let returned = function
         .call(arguments)
-        .map_err(|error| StageError::Function(error.to_string()))?;
+        .map_err(|error| StageError::Transient(error.to_string()))?;
     let values = match returned {
         Returned::Values(values) => values,
         Returned::Factors(..) => Vec::new(),
     };
     let count = values.len();
     <[f64; N]>::try_from(values).map_err(|_| {
-        StageError::Function(format!("the search returned {count} numbers: expected {N}"))
+        StageError::Transient(format!("the search returned {count} numbers: expected {N}"))
     })
 }

@@ -15,12 +15,11 @@ use gyre_stage::{
 pub type Search =
     Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
-    let mut rotation = SequentialRotation::new(raster.n, &config)
-        .map_err(|error| StageError::Configuration(error.to_string()))?;
+    let mut rotation =
+        SequentialRotation::new(raster.n, &config).map_err(StageError::configuration)?;
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
         let turn = input.current.header().turn().map(|turn| turn.yaw_rad);

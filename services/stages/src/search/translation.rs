@@ -17,12 +17,11 @@ pub type Search = Box<
     dyn FnMut(&PairView<'_, Masked>, &RotationMatch) -> Result<Option<MotionMatch>, StageError>,
 >;
 
-/// Runs the stage until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;
     let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(|error| StageError::Configuration(error.to_string()))?;
+        .map_err(StageError::configuration)?;
     let search = move |input: &PairView<'_, Masked>, rotation: &RotationMatch| {
         let pair = input.rasters()?;
         pair.earlier

@@ -2,67 +2,43 @@
 
 use crate::refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 
-/// The basis of a motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Basis {
-    /// Two scans: there is no refinement, or the chain starts here.
-    ScanToScan,
-    /// The map alone: there is no gyro, no wheels and no Doppler, or they are not used.
-    RadarOnly,
-    /// The map, and a gyro, wheels or Doppler that do not contradict it.
-    RadarAndOthers,
-    /// Walls without structure, and wheels or Doppler for the way along them.
-    AlongWalls,
-    /// As above without these sensors: the displacement comes from the motions before.
-    WayGuessed,
-    /// Wheels or Doppler, since nothing matches: with the turn of a gyro, if there is one.
-    DeadReckoning,
-    /// The motions before, since nothing matches and there are no wheels and no Doppler: with the
-    /// turn of a gyro, if there is one.
-    Guessed,
+crate::named! {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Basis {
+        /// Two scans: there is no refinement, or the chain starts here.
+        ScanToScan = "scan to scan",
+        /// The map alone: there is no gyro, no wheels and no Doppler, or they are not used.
+        RadarOnly = "radar only",
+        /// The map, and a gyro, wheels or Doppler that do not contradict it.
+        RadarAndOthers = "radar and others",
+        /// Walls without structure, and wheels or Doppler for the way along them.
+        AlongWalls = "along walls",
+        /// As above without these sensors: the displacement comes from the motions before.
+        WayGuessed = "way guessed",
+        /// Wheels or Doppler, since nothing matches: with the turn of a gyro, if there is one.
+        DeadReckoning = "dead reckoning",
+        /// The motions before, since nothing matches and there are no wheels and no Doppler: with
+        /// the turn of a gyro, if there is one.
+        Guessed = "guessed",
+    }
 }
 
 impl Basis {
-    pub const ALL: [Self; 7] = [
-        Self::ScanToScan,
-        Self::RadarOnly,
-        Self::RadarAndOthers,
-        Self::AlongWalls,
-        Self::WayGuessed,
-        Self::DeadReckoning,
-        Self::Guessed,
-    ];
-
-    /// Returns its name in words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ScanToScan => "scan to scan",
-            Self::RadarOnly => "radar only",
-            Self::RadarAndOthers => "radar and others",
-            Self::AlongWalls => "along walls",
-            Self::WayGuessed => "way guessed",
-            Self::DeadReckoning => "dead reckoning",
-            Self::Guessed => "guessed",
-        }
-    }
-
     /// Returns whether the radar leaves part of the motion undetermined, so that other sensors or
     /// the motions before determine it.
     pub fn is_degraded(self) -> bool {
-        match self {
-            Self::ScanToScan | Self::RadarOnly | Self::RadarAndOthers => false,
-            Self::AlongWalls | Self::WayGuessed | Self::DeadReckoning | Self::Guessed => true,
-        }
+        !matches!(
+            self,
+            Self::ScanToScan | Self::RadarOnly | Self::RadarAndOthers
+        )
     }
 }
 
 impl RefinementRecord {
-    /// Returns whether the motion is made with the turn of the gyro.
     pub fn uses_gyro(&self) -> bool {
         [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
     }
 
-    /// Returns the basis of the motion.
     pub fn basis(&self) -> Basis {
         let by_distance = self.wheels == wheels::USED || self.doppler == doppler::USED;
         match self.outcome {
@@ -79,10 +55,9 @@ impl RefinementRecord {
     }
 }
 
-/// Counts of motions by their basis, and by the part of gyro, wheels and Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct WitnessCounts {
-    /// Motions by their basis, in the order of [`Basis::ALL`].
+    /// In the order of [`Basis::ALL`].
     pub by_basis: [u64; Basis::ALL.len()],
     /// Those whose turn the gyro has measured, and which were made with it.
     pub gyro_used: u64,
@@ -92,9 +67,7 @@ pub struct WitnessCounts {
     pub wheels_used: u64,
     /// Those whose distance they have measured slipping.
     pub wheel_slips: u64,
-    /// Motions with a Doppler velocity that agrees with them.
     pub doppler_used: u64,
-    /// Motions with a Doppler velocity that contradicts them.
     pub doppler_refused: u64,
 }
 
@@ -139,14 +112,11 @@ impl WitnessCounts {
             };
             (used + count > 0).then(|| format!("{name} {share:.0} %{not}"))
         };
+        let doppler_refused = ("refused", self.doppler_refused);
         let words = [
             of("gyro", self.gyro_used, ("refused", self.gyro_refused)),
             of("wheels", self.wheels_used, ("slips", self.wheel_slips)),
-            of(
-                "Doppler",
-                self.doppler_used,
-                ("refused", self.doppler_refused),
-            ),
+            of("Doppler", self.doppler_used, doppler_refused),
         ];
         let words: Vec<String> = words.into_iter().flatten().collect();
         (!words.is_empty()).then(|| words.join(", "))
@@ -157,68 +127,63 @@ impl WitnessCounts {
 mod tests {
     use super::*;
 
-    fn motion([outcome, initial_guess]: [u32; 2], gyro: u64, wheels: u64) -> RefinementRecord {
-        RefinementRecord {
+    #[test]
+    fn each_state_has_its_name_and_the_sensors_that_were_used_are_counted() {
+        let motion = |[outcome, initial_guess]: [u32; 2], gyro, wheels, doppler| RefinementRecord {
             outcome,
             initial_guess,
             gyro,
             wheels,
+            doppler,
             ..RefinementRecord::default()
-        }
-    }
-
-    #[test]
-    fn each_state_has_its_name_and_the_sensors_that_were_used_are_counted() {
+        };
+        let counted = |cases: &[(RefinementRecord, &str)]| {
+            for (motion, name) in cases {
+                assert_eq!(motion.basis().name(), *name, "{motion:?}");
+            }
+            WitnessCounts::of(cases.iter().map(|(motion, _)| motion))
+        };
         let refined = [outcome::REFINED, initial_guess::PREDICTION];
         let walls = [outcome::REFINED, initial_guess::ALONG_WALLS];
         let predicted = [outcome::PREDICTED, initial_guess::PREDICTION];
-        let cases = [
-            (motion([0, 0], 0, 0), "scan to scan"),
-            (motion(refined, gyro::NONE, wheels::NONE), "radar only"),
-            (motion(refined, gyro::REFUSED, wheels::SLIP), "radar only"),
+        let counts = counted(&[
+            (motion([0, 0], 0, 0, 0), "scan to scan"),
+            (motion(refined, 0, 0, 0), "radar only"),
             (
-                motion(refined, gyro::USED, wheels::SLIP),
+                motion(refined, gyro::REFUSED, wheels::SLIP, 0),
+                "radar only",
+            ),
+            (
+                motion(refined, gyro::USED, wheels::SLIP, 0),
                 "radar and others",
             ),
             (
-                motion(refined, gyro::REFUSED, wheels::USED),
+                motion(refined, gyro::REFUSED, wheels::USED, 0),
                 "radar and others",
             ),
-            (motion(walls, gyro::USED, wheels::USED), "along walls"),
-            (motion(walls, gyro::USED, wheels::NONE), "way guessed"),
-            (
-                motion(predicted, gyro::NONE, wheels::USED),
-                "dead reckoning",
-            ),
-            (motion(predicted, gyro::USED, wheels::SLIP), "guessed"),
-        ];
-        for (motion, name) in cases {
-            assert_eq!(motion.basis().name(), name, "{motion:?}");
-        }
-        let counts = WitnessCounts::of(cases.iter().map(|(motion, _)| motion));
+            (motion(walls, gyro::USED, wheels::USED, 0), "along walls"),
+            (motion(walls, gyro::USED, 0, 0), "way guessed"),
+            (motion(predicted, 0, wheels::USED, 0), "dead reckoning"),
+            (motion(predicted, gyro::USED, wheels::SLIP, 0), "guessed"),
+        ]);
         assert_eq!(counts.by_basis, [1, 2, 2, 1, 1, 1, 1]);
         assert_eq!(counts.motions(), 9);
         assert_eq!(counts.degraded_percent(), Some(400.0 / 9.0));
         assert_eq!(WitnessCounts::default().degraded_percent(), None);
         let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
         assert_eq!(counts.in_words().as_deref(), Some(words));
-        assert_eq!(WitnessCounts::of([&cases[1].0]).in_words(), None);
-        let by_doppler = |made: [u32; 2], doppler: u64| RefinementRecord {
-            doppler,
-            ..motion(made, gyro::NONE, wheels::NONE)
-        };
-        let cases = [
-            (by_doppler(refined, doppler::USED), "radar and others"),
-            (by_doppler(refined, doppler::REFUSED), "radar only"),
-            (by_doppler(walls, doppler::USED), "along walls"),
-            (by_doppler(walls, doppler::REFUSED), "way guessed"),
-            (by_doppler(predicted, doppler::USED), "dead reckoning"),
-        ];
-        for (motion, name) in cases {
-            assert_eq!(motion.basis().name(), name, "{motion:?}");
-        }
-        let counts = WitnessCounts::of(cases.iter().map(|(motion, _)| motion));
+        let counts = counted(&[
+            (motion(refined, 0, 0, doppler::USED), "radar and others"),
+            (motion(refined, 0, 0, doppler::REFUSED), "radar only"),
+            (motion(walls, 0, 0, doppler::USED), "along walls"),
+            (motion(walls, 0, 0, doppler::REFUSED), "way guessed"),
+            (motion(predicted, 0, 0, doppler::USED), "dead reckoning"),
+        ]);
         let words = "Doppler 60 %, 2 refused";
         assert_eq!(counts.in_words().as_deref(), Some(words));
+        assert_eq!(
+            counted(&[(motion(refined, 0, 0, 0), "radar only")]).in_words(),
+            None
+        );
     }
 }

@@ -4,7 +4,10 @@ use bytemuck::{Pod, Zeroable};
 
 use gyre_radar::{LostAzimuths, MAX_AZIMUTHS, lost::MAX_GAPS};
 
-use crate::check::{Violation, require};
+use crate::{
+    check::{Violation, require},
+    limits::Window,
+};
 
 /// Bits of [`Item::flags`].
 pub mod flag {
@@ -21,51 +24,57 @@ pub mod flag {
     pub(crate) const ALL: u32 = END | BREAK | SYNC | BASE;
 }
 
-/// The stages of a pipeline in the order of the stream; a stage's value is the index of its
-/// [`Hop`]. A run has either the two decoupled searches or the joint one, and may lack refinement;
-/// the hops of missing stages stay zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(usize)]
-pub enum StageId {
-    /// Reads the sensor or a recording.
-    RadarReplay = 0,
-    Masking = 1,
-    RotationSearch = 2,
-    TranslationSearch = 3,
-    JointSearch = 4,
-    /// Refines the motion against the local map.
-    Refinement = 5,
-    PoseIntegration = 6,
+crate::named! {
+    /// The stages of a pipeline in the order of the stream; a stage's value is the index of its
+    /// [`Hop`]. A run has either the two decoupled searches or the joint one, and may lack
+    /// refinement; the hops of missing stages stay zero.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[repr(usize)]
+    pub enum StageId {
+        /// Reads the sensor or a recording.
+        RadarReplay = "radar-replay",
+        Masking = "masking",
+        RotationSearch = "rotation-search",
+        TranslationSearch = "translation-search",
+        JointSearch = "joint-search",
+        /// Refines the motion against the local map.
+        Refinement = "refinement",
+        PoseIntegration = "pose-integration",
+    }
 }
 
-impl StageId {
-    /// All stages, in the order of the stream.
-    pub const ALL: [Self; 7] = [
-        Self::RadarReplay,
-        Self::Masking,
-        Self::RotationSearch,
-        Self::TranslationSearch,
-        Self::JointSearch,
-        Self::Refinement,
-        Self::PoseIntegration,
-    ];
+crate::named! {
+    /// The followers of a run, in the order of reading each other's logs. They read durable logs at
+    /// their own pace and are not in the stream of scans, so they have no [`Hop`] and
+    /// give no credit.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum FollowerId {
+        LoopClosure = "loop-closure",
+        /// Corrects the trajectory by the loops.
+        Trajectory = "trajectory",
+        /// Finds the keyframes in the map of an earlier drive, in a run that names one.
+        Localisation = "localisation",
+        Objects = "objects",
+    }
+}
 
-    /// The name used in configurations, on the command line and in results.
-    pub const fn name(self) -> &'static str {
+impl FollowerId {
+    /// Returns whether a run has this follower.
+    pub const fn is_in(self, window: &Window) -> bool {
         match self {
-            Self::RadarReplay => "radar-replay",
-            Self::Masking => "masking",
-            Self::RotationSearch => "rotation-search",
-            Self::TranslationSearch => "translation-search",
-            Self::JointSearch => "joint-search",
-            Self::Refinement => "refinement",
-            Self::PoseIntegration => "pose-integration",
+            Self::LoopClosure | Self::Trajectory => window.slam,
+            Self::Localisation => window.localises,
+            Self::Objects => window.objects,
         }
     }
 
-    /// Returns the stage of this name.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|stage| stage.name() == name)
+    /// The property of a run with this follower, and the keys that give it.
+    pub const fn needs(self) -> &'static str {
+        match self {
+            Self::LoopClosure | Self::Trajectory => "SLAM (slam.kind = \"graph\" or \"filter\")",
+            Self::Localisation => "a map (slam.map, with slam.kind)",
+            Self::Objects => "objects (objects.kind = \"tracks\")",
+        }
     }
 }
 
@@ -93,10 +102,9 @@ pub struct HopTimes {
     pub work_ns: i64,
 }
 
-/// One [`Hop`] for each [`StageId`].
 pub type Hops = [Hop; StageId::ALL.len()];
 
-/// The identity of a scan: its numbers, its times, and the time stamps of each stage.
+/// The identity of a scan: its numbers and its times.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Item {
@@ -126,36 +134,49 @@ pub struct Item {
     /// which a gap may be, and its number of azimuths, 0 behind the last gap. The pose keeps them
     /// for a masking that is restarted.
     pub lost: [[u16; 3]; MAX_GAPS],
-    /// The time stamps of each stage.
     pub hops: Hops,
 }
 
 impl Item {
-    /// Returns where azimuths were lost.
+    /// Returns an item that has a number alone.
+    pub fn numbered(seq: u64) -> Self {
+        Self {
+            seq,
+            ..Self::default()
+        }
+    }
+
+    /// Returns the item of a record of a scan, which has no times of the run.
+    pub fn recorded(seq: u64, scan: u64, stamp_ns: i64) -> Self {
+        Self {
+            scan,
+            previous_scan: scan,
+            stamp_ns,
+            ..Self::numbered(seq)
+        }
+    }
+
+    /// Returns it with these flags in the place of its own.
+    #[must_use]
+    pub fn flagged(self, flags: u32) -> Self {
+        Self { flags, ..self }
+    }
+
     pub fn lost_azimuths(&self) -> LostAzimuths {
         LostAzimuths::of_gaps(self.lost)
     }
 
-    /// Notes where azimuths were lost.
     pub fn set_lost_azimuths(&mut self, lost: &LostAzimuths) {
         self.lost = Default::default();
         self.lost[..lost.gaps().len()].copy_from_slice(lost.gaps());
     }
 
     pub(crate) fn check(&self) -> Result<(), Violation> {
-        require(
-            self.flags & !flag::ALL == 0,
-            "flags",
-            self.flags,
-            "bits of 1 to 8",
-        )?;
-        let previous = self.previous_scan;
-        require(
-            previous <= self.scan,
-            "previous_scan",
-            previous,
-            format_args!("at most {}, its scan", self.scan),
-        )?;
+        let known = self.flags & !flag::ALL == 0;
+        require(known, "flags", self.flags, "bits of 1 to 8")?;
+        let (scan, previous) = (self.scan, self.previous_scan);
+        let expected = format_args!("at most {scan}, its scan");
+        require(previous <= scan, "previous_scan", previous, expected)?;
         for [first, last, azimuths] in self.lost {
             require(
                 first <= last && usize::from(last) + usize::from(azimuths) <= MAX_AZIMUTHS,
@@ -165,16 +186,9 @@ impl Item {
             )?;
         }
         // The scan of the newest pose is sent again with its number.
-        let first = self.numbered_from;
-        require(
-            first <= self.seq.saturating_add(1),
-            "numbered_from",
-            first,
-            format_args!(
-                "at most {}, one more than its number",
-                self.seq.saturating_add(1)
-            ),
-        )
+        let (first, next) = (self.numbered_from, self.seq.saturating_add(1));
+        let expected = format_args!("at most {next}, one more than its number");
+        require(first <= next, "numbered_from", first, expected)
     }
 
     /// Returns whether all of these flags are set.
@@ -209,19 +223,10 @@ impl Item {
         self.hops[StageId::PoseIntegration as usize].finished_ns - self.due_ns
     }
 
-    /// Returns the time stamps of a stage, to fill in.
     pub fn hop_mut(&mut self, stage: StageId) -> &mut Hop {
         &mut self.hops[stage as usize]
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_part_of_the_wire_format() {
-        assert_eq!(size_of::<Hop>(), 32);
-        assert_eq!(size_of::<Item>(), 112 + 7 * 32);
-    }
-}
+// Sizes are part of the wire format.
+const _: () = assert!(size_of::<Hop>() == 32 && size_of::<Item>() == 112 + 7 * 32);

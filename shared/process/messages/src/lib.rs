@@ -1,70 +1,39 @@
 //! Wire types: the messages that Gyre's processes exchange, their versions and limits.
 //!
-//! Each message is a fixed header and a slice of 64-byte aligned elements, on a topic of its own:
-//!
-//! | topic | header | payload |
-//! |---|---|---|
-//! | `scan` | [`ScanHeader`] | the sweep's bytes, in [`ByteBlock`]s |
-//! | `masked` | [`MaskedHeader`] | one or two rasters and the scan's points, in [`FloatBlock`]s |
-//! | `rotation` | [`RotationHeader`] | empty |
-//! | `motion` | [`MotionHeader`] | empty |
-//! | `refined` | [`MotionHeader`] | empty |
-//! | `pose` | [`PoseHeader`] | empty |
-//! | `loop` | [`LoopHeader`] | empty |
-//! | `correction` | [`CorrectionHeader`] | empty |
-//! | `fix` | [`FixHeader`] | empty |
-//! | `objects` | [`ObjectsHeader`] | empty |
-//!
-//! The last four exist only in runs with the follower that publishes them: [`FollowerId`]. All
-//! headers start with an [`Item`], which identifies the scan and carries the time stamps of each
-//! stage. Type names carry a version, so that two builds of different versions reject each other's
-//! messages instead of misreading them.
-//!
-//! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its
-//! enforcement), one file per message, `topics`.
+//! Each message is a fixed header, which starts with an [`Item`], and a slice of 64-byte aligned
+//! elements, on a topic of its own: see [`topics()`]. Type names carry a version, so that builds of
+//! different versions reject each other's messages instead of misreading them.
 
 mod basis;
-mod block;
 mod check;
-mod closed_loop;
-mod compose;
-mod correction;
-mod fix;
 mod follower;
 mod item;
 mod limits;
 mod masked;
 mod message;
 mod motion;
-mod numbering;
-mod objects;
+mod named;
 mod pose;
-mod refined;
 mod refinement;
-mod rotation;
 mod sample_rates;
 mod scan;
 mod topics;
 
 pub use basis::{Basis, WitnessCounts};
-pub use block::{ByteBlock, FloatBlock};
 pub use check::Violation;
-pub use closed_loop::{Loop, LoopHeader};
-pub use compose::compose;
-pub use correction::{Correction, CorrectionHeader};
-pub use fix::{Fix, FixHeader, fix_status};
-pub use follower::FollowerId;
-pub use item::{Hop, HopTimes, Hops, Item, StageId, flag};
-pub use limits::{History, Limits, TopicSizes, Window, WindowError};
+pub use follower::{
+    Correction, CorrectionHeader, Fix, FixHeader, ListedObject, Loop, LoopHeader, MAX_LISTED,
+    Objects, ObjectsHeader, fix_status,
+};
+pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
+pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
-pub use message::{Element, Header, Message, Sender};
-pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
-pub use numbering::{GivenAnew, NumberedBy};
-pub use objects::{ListedObject, MAX_LISTED, Objects, ObjectsHeader};
-pub use pose::{Pose, PoseHeader};
-pub use refined::Refined;
+pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender};
+pub use motion::{
+    Motion, MotionEstimate, MotionHeader, Refined, Rotation, RotationEstimate, RotationHeader,
+};
+pub use pose::{Pose, PoseHeader, compose};
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
-pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, Topic, WireType, topic, topics};
+pub use topics::{Footprint, GivenAnew, NumberedBy, Topic, WireType, topic, topics};

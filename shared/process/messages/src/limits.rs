@@ -2,7 +2,6 @@
 //! known before the first scan.
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// Processes of the run that may have a topic open at once. A dead process counts until its
 /// resources are removed.
@@ -18,7 +17,7 @@ const LOANED: usize = 1;
 const LATEST: usize = 16;
 
 /// The number of scans in flight, and the look-back of the stages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// Maximum number of scans in flight, between admission and pose (W).
     pub scans: usize,
@@ -29,7 +28,7 @@ pub struct Window {
     pub look_back: usize,
     /// Length of the history that the source keeps for masking in live mode; 0 in lossless mode.
     pub live_depth: usize,
-    /// Number of observers that each topic has room for: see [`TopicSizes::observers`].
+    /// Number of observers that each topic has room for.
     pub observers: usize,
     /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of loops and
     /// corrections exist.
@@ -39,17 +38,6 @@ pub struct Window {
     /// True in a run that tracks objects: pose-integration logs each scan with its points, and the
     /// topic of objects exists.
     pub objects: bool,
-}
-
-/// A window out of its bounds.
-#[derive(Debug, Error, PartialEq, Eq)]
-pub enum WindowError {
-    #[error("run.window is {0}, but must be 1 to 64 scans")]
-    Scans(usize),
-    #[error("masking.lag is {0}, but must be at most 16 scans")]
-    Lag(usize),
-    #[error("run.observers is {0}, but must be at most {MAX_OBSERVERS}")]
-    Observers(usize),
 }
 
 /// The reach of a publisher's history for restarted readers.
@@ -63,7 +51,6 @@ pub enum History {
     Latest,
 }
 
-/// Sizes of one topic's queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TopicSizes {
     /// Samples that the publisher keeps for late subscribers.
@@ -99,17 +86,20 @@ impl TopicSizes {
 }
 
 impl Window {
-    pub fn validate(&self) -> Result<(), WindowError> {
-        if !(1..=64).contains(&self.scans) {
-            return Err(WindowError::Scans(self.scans));
+    pub fn validate(&self) -> Result<(), String> {
+        let (scans, lag, observers) = (self.scans, self.lag, self.observers);
+        match () {
+            () if !(1..=64).contains(&scans) => {
+                Err(format!("run.window is {scans}, but must be 1 to 64 scans"))
+            }
+            () if lag > 16 => Err(format!(
+                "masking.lag is {lag}, but must be at most 16 scans"
+            )),
+            () if observers > MAX_OBSERVERS => Err(format!(
+                "run.observers is {observers}, but must be at most {MAX_OBSERVERS}"
+            )),
+            () => Ok(()),
         }
-        if self.lag > 16 {
-            return Err(WindowError::Lag(self.lag));
-        }
-        if self.observers > MAX_OBSERVERS {
-            return Err(WindowError::Observers(self.observers));
-        }
-        Ok(())
     }
 
     /// Returns whether item `seq` may be admitted when `newest_pose` is the newest pose.
@@ -152,13 +142,10 @@ impl Window {
 }
 
 /// Sizes of the largest messages, and of the rasters.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Bytes of a polar scan.
     pub scan_bytes: usize,
-    /// Cells of one raster.
     pub raster_cells: usize,
-    /// Size of a cell, m.
     pub cell_m: f32,
     /// Rasters in a `masked` message: 1 or 2.
     pub rasters: usize,
@@ -169,12 +156,10 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Returns the cells on each side of a raster.
     pub fn side(&self) -> usize {
         self.raster_cells.isqrt()
     }
 
-    /// Returns the width of a raster, m.
     pub fn extent_m(&self) -> f64 {
         self.side() as f64 * f64::from(self.cell_m)
     }
@@ -184,28 +169,15 @@ impl Limits {
 mod tests {
     use super::*;
 
-    const WINDOW: Window = Window {
-        scans: 4,
-        lag: 2,
-        look_back: 1,
-        live_depth: 0,
-        observers: 0,
-        slam: false,
-        localises: false,
-        objects: false,
-    };
-
     #[test]
     fn a_pose_is_the_credit_for_one_more_scan() {
-        assert!(WINDOW.admits(3, None) && !WINDOW.admits(4, None));
-        assert!(WINDOW.admits(4, Some(0)) && !WINDOW.admits(5, Some(0)));
-        assert!(WINDOW.admits(u64::MAX, Some(u64::MAX)));
-    }
-
-    #[test]
-    fn an_empty_window_is_rejected() {
-        let empty = Window { scans: 0, ..WINDOW };
-        assert_eq!(empty.validate(), Err(WindowError::Scans(0)));
-        assert!(WINDOW.validate().is_ok());
+        let window = Window {
+            scans: 4,
+            ..Window::default()
+        };
+        assert!(window.admits(3, None) && !window.admits(4, None));
+        assert!(window.admits(4, Some(0)) && !window.admits(5, Some(0)));
+        assert!(window.admits(u64::MAX, Some(u64::MAX)));
+        assert!(window.validate().is_ok() && Window::default().validate().is_err());
     }
 }

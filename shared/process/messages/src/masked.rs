@@ -6,11 +6,10 @@ use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    block::{ByteBlock, FloatBlock},
-    check::{Violation, finite, require},
+    check::{Violation, code, fields, finite, not_negative, of, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
-    message::{Message, Sender, header},
+    message::{ByteBlock, FloatBlock, Message, Sender, header},
 };
 
 /// The payload is one raster if the mask takes one scan, or two (this scan and the previous one,
@@ -27,14 +26,6 @@ impl Message for Masked {
     const HISTORY: History = History::Stream;
     type Header = MaskedHeader;
     type Element = FloatBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        payload: &[Self::Element],
-        limits: &Limits,
-    ) -> Result<(), Violation> {
-        header.check(bytemuck::cast_slice(payload), limits)
-    }
 
     /// The rasters, and the points after them.
     fn content_bytes(header: &Self::Header) -> Option<usize> {
@@ -67,7 +58,8 @@ pub mod mask_kind {
     pub const LEARNED: u32 = 2;
 }
 
-/// The geometry of a raster and the processing that led to it.
+/// The geometry of a raster and the processing that led to it. What `has_*` is 1 for was measured:
+/// the turn and the distance since the previous scan, and the velocity during this one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MaskedHeader {
@@ -78,29 +70,23 @@ pub struct MaskedHeader {
     pub rasters: u32,
     /// Size of a cell, m.
     pub cell_m: f32,
-    /// The mask: see [`mask_kind`].
+    /// See [`mask_kind`].
     pub mask: u32,
     /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without
     /// compensation.
     pub twist: [f32; 3],
     /// 1 if the scan is motion-compensated.
     pub compensated: u32,
-    /// Number of points after the rasters: see [`MaskedHeader::points`].
+    /// Number of points after the rasters.
     pub points: u32,
     /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at
     /// places that are not known.
     pub azimuth_variance_rad2: f32,
-    /// The turn since the previous scan by the gyro: see [`MaskedHeader::turn`].
     pub gyro: GyroTurn,
-    /// 1 if the gyro measured the turn.
     pub has_gyro: u64,
-    /// The distance since the previous scan by the wheels: see [`MaskedHeader::distance`].
     pub wheels: WheelDistance,
-    /// 1 if the wheels measured the distance.
     pub has_wheels: u64,
-    /// The velocity by Doppler during this scan: see [`MaskedHeader::velocity`].
     pub doppler: DopplerVelocity,
-    /// 1 if the scan determines the velocity.
     pub has_doppler: u64,
 }
 
@@ -111,7 +97,6 @@ pub struct MaskedParts<'a> {
     pub later: ArrayViewMut2<'a, f32>,
     /// The raster of the previous scan, n x n, if the mask takes two scans.
     pub earlier: Option<ArrayViewMut2<'a, f32>>,
-    /// The scan's points.
     pub points: &'a mut [SparsePoint],
 }
 
@@ -130,79 +115,56 @@ pub struct Pair<'a> {
 impl MaskedHeader {
     /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are
     /// not looked at.
-    fn check(&self, values: &[f32], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+        let values: &[f32] = bytemuck::cast_slice(payload);
         let (n, rasters, points) = (self.n as usize, self.rasters as usize, self.points as usize);
         require(n == limits.side(), "n", n, limits.side())?;
+        let fits = rasters == limits.rasters;
+        require(fits, "rasters", rasters, limits.rasters)?;
+        let fits = self.cell_m == limits.cell_m;
+        require(fits, "cell_m", self.cell_m, limits.cell_m)?;
+        let most = limits.points;
         require(
-            rasters == limits.rasters,
-            "rasters",
-            rasters,
-            limits.rasters,
-        )?;
-        require(
-            self.cell_m == limits.cell_m,
-            "cell_m",
-            self.cell_m,
-            limits.cell_m,
-        )?;
-        require(
-            points <= limits.points,
+            points <= most,
             "points",
             points,
-            format_args!("at most {}", limits.points),
+            format_args!("at most {most}"),
         )?;
-        require(self.mask <= mask_kind::LEARNED, "mask", self.mask, "0 to 2")?;
+        code("mask", self.mask, mask_kind::LEARNED)?;
         let [vx, vy, yaw_rate] = self.twist.map(f64::from);
         finite([("twist[0]", vx), ("twist[1]", vy), ("twist[2]", yaw_rate)])?;
-        require(
-            self.azimuth_variance_rad2 >= 0.0 && self.azimuth_variance_rad2.is_finite(),
-            "azimuth_variance_rad2",
-            self.azimuth_variance_rad2,
-            "finite, 0 or more",
+        not_negative([("azimuth_variance_rad2", self.azimuth_variance_rad2.into())])?;
+        code("has_gyro", self.has_gyro, 1_u64)?;
+        code("has_wheels", self.has_wheels, 1_u64)?;
+        code("has_doppler", self.has_doppler, 1_u64)?;
+        let (gyro, wheels) = (&self.gyro, &self.wheels);
+        of("gyro.", finite(fields![gyro; yaw_rad sweep_rate_radps]))?;
+        of(
+            "gyro.",
+            not_negative(fields![gyro; variance_rad2 interval_s]),
         )?;
-        require(self.has_gyro <= 1, "has_gyro", self.has_gyro, "0 or 1")?;
-        require(
-            self.has_wheels <= 1,
-            "has_wheels",
-            self.has_wheels,
-            "0 or 1",
+        of("wheels.", finite(fields![wheels; distance_m]))?;
+        let spread = fields![wheels; variance_m2 side_variance_m2 interval_s];
+        of("wheels.", not_negative(spread))?;
+        let ([vx, vy], [xx, xy, yy]) = (self.doppler.velocity_mps, self.doppler.covariance);
+        of(
+            "doppler.",
+            finite([
+                ("velocity_mps[0]", vx),
+                ("velocity_mps[1]", vy),
+                ("covariance[1]", xy),
+            ]),
         )?;
-        let has_doppler = self.has_doppler;
-        require(has_doppler <= 1, "has_doppler", has_doppler, "0 or 1")?;
-        let (gyro, wheels, doppler) = (&self.gyro, &self.wheels, &self.doppler);
-        finite([
-            ("doppler.velocity_mps[0]", doppler.velocity_mps[0]),
-            ("doppler.velocity_mps[1]", doppler.velocity_mps[1]),
-            ("doppler.covariance[1]", doppler.covariance[1]),
-            ("gyro.yaw_rad", gyro.yaw_rad),
-            ("gyro.sweep_rate_radps", gyro.sweep_rate_radps),
-            ("wheels.distance_m", wheels.distance_m),
-        ])?;
-        for (key, value) in [
-            ("gyro.variance_rad2", gyro.variance_rad2),
-            ("gyro.interval_s", gyro.interval_s),
-            ("wheels.variance_m2", wheels.variance_m2),
-            ("wheels.side_variance_m2", wheels.side_variance_m2),
-            ("wheels.interval_s", wheels.interval_s),
-            ("doppler.covariance[0]", doppler.covariance[0]),
-            ("doppler.covariance[2]", doppler.covariance[2]),
-        ] {
-            require(
-                value >= 0.0 && value.is_finite(),
-                key,
-                value,
-                "finite, 0 or more",
-            )?;
-        }
+        of(
+            "doppler.",
+            not_negative([("covariance[0]", xx), ("covariance[2]", yy)]),
+        )?;
         let points = self.points(values).ok_or_else(|| {
-            let bytes = size_of_val(values);
+            let bytes = payload.len();
             Violation(format!("its payload of {bytes} bytes is shorter than its header says: {rasters} rasters of {n} x {n} cells and {points} points"))
         })?;
-        let is_finite = |point: &SparsePoint| {
-            <[f32; 5]>::from(*point)
-                .iter()
-                .all(|value| value.is_finite())
-        };
+        let is_finite =
+            |point: &SparsePoint| <[f32; 5]>::from(*point).iter().all(|it| it.is_finite());
         match points.iter().position(|point| !is_finite(point)) {
             None => Ok(()),
             Some(index) => Err(Violation(format!(
@@ -218,59 +180,50 @@ impl MaskedHeader {
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    /// Returns the turn from the previous scan to this one, as the gyro has measured it; `None`
-    /// where it has not.
     pub fn turn(&self) -> Option<GyroTurn> {
         (self.has_gyro == 1).then_some(self.gyro)
     }
 
-    pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
-        self.gyro = turn.unwrap_or_default();
-        self.has_gyro = turn.is_some().into();
-    }
-
-    /// Returns the distance from the previous scan to this one, as the wheels have measured it;
-    /// `None` where they have not.
     pub fn distance(&self) -> Option<WheelDistance> {
         (self.has_wheels == 1).then_some(self.wheels)
     }
 
-    pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
-        self.wheels = distance.unwrap_or_default();
-        self.has_wheels = distance.is_some().into();
-    }
-
-    /// Returns the velocity by Doppler during this scan; `None` if the scan does not determine it.
     pub fn velocity(&self) -> Option<DopplerVelocity> {
         (self.has_doppler == 1).then_some(self.doppler)
     }
 
+    pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
+        (self.gyro, self.has_gyro) = (turn.unwrap_or_default(), turn.is_some().into());
+    }
+
+    pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
+        (self.wheels, self.has_wheels) = (distance.unwrap_or_default(), distance.is_some().into());
+    }
+
     pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
-        self.doppler = velocity.unwrap_or_default();
-        self.has_doppler = velocity.is_some().into();
+        (self.doppler, self.has_doppler) =
+            (velocity.unwrap_or_default(), velocity.is_some().into());
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too
     /// short.
-    pub fn split(values: &mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'_>> {
+    pub fn split<'a>(values: &'a mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'a>> {
         let raster = Self::raster_values(n)?;
         let (later, rest) = values.split_at_mut_checked(raster)?;
         let (earlier, rest) = match rasters {
-            2 => rest
-                .split_at_mut_checked(raster)
-                .map(|(earlier, rest)| (Some(earlier), rest))?,
+            2 => {
+                let (earlier, rest) = rest.split_at_mut_checked(raster)?;
+                (Some(earlier), rest)
+            }
             _ => (None, rest),
         };
-        let view = |values| ArrayViewMut2::from_shape((n, n), values).ok();
-        let earlier = match earlier {
-            Some(values) => Some(view(&mut values[..n * n])?),
-            None => None,
-        };
+        let view =
+            |values: &'a mut [f32]| ArrayViewMut2::from_shape((n, n), &mut values[..n * n]).ok();
         let floats = size_of::<SparsePoint>() / size_of::<f32>();
         let whole = rest.len() / floats * floats;
         Some(MaskedParts {
-            later: view(&mut later[..n * n])?,
-            earlier,
+            later: view(later)?,
+            earlier: earlier.and_then(view),
             points: bytemuck::cast_slice_mut(&mut rest[..whole]),
         })
     }

@@ -1,14 +1,14 @@
 //! The contract of a message type: its topic, its header, the elements of its payload and the sizes
-//! of its queues.
+//! of its queues. Elements are blocks of 64 bytes, so that every payload starts on a cache line and
+//! is aligned for any vector unit; the transport would multiply an aligned slice of bytes.
 
 use std::fmt::Debug;
 
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 
 use crate::{
     check::Violation,
-    follower::FollowerId,
-    item::{Item, StageId, flag},
+    item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
 };
 
@@ -19,11 +19,11 @@ pub trait Header: Pod + Default + Debug {
     const TYPE_NAME: &'static str;
     /// The scan that the message is about.
     fn item(&self) -> &Item;
-    /// The same, to fill in.
     fn item_mut(&mut self) -> &mut Item;
+    /// Checks all but the item; the end of the stream has no content.
+    fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation>;
 }
 
-/// An element of payloads, plain data too.
 pub trait Element: Pod + Debug {
     /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
@@ -53,13 +53,10 @@ impl Sender {
 }
 
 pub trait Message: 'static {
-    /// The name of the topic.
     const TOPIC: &'static str;
-    /// The process that publishes the topic.
     const SENDER: Sender;
     /// Number of processes that subscribe to the topic.
     const READERS: usize;
-    /// The reach of the publisher's history.
     const HISTORY: History;
     type Header: Header;
     /// The element that the payload is a slice of.
@@ -81,16 +78,9 @@ pub trait Message: 'static {
         item.check()?;
         match item.is(flag::END) {
             true => Ok(()),
-            false => Self::check_content(header, payload, limits),
+            false => header.check(bytemuck::cast_slice(payload), limits),
         }
     }
-
-    /// Checks all but the item; the end of the stream has no content.
-    fn check_content(
-        header: &Self::Header,
-        payload: &[Self::Element],
-        limits: &Limits,
-    ) -> Result<(), Violation>;
 
     /// Returns the bytes of the payload that the header describes; what follows them in memory has
     /// no meaning. `None`: more than a payload can have.
@@ -98,13 +88,12 @@ pub trait Message: 'static {
         Some(0)
     }
 
-    /// The sizes of the topic's queues.
     fn sizes(window: &Window) -> TopicSizes {
         window.queues(Self::HISTORY, Self::READERS)
     }
 }
 
-/// Implements [`Header`] for a type whose first field is `item`.
+/// Implements [`Header`] for a type whose first field is `item`, and which has `check_content`.
 macro_rules! header {
     ($header:ty, $type_name:literal) => {
         const _: () = assert!(std::mem::offset_of!($header, item) == 0);
@@ -115,10 +104,73 @@ macro_rules! header {
             fn item(&self) -> &$crate::item::Item {
                 &self.item
             }
+
             fn item_mut(&mut self) -> &mut $crate::item::Item {
                 &mut self.item
+            }
+
+            fn check(
+                &self,
+                payload: &[u8],
+                limits: &$crate::limits::Limits,
+            ) -> Result<(), $crate::check::Violation> {
+                self.check_content(payload, limits)
             }
         }
     };
 }
 pub(crate) use header;
+
+/// Defines a message without a payload.
+macro_rules! message {
+    (
+        $(#[$doc:meta])*
+        $message:ident: $topic:literal, $header:ty, $sender:expr, $readers:literal readers, $history:ident
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub enum $message {}
+
+        impl $crate::message::Message for $message {
+            const TOPIC: &'static str = $topic;
+            const SENDER: $crate::message::Sender = $sender;
+            const READERS: usize = $readers;
+            const HISTORY: $crate::limits::History = $crate::limits::History::$history;
+            type Header = $header;
+            type Element = $crate::message::FloatBlock;
+        }
+    };
+}
+pub(crate) use message;
+
+/// 64 bytes of a polar scan.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct ByteBlock([u8; 64]);
+
+/// 16 values of a raster.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct FloatBlock([f32; 16]);
+
+/// Implements an element of as many values as `LEN`.
+macro_rules! block {
+    ($block:ty, $len:literal, $type_name:literal) => {
+        impl $block {
+            pub const LEN: usize = $len;
+
+            pub fn count(values: usize) -> usize {
+                values.div_ceil(Self::LEN)
+            }
+        }
+
+        impl Element for $block {
+            const TYPE_NAME: &'static str = $type_name;
+        }
+
+        const _: () = assert!(size_of::<$block>() == 64 && align_of::<$block>() == 64);
+    };
+}
+
+block!(ByteBlock, 64, "gyre_byte_block_v1");
+block!(FloatBlock, 16, "gyre_float_block_v1");

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::{InitialGuess, Outcome, Verdict};
 
-use crate::check::{Violation, finite, require};
+use crate::check::{Violation, code, fields, finite};
 
 /// Values of [`RefinementRecord::outcome`].
 pub mod outcome {
@@ -66,7 +66,7 @@ pub mod doppler {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RefinementRecord {
-    /// The outcome: see [`outcome`].
+    /// See [`outcome`].
     pub outcome: u32,
     /// The initial guess of the accepted motion: see [`initial_guess`].
     pub initial_guess: u32,
@@ -77,7 +77,7 @@ pub struct RefinementRecord {
     pub support: f64,
     /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
     pub stationary: u64,
-    /// The part of the gyro: see [`gyro`].
+    /// See [`gyro`].
     pub gyro: u64,
     /// Turn since the previous scan that the gyro measured, rad; zero without one.
     pub gyro_turn_rad: f64,
@@ -85,66 +85,40 @@ pub struct RefinementRecord {
     pub gyro_scale: f64,
     /// Bias of the gyro after the scan, rad/s; zero without one.
     pub gyro_bias_radps: f64,
-    /// Standard deviation of that bias, rad/s.
     pub gyro_bias_sigma_radps: f64,
-    /// The part of the wheels: see [`wheels`].
+    /// See [`wheels`].
     pub wheels: u64,
     /// Distance since the previous scan that the wheels measured, m; zero without wheels.
     pub wheel_distance_m: f64,
     /// True distance over the wheels' distance, after the scan; zero without wheels.
     pub wheel_scale: f64,
-    /// Standard deviation of that scale.
     pub wheel_scale_sigma: f64,
-    /// The part of the velocity by Doppler: see [`doppler`].
+    /// See [`doppler`].
     pub doppler: u64,
     /// True velocity over that by Doppler, after the scan; zero without one.
     pub doppler_scale: f64,
-    /// Standard deviation of that scale.
     pub doppler_scale_sigma: f64,
 }
 
 impl RefinementRecord {
-    /// Returns whether the vehicle stands.
     pub fn is_stationary(&self) -> bool {
         self.stationary != 0
     }
 
     pub(crate) fn check(&self) -> Result<(), Violation> {
-        require(
-            self.outcome <= outcome::PREDICTED,
-            "outcome",
-            self.outcome,
-            "0 to 3",
-        )?;
-        let guess = self.initial_guess;
-        require(
-            guess <= initial_guess::ALONG_WALLS,
+        code("outcome", self.outcome, outcome::PREDICTED)?;
+        code(
             "initial_guess",
-            guess,
-            "0 to 4",
+            self.initial_guess,
+            initial_guess::ALONG_WALLS,
         )?;
-        require(
-            self.stationary <= 1,
-            "stationary",
-            self.stationary,
-            "0 or 1",
-        )?;
-        require(self.gyro <= gyro::DOUBTED, "gyro", self.gyro, "0 to 3")?;
-        require(self.wheels <= wheels::SLIP, "wheels", self.wheels, "0 to 2")?;
-        let part = self.doppler;
-        require(part <= doppler::REFUSED, "doppler", part, "0 to 2")?;
-        finite([
-            ("overlap", self.overlap),
-            ("support", self.support),
-            ("gyro_turn_rad", self.gyro_turn_rad),
-            ("gyro_scale", self.gyro_scale),
-            ("gyro_bias_radps", self.gyro_bias_radps),
-            ("gyro_bias_sigma_radps", self.gyro_bias_sigma_radps),
-            ("wheel_distance_m", self.wheel_distance_m),
-            ("wheel_scale", self.wheel_scale),
-            ("wheel_scale_sigma", self.wheel_scale_sigma),
-            ("doppler_scale", self.doppler_scale),
-            ("doppler_scale_sigma", self.doppler_scale_sigma),
+        code("stationary", self.stationary, 1_u64)?;
+        code("gyro", self.gyro, gyro::DOUBTED)?;
+        code("wheels", self.wheels, wheels::SLIP)?;
+        code("doppler", self.doppler, doppler::REFUSED)?;
+        finite(fields![self;
+            overlap support gyro_turn_rad gyro_scale gyro_bias_radps gyro_bias_sigma_radps
+            wheel_distance_m wheel_scale wheel_scale_sigma doppler_scale doppler_scale_sigma
         ])
     }
 }

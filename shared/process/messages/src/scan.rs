@@ -7,11 +7,10 @@ use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 use crate::{
-    block::ByteBlock,
     check::{Violation, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
-    message::{Message, Sender, header},
+    message::{ByteBlock, Message, Sender, header},
 };
 
 /// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of
@@ -27,14 +26,6 @@ impl Message for Scan {
     const HISTORY: History = History::Stream;
     type Header = ScanHeader;
     type Element = ByteBlock;
-
-    fn check_content(
-        header: &Self::Header,
-        payload: &[Self::Element],
-        limits: &Limits,
-    ) -> Result<(), Violation> {
-        header.check(bytemuck::cast_slice(payload), limits)
-    }
 
     fn max_elements(limits: &Limits) -> usize {
         ByteBlock::count(limits.scan_bytes) + limits.samples
@@ -70,15 +61,11 @@ header!(ScanHeader, "gyre_scan_header_v7");
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanHeader {
     pub item: Item,
-    /// Number of rows.
     pub azimuths: u32,
-    /// Range bins per row.
     pub bins: u32,
     /// Bytes from the first bin of a row to the first bin of the next row.
     pub stride: u32,
-    /// Position of the first bin of the first row.
     pub first_byte: u32,
-    /// Size of a range bin, m.
     pub range_resolution_m: f32,
     /// Offset of ranges, m: the centre of bin `b` is at
     /// `(b + 0.5) * range_resolution_m + range_offset_m`.
@@ -88,7 +75,7 @@ pub struct ScanHeader {
     /// Metres to add to a range for each m/s of approach; 0 if unknown: see
     /// [`SweepGeometry::doppler_s`].
     pub doppler_s: f32,
-    /// Number of samples of other sensors after the powers: see [`ScanHeader::samples`].
+    /// Number of samples of other sensors after the powers.
     pub samples: u32,
     /// Number of samples since the scan before that were left out: late, or unusable.
     pub samples_left_out: u32,
@@ -132,43 +119,27 @@ impl ScanHeader {
         last_row.checked_add(geometry.bins)
     }
 
-    /// Checks the geometry, the angles and the times, and that the length of the payload fits the
-    /// geometry.
-    fn check(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
-        let azimuths = self.azimuths as usize;
-        let range = format_args!("1 to {MAX_AZIMUTHS}");
-        require(
-            (1..=MAX_AZIMUTHS).contains(&azimuths),
-            "azimuths",
-            azimuths,
-            range,
-        )?;
+    /// Checks the geometry, the angles, the times and the samples, and that the length of the
+    /// payload fits the geometry.
+    fn check_content(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
+        let (length, azimuths) = (bytes.len(), self.azimuths as usize);
+        let holds = (1..=MAX_AZIMUTHS).contains(&azimuths);
+        let expected = format_args!("1 to {MAX_AZIMUTHS}");
+        require(holds, "azimuths", azimuths, expected)?;
         let scan = self.view(bytes).ok_or_else(|| {
             Violation(format!(
-                "its payload of {} bytes is shorter than its header says: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
-                bytes.len(),
-                self.bins,
-                self.stride,
-                self.first_byte
+                "its payload of {length} bytes is shorter than its header says: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
+                self.bins, self.stride, self.first_byte
             ))
         })?;
         let checked = scan.check().and_then(|()| scan.check_times());
         checked.map_err(|error| Violation(error.to_string()))?;
-        self.check_samples(bytes, limits)
-    }
-
-    fn check_samples(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
-        require(
-            self.samples as usize <= limits.samples,
-            "samples",
-            self.samples,
-            format_args!("at most {}", limits.samples),
-        )?;
+        let (samples, most) = (self.samples, limits.samples);
+        let expected = format_args!("at most {most}");
+        require(samples as usize <= most, "samples", samples, expected)?;
         let samples = self.samples(bytes).ok_or_else(|| {
             Violation(format!(
-                "its payload of {} bytes is shorter than its header says: {} samples",
-                bytes.len(),
-                self.samples
+                "its payload of {length} bytes is shorter than its header says: {samples} samples"
             ))
         })?;
         if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
@@ -177,15 +148,12 @@ impl ScanHeader {
                 "sample {index} is {sample:?}, but must be of a known kind, finite, and at most {MAX_RATE_RADPS} rad/s or {MAX_SPEED_MPS} m/s"
             )));
         }
-        let disorder = samples
-            .windows(2)
-            .position(|pair| pair[0].order() >= pair[1].order());
-        disorder.map_or(Ok(()), |index| {
-            Err(Violation(format!(
-                "sample {} is not later than the one before",
-                index + 1
-            )))
-        })
+        match samples.is_sorted_by(|one, next| one.order() < next.order()) {
+            true => Ok(()),
+            false => Err(Violation(
+                "a sample is not later than the one before".to_owned(),
+            )),
+        }
     }
 
     /// Returns the times of the first and of the last azimuth, ns since 1970; the stamp twice
@@ -197,7 +165,6 @@ impl ScanHeader {
         [or_stamp(stamps.clone().min()), or_stamp(stamps.max())]
     }
 
-    /// Where the samples begin in the payload.
     fn first_sample(&self) -> Option<usize> {
         self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)
     }
@@ -222,7 +189,6 @@ impl ScanHeader {
         Some(samples.map(bytemuck::pod_read_unaligned).collect())
     }
 
-    /// Where the samples are in the payload.
     fn sample_bytes(&self) -> Option<Range<usize>> {
         let first = self.first_sample()?;
         let bytes = (self.samples as usize).checked_mul(size_of::<Sample>())?;
@@ -295,10 +261,9 @@ impl ScanHeader {
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
             doppler_s: self.doppler_s,
-            sense: if self.clockwise == 1 {
-                Sense::Clockwise
-            } else {
-                Sense::CounterClockwise
+            sense: match self.clockwise {
+                1 => Sense::Clockwise,
+                _ => Sense::CounterClockwise,
             },
             stamp_ns: self.item.stamp_ns,
         }
@@ -344,16 +309,10 @@ mod tests {
         assert_eq!(header.samples(bytes), Some(&samples[..2]));
         assert_eq!(header.read_samples(bytes), Some(samples[..2].to_vec()));
         assert_eq!(Scan::content_bytes(&header), Some(192));
-        assert!(
-            header
-                .view(bytes)
-                .is_some_and(|scan| scan.row(1) == [7; 10])
-        );
+        assert_eq!(header.view(bytes).map(|scan| scan.row(1)[9]), Some(7));
         header.shift_times(100, bytes);
-        let stamps = header
-            .samples(bytes)
-            .map(|it| [it[0].stamp_ns, it[1].stamp_ns]);
-        assert_eq!(stamps, Some([101, 102]));
+        let stamps = header.samples(bytes).unwrap_or_default().iter();
+        assert!(stamps.map(|it| it.stamp_ns).eq([101, 102]));
         assert_eq!(header.samples(&bytes[..191]), None);
         header.set_samples(&mut [], &samples, 0);
         assert_eq!((header.samples, header.samples_left_out), (0, 3));

@@ -1,21 +1,16 @@
-//! All topics, and the shared memory that they need.
+//! All topics, the shared memory that they need, and who numbers their items.
 
 use std::fmt;
 
 use serde::Serialize;
 
 use crate::{
-    closed_loop::Loop,
-    correction::Correction,
-    fix::Fix,
+    follower::{Correction, Fix, Loop, Objects},
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
     message::{Element, Header, Message, Sender},
-    motion::Motion,
-    objects::Objects,
+    motion::{Motion, Refined, Rotation},
     pose::Pose,
-    refined::Refined,
-    rotation::Rotation,
     scan::Scan,
 };
 
@@ -25,11 +20,8 @@ const SAMPLE_OVERHEAD: usize = 192;
 /// A type of headers or of elements, as the transport compares it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireType {
-    /// The name, with the version.
     pub name: &'static str,
-    /// Bytes of a value.
     pub bytes: usize,
-    /// The alignment of a value in memory.
     pub alignment: usize,
 }
 
@@ -43,23 +35,18 @@ impl WireType {
     }
 }
 
-/// The properties of a message type as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     pub name: &'static str,
-    /// The process that publishes it.
     pub sender: Sender,
-    /// The sizes of its queues.
     pub sizes: fn(&Window) -> TopicSizes,
     /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
     pub header: WireType,
-    /// The type of the elements of its payload.
     pub element: WireType,
 }
 
 impl Topic {
-    /// The topic of a message type.
     pub const fn of<M: Message>() -> Self {
         Self {
             name: M::TOPIC,
@@ -72,19 +59,17 @@ impl Topic {
     }
 
     /// Returns the bytes of its largest sample in shared memory.
-    pub fn max_sample_bytes(&self, limits: &Limits) -> usize {
+    fn max_sample_bytes(&self, limits: &Limits) -> usize {
         SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
     }
 }
 
-/// Bytes of a page of memory.
 const PAGE: usize = 4096;
 /// Pages of bookkeeping, whatever the topics.
 const OTHER_PAGES: usize = 32;
 const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
-/// All topics, in the order of the stream.
 const TOPICS: [Topic; 10] = [
     Topic::of::<Scan>(),
     Topic::of::<Masked>(),
@@ -107,7 +92,6 @@ pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
     })
 }
 
-/// Returns the topic of this name.
 pub fn topic(name: &str) -> Option<&'static Topic> {
     TOPICS.iter().find(|topic| topic.name == name)
 }
@@ -123,15 +107,14 @@ fn bookkeeping(window: &Window) -> usize {
         * PAGE
 }
 
-/// The shared memory that a run needs.
+/// The shared memory that a run needs, bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
-    /// Bytes of each topic's segment, by topic, and of the transport's bookkeeping.
+    /// Of each topic's segment, by topic, and of the transport's bookkeeping.
     pub segments: Vec<(&'static str, usize)>,
 }
 
 impl Footprint {
-    /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
         let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
@@ -143,7 +126,6 @@ impl Footprint {
         }
     }
 
-    /// Bytes of all segments.
     pub fn total(&self) -> usize {
         self.segments.iter().map(|(_, bytes)| bytes).sum()
     }
@@ -159,6 +141,40 @@ impl fmt::Display for Footprint {
         }
         write!(f, ")")
     }
+}
+
+crate::named! {
+    /// The process that numbers the items of a topic; its name is in the file of the generations.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum NumberedBy {
+        /// The source, on `scan`.
+        Source = "source",
+        /// Masking in live mode, on the topics of the other stages; otherwise they have the numbers
+        /// of the source.
+        Masking = "masking",
+        /// A follower, whose results are numbered.
+        Follower = "follower",
+    }
+}
+
+impl NumberedBy {
+    /// Returns who numbers the items of a topic.
+    pub fn of(name: &str) -> Self {
+        match topic(name).map(|topic| topic.sender) {
+            _ if name == Scan::TOPIC => Self::Source,
+            Some(Sender::Stage(_)) => Self::Masking,
+            _ => Self::Follower,
+        }
+    }
+}
+
+/// A generation of numbers: it gives the numbers from `first` on again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GivenAnew {
+    /// See [`Item::generation`](crate::Item::generation).
+    pub generation: u32,
+    /// See [`Item::numbered_from`](crate::Item::numbered_from).
+    pub first: u64,
 }
 
 #[cfg(test)]
@@ -187,11 +203,9 @@ mod tests {
 
     #[test]
     fn a_run_has_the_topics_of_its_followers_and_their_memory() {
-        let slam = Window {
-            slam: true,
-            ..WINDOW
-        };
         let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
+        let (mut slam, mut with_objects) = (WINDOW, WINDOW);
+        (slam.slam, with_objects.objects) = (true, true);
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
         assert_eq!(names(&slam)[6..], ["loop", "correction"]);
         let with_map = Window {
@@ -199,10 +213,6 @@ mod tests {
             ..slam
         };
         assert_eq!(names(&with_map)[6..], ["loop", "correction", "fix"]);
-        let with_objects = Window {
-            objects: true,
-            ..WINDOW
-        };
         assert_eq!(names(&with_objects)[6..], ["objects"]);
         assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();

@@ -104,7 +104,8 @@ impl Budget {
 mod tests {
     use super::*;
 
-    fn budget() -> Budget {
+    #[test]
+    fn a_fault_is_judged_by_its_recovery_and_the_limits_of_a_scenario_go_first() {
         let all = Limits {
             p99_ms: Some(100.0),
             drops_percent: Some(0.0),
@@ -120,31 +121,26 @@ mod tests {
             drops_percent: Some(5.0),
             ..Limits::default()
         };
-        Budget {
+        let budget = Budget {
             all,
             scenarios: [("kills".to_owned(), kills), ("fast".to_owned(), fast)].into(),
+        };
+        for (scenario, p99_ms, drops_percent, degraded_percent) in [
+            (Scenario::Kills, Some(900.0), None, None),
+            (Scenario::Stopped, None, None, None),
+            (Scenario::Fast, Some(100.0), Some(5.0), Some(1.0)),
+            (Scenario::Bursts, Some(100.0), None, Some(1.0)),
+            (Scenario::RadarBlind, Some(100.0), Some(0.0), None),
+        ] {
+            let expected = Limits {
+                p99_ms,
+                drops_percent,
+                recovery_ms: Some(500.0),
+                degraded_percent,
+                ..Limits::default()
+            };
+            assert_eq!(budget.of(scenario), expected, "{scenario}");
         }
-    }
-
-    #[test]
-    fn a_fault_is_judged_by_its_recovery_and_by_limits_of_its_own() {
-        let kills = budget().of(Scenario::Kills);
-        assert_eq!(
-            (kills.p99_ms, kills.recovery_ms),
-            (Some(900.0), Some(500.0))
-        );
-        assert_eq!(kills.drops_percent, None);
-        assert_eq!(budget().of(Scenario::Stopped).p99_ms, None);
-    }
-
-    #[test]
-    fn a_load_is_judged_by_the_budget_and_its_own_limits_go_first() {
-        let fast = budget().of(Scenario::Fast);
-        assert_eq!((fast.p99_ms, fast.drops_percent), (Some(100.0), Some(5.0)));
-        assert_eq!(budget().of(Scenario::Bursts).drops_percent, None);
-        let blind = budget().of(Scenario::RadarBlind);
-        assert_eq!((blind.p99_ms, blind.degraded_percent), (Some(100.0), None));
-        assert_eq!(fast.degraded_percent, Some(1.0));
     }
 
     #[test]

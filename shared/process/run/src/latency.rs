@@ -1,30 +1,23 @@
 //! Latency from the completion of a scan to its pose, hop by hop.
 
-mod durations;
-mod overlap;
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BinaryHeap},
+};
 
-use std::collections::BTreeMap;
-
-use gyre_messages::{PoseHeader, StageId};
+use gyre_messages::{Hop, Hops, PoseHeader, StageId};
+use hdrhistogram::Histogram;
 use serde::Serialize;
-
-pub use durations::Durations;
-use overlap::Overlap;
 
 /// Percentiles of a duration, microseconds; exact to 0.1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// Median, us.
     pub p50_us: f64,
-    /// 90th percentile, us.
     pub p90_us: f64,
-    /// 99th percentile, us.
     pub p99_us: f64,
-    /// Maximum, us.
     pub max_us: f64,
 }
 
-/// The latency of one stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct HopLatency {
     /// From the publication by the stage before to the reception.
@@ -60,7 +53,6 @@ pub struct LatencyMeter {
     overlap: Overlap,
 }
 
-/// The durations of one stage.
 #[derive(Debug, Default)]
 pub struct HopMeter {
     /// From the publication by the stage before to the reception; empty of the first stage.
@@ -72,7 +64,6 @@ pub struct HopMeter {
 }
 
 impl LatencyMeter {
-    /// Adds the time stamps of a pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         let hops = &pose.item.hops;
         let (source, sink) = (hops[0], hops[StageId::PoseIntegration as usize]);
@@ -98,7 +89,6 @@ impl LatencyMeter {
         stages.filter(|(_, meter)| meter.work.count() > 0)
     }
 
-    /// Returns the latency of all poses.
     pub fn latency(self) -> Latency {
         let span_ns = self.span.map_or(0, |(first, last)| last - first).max(1) as f64;
         let hop = |meter: &HopMeter| HopLatency {
@@ -122,9 +112,97 @@ impl LatencyMeter {
     }
 }
 
+const DIGITS: u8 = 3;
+/// The longest distinguished duration, ns: an hour.
+const LONGEST_NS: u64 = 3_600_000_000_000;
+
+#[derive(Debug, Default)]
+pub struct Durations(Option<Histogram<u64>>);
+
+impl Durations {
+    /// Adds a duration. One below zero counts as zero, one above an hour as an hour.
+    pub fn add(&mut self, duration_ns: i64) {
+        if self.0.is_none() {
+            // Fails for more than 5 digits alone.
+            self.0 = Histogram::new_with_max(LONGEST_NS, DIGITS).ok();
+        }
+        if let Some(histogram) = &mut self.0 {
+            histogram.saturating_record(u64::try_from(duration_ns).unwrap_or(0));
+        }
+    }
+
+    pub fn count(&self) -> u64 {
+        self.0.as_ref().map_or(0, Histogram::len)
+    }
+
+    /// Returns the duration, ns, that this share (0 to 1) of all does not exceed; `None` if there
+    /// is no duration.
+    pub fn at(&self, share: f64) -> Option<u64> {
+        let histogram = self.0.as_ref()?;
+        Some(histogram.value_at_quantile(share))
+    }
+
+    pub fn percentiles(&self) -> Percentiles {
+        self.percentiles_if_any().unwrap_or_default()
+    }
+
+    /// Returns the percentiles; `None` if there is no duration.
+    pub fn percentiles_if_any(&self) -> Option<Percentiles> {
+        let histogram = self.0.as_ref()?;
+        let at = |share| histogram.value_at_quantile(share) as f64 * 1e-3;
+        Some(Percentiles {
+            p50_us: at(0.5),
+            p90_us: at(0.9),
+            p99_us: at(0.99),
+            max_us: histogram.max() as f64 * 1e-3,
+        })
+    }
+}
+
+/// Starts (+1) and ends (-1) of work in the order of time. Work earlier than the first work on the
+/// newest scan is final, so only the scans in flight are kept.
+#[derive(Debug, Default)]
+struct Overlap {
+    edges: BinaryHeap<Reverse<(i64, i32)>>,
+    busy: i32,
+    since_ns: i64,
+    together_ns: i64,
+}
+
+impl Overlap {
+    fn add(&mut self, hops: &Hops) {
+        let worked = |hop: &&Hop| **hop != Hop::default();
+        for hop in hops.iter().filter(worked) {
+            self.edges.push(Reverse((hop.started_ns, 1)));
+            self.edges.push(Reverse((hop.finished_ns, -1)));
+        }
+        self.sweep(hops[0].started_ns);
+    }
+
+    /// Returns the time while two or more stages worked at once, ns.
+    fn together_ns(mut self) -> i64 {
+        self.sweep(i64::MAX);
+        self.together_ns
+    }
+
+    fn sweep(&mut self, until_ns: i64) {
+        while let Some(Reverse((at_ns, change))) = self.edges.peek().copied() {
+            if at_ns >= until_ns {
+                break;
+            }
+            self.edges.pop();
+            if self.busy >= 2 {
+                self.together_ns += at_ns - self.since_ns;
+            }
+            self.busy += change;
+            self.since_ns = at_ns;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Hop, Item};
+    use gyre_messages::Item;
 
     use super::*;
 
@@ -138,15 +216,8 @@ mod tests {
                 published_ns: received_ns + 7000,
             }
         };
-        let hops = [
-            hop(0),
-            hop(1),
-            hop(2),
-            hop(3),
-            Hop::default(),
-            Hop::default(),
-            hop(4),
-        ];
+        let mut hops = [0, 1, 2, 3, 0, 0, 4].map(hop);
+        hops[4..6].fill(Hop::default());
         PoseHeader {
             item: Item {
                 due_ns,
@@ -176,20 +247,25 @@ mod tests {
         assert!(near(latency.sensor_to_pose.p50_us, 46.0));
         assert!(latency.stages["radar-replay"].transport.is_none());
         assert_eq!((latency.stages.len(), latency.overlap), (5, 0.0));
-    }
-
-    #[test]
-    fn scans_a_hop_apart_keep_two_stages_busy_at_once() {
+        // A hop apart they keep two stages busy at once.
         let latency = measured(&[pose(0), pose(10_000)]);
-        assert!(
-            near(latency.overlap, 4.0 * 5.0 / 55.0),
-            "{}",
-            latency.overlap
-        );
+        assert!(near(latency.overlap, 4.0 * 5.0 / 55.0), "{latency:?}");
+        assert_eq!(measured(&[]).sensor_to_pose, Percentiles::default());
     }
 
     #[test]
-    fn percentiles_of_nothing_are_zero() {
-        assert_eq!(measured(&[]).sensor_to_pose, Percentiles::default());
+    fn only_the_scans_in_flight_are_kept() {
+        let mut overlap = Overlap::default();
+        for scan in 0..1000 {
+            let hop = |k: i64| Hop {
+                started_ns: scan * 10 + k * 10,
+                finished_ns: scan * 10 + k * 10 + 8,
+                ..Hop::default()
+            };
+            overlap.add(&std::array::from_fn(|k| hop(k as i64 + 1)));
+            assert!(overlap.edges.len() <= 2 * 7 * 8, "{}", overlap.edges.len());
+        }
+        // Seven stages work at once for 8 of 10 ns; alone are the first and the last scan's ends.
+        assert_eq!(overlap.together_ns(), 8 * (1000 + 6 - 2));
     }
 }

@@ -1,18 +1,9 @@
 //! A run as data: the sections of its configuration that its processes read, and its report at the
-//! end.
-//!
-//! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and
-//!   [`Budget`] are sections;
-//! - [`Report`] is the supervisor's report, with the [`StageCounters`] of each process.
-//!
-//! It is light, so that a stage which reads its own section, and a program which only writes
-//! configurations, need neither the mathematics nor the transport.
+//! end. It needs neither the mathematics nor the transport.
 
 mod budget;
 pub mod latency;
 mod link;
-mod played_fault;
-mod played_from;
 mod processes;
 mod rate;
 mod record;
@@ -24,15 +15,13 @@ mod unset;
 
 pub use budget::{Budget, Limits};
 pub use link::{LinkConfig, Side};
-pub use played_fault::{PlayedFault, PlayedFaultKind};
-pub use played_from::PlayedFrom;
 pub use processes::{EarlierRun, Mode, RestartPolicy, RunConfig, StageConfig};
 pub use rate::Rate;
 pub use record::RecordConfig;
 pub use report::{Ending, Report, StageCounters, Swapped};
 pub use scenario::{Judged, RADAR_HZ, Scenario};
 pub use scheduling::Scheduling;
-pub use source::{SourceConfig, SourceKind};
+pub use source::{PlayedFault, PlayedFaultKind, PlayedFrom, SourceConfig, SourceKind};
 
 /// The file in the folder of the results with the configuration of the run's begin, TOML.
 pub const BEGUN_WITH: &str = "journal/run.toml";

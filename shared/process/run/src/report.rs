@@ -4,13 +4,11 @@ use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-/// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
     /// All scans are in the trajectory.
     Complete,
-    /// Stopped by SIGINT or SIGTERM.
     Interrupted,
 }
 
@@ -19,22 +17,17 @@ pub enum Ending {
 pub struct Report {
     /// The end of the run.
     pub ending: Ending,
-    /// Number of restarts by stage.
     pub restarts: BTreeMap<String, usize>,
     /// Time from each death to the first pose with work of the new process.
     pub recovery: Vec<Duration>,
-    /// Counters of the last process of each stage.
     pub counters: BTreeMap<String, StageCounters>,
-    /// The programs that have taken the place of others, in order.
     pub swaps: Vec<Swapped>,
 }
 
 /// A program that has taken the place of a stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Swapped {
-    /// The name of the stage.
     pub stage: String,
-    /// The program and its arguments.
     pub command: Vec<String>,
     pub after_poses: u64,
 }
@@ -71,6 +64,5 @@ pub struct StageCounters {
     /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source
     /// only).
     pub slipped_ns: u64,
-    /// Time spent in `process`, ns.
     pub busy_ns: u64,
 }

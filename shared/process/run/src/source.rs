@@ -1,34 +1,23 @@
-//! The section `[source]`.
+//! The section `[source]`: where scans come from, and the faults to inject into them.
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{PlayedFault, PlayedFrom};
-
-/// Where scans come from.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum SourceKind {
-    /// A recording, or a simulation.
-    #[default]
-    Recording,
-    /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
-    Colossus,
-    /// A Navtech radar behind its driver in ROS 2.
-    Ros2,
-}
-
-impl SourceKind {
-    /// Returns its name in configurations.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Recording => "recording",
-            Self::Colossus => "colossus",
-            Self::Ros2 => "ros2",
-        }
+gyre_messages::named! {
+    /// Where scans come from.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum SourceKind {
+        /// A recording, or a simulation.
+        #[default]
+        Recording = "recording",
+        /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
+        Colossus = "colossus",
+        /// A Navtech radar behind its driver in ROS 2.
+        Ros2 = "ros2",
     }
 }
 
@@ -151,6 +140,107 @@ impl SourceConfig {
             true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
             false => once,
         }
+    }
+}
+
+gyre_messages::named! {
+    /// The first topic that is played from a recording: the stages that compute it, and all stages
+    /// before, are absent.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFrom {
+        /// Scans: all stages compute.
+        #[default]
+        Scan = "scan",
+        /// Masked scans.
+        Masked = "masked",
+        /// Rotations, beside masked scans.
+        Rotation = "rotation",
+        /// Searched motions, beside masked scans.
+        Motion = "motion",
+        /// Refined motions.
+        Refined = "refined",
+    }
+}
+
+impl PlayedFrom {
+    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads
+    /// masked scans, for the keyframes of SLAM.
+    pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {
+        match self {
+            Self::Scan => vec!["scan"],
+            Self::Masked => vec!["masked"],
+            Self::Rotation => vec!["masked", "rotation"],
+            Self::Motion if refines || reads_masked => vec!["masked", "motion"],
+            Self::Motion => vec!["motion"],
+            Self::Refined if reads_masked => vec!["masked", "refined"],
+            Self::Refined => vec!["refined"],
+        }
+    }
+}
+
+gyre_messages::named! {
+    /// The kind of a fault.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFaultKind {
+        /// There are no samples of the gyro.
+        #[default]
+        GyroOut = "gyro-out",
+        /// The wheels turn 30 % faster than the vehicle drives.
+        WheelsSlip = "wheels-slip",
+        /// The stamps of the samples of gyro and wheels are 1 s ahead.
+        ClockJump = "clock-jump",
+        /// Scans show nothing.
+        RadarBlind = "radar-blind",
+    }
+}
+
+impl PlayedFaultKind {
+    /// Share of the excess turn of slipping wheels.
+    pub const SLIP_SHARE: f64 = 0.3;
+    /// Jump of the stamps of samples, s.
+    pub const JUMP_S: f64 = 1.0;
+}
+
+/// A fault to inject into the playback of a recording, at the same place of each turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlayedFault {
+    /// `gyro-out`: no samples of the gyro; `wheels-slip`: wheels that turn 30 % too fast;
+    /// `clock-jump`: stamps of the samples of gyro and wheels that are 1 s ahead; `radar-blind`:
+    /// scans that show nothing.
+    pub kind: PlayedFaultKind,
+    /// The begin, s after the stamp of the first scan that is played.
+    pub from_s: f64,
+    /// The duration, s; 0: no fault.
+    pub for_s: f64,
+}
+
+impl PlayedFault {
+    /// Returns whether it is there at a time after the stamp of the first scan, s.
+    pub fn is_at(&self, time_s: f64) -> bool {
+        (self.from_s..self.from_s + self.for_s).contains(&time_s)
+    }
+
+    /// Returns the time when its last effect ends, s after the stamp of the first scan: a clock
+    /// that jumps back repeats earlier stamps.
+    pub fn ends_s(&self) -> f64 {
+        let after_s = match self.kind {
+            PlayedFaultKind::ClockJump => PlayedFaultKind::JUMP_S,
+            _ => 0.0,
+        };
+        self.from_s + self.for_s + after_s
+    }
+
+    /// Returns the first key whose value is no time of at least 0.
+    pub fn invalid(&self) -> Option<(&'static str, f64)> {
+        let mut times = [("from_s", self.from_s), ("for_s", self.for_s)].into_iter();
+        times.find(|(_, time_s)| !(time_s.is_finite() && *time_s >= 0.0))
     }
 }
 

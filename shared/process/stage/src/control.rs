@@ -6,6 +6,7 @@
 mod exchange;
 
 use std::{
+    fmt::Display,
     fs, io,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
@@ -17,7 +18,6 @@ use serde::{Deserialize, Serialize};
 use crate::{Manifest, StageError, run, sessions::not_running, source::Received};
 use exchange::Sent;
 
-/// The name of the socket in the run's root.
 pub const SOCKET: &str = "control.sock";
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -26,84 +26,65 @@ const LOOK: Duration = Duration::from_secs(1);
 /// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
-/// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
-    /// Report the state of the run.
     Status,
     /// End the run as an interrupt does: its journal stays, and the same command continues it.
     Stop,
     Restart {
-        /// The name of the stage or follower, or `recorder`.
         process: String,
     },
-    /// Replace the program of a stage.
     Swap(Swap),
 }
 
-/// Another program for a stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Swap {
-    /// The name of the stage or follower.
     pub process: String,
     /// Program and arguments; `None`: those that the run was begun with.
     pub command: Option<Vec<String>>,
-    /// The directory for starting the program.
     pub directory: PathBuf,
     /// True if the program is started only when the one before has ended, since it cannot stand by.
     pub cold: bool,
 }
 
-/// The answer to a request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
-    /// To [`Request::Status`].
     Status(Box<Status>),
     /// It is done, or has begun.
     Done,
-    /// It was not done, and why.
     Refused(String),
     /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a
     /// sentence.
     Untried(String),
 }
 
-/// The state of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// The process of the supervisor.
     pub pid: u32,
-    /// The folder of the results.
     pub out: PathBuf,
     /// The current folder of the command that has started the run.
     pub started_in: PathBuf,
     pub live: bool,
-    /// Where the run is between its start and its end.
     pub phase: Phase,
-    /// Time since the supervisor has started, s.
     pub uptime_s: f64,
     /// Scans that the source has published; `None` if a replaced source does not report them.
     pub published: Option<u64>,
     pub poses: u64,
-    /// Scans that were dropped before the newest pose.
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
     /// The trouble of the whole run: it waits for its radar, or its disk is full.
     #[serde(default)]
     pub notice: Option<String>,
-    /// The swap that is not done yet.
     pub swap: Option<PendingSwap>,
     /// The processes: the stages in the order of the stream, the followers, the recorder.
     pub processes: Vec<ProcessStatus>,
 }
 
-/// A swap that is not done yet.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PendingSwap {
-    /// The name of the stage or follower.
     pub process: String,
     pub command: Vec<String>,
     /// True if the program has taken over, but no scan has passed through it yet; false if it has
@@ -115,32 +96,22 @@ pub struct PendingSwap {
     pub limit_s: Option<f64>,
 }
 
-/// Where a run is between its start and its end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Phase {
-    /// A stage has not opened its topics.
-    #[default]
-    Starting,
-    Running,
-    /// The stream has ended, and followers read their logs to the end.
-    Following,
-}
-
-impl Phase {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Running => "running",
-            Self::Following => "following",
-        }
+gyre_messages::named! {
+    /// Where a run is between its start and its end.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Phase {
+        /// A stage has not opened its topics.
+        #[default]
+        Starting = "starting",
+        Running = "running",
+        /// The stream has ended, and followers read their logs to the end.
+        Following = "following",
     }
 }
 
-/// The state of a process of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProcessStatus {
-    /// The name of the stage or follower, or `recorder`.
     pub name: String,
     pub pid: u32,
     pub command: Vec<String>,
@@ -149,11 +120,8 @@ pub struct ProcessStatus {
     pub activity: Activity,
     /// For how long it has done that, s; `None` if it does not report it.
     pub activity_s: Option<f64>,
-    /// Time since its start, s.
     pub uptime_s: f64,
-    /// The restarts, for whatever reason.
     pub restarts: usize,
-    /// The cause of its last death.
     pub last_death: Option<String>,
     /// Messages that it should have recorded and has missed since its start; `None` if it is no
     /// recorder.
@@ -162,37 +130,22 @@ pub struct ProcessStatus {
     pub received: Option<Received>,
 }
 
-/// The activity of a process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Activity {
-    /// It has not opened its topics: it may be loading a model.
-    Starting,
-    /// It sleeps until there is work.
-    Waiting,
-    /// It works on an item.
-    Working,
-    /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
-    Silent,
-    /// It runs, and writes no heartbeat, as a replacement need not.
-    Running,
-    Ended,
-}
-
-impl Activity {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Waiting => "waiting",
-            Self::Working => "working",
-            Self::Silent => "silent",
-            Self::Running => "running",
-            Self::Ended => "ended",
-        }
+gyre_messages::named! {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Activity {
+        /// It has not opened its topics: it may be loading a model.
+        Starting = "starting",
+        Waiting = "waiting",
+        Working = "working",
+        /// It has not woken from a sleep that has ended: it is stopped, or not run by the system.
+        Silent = "silent",
+        /// It runs, and writes no heartbeat, as a replacement need not.
+        Running = "running",
+        Ended = "ended",
     }
 }
 
-/// A client of a run's supervisor.
 #[derive(Debug)]
 pub struct Control {
     root: PathBuf,
@@ -202,7 +155,6 @@ pub struct Control {
 }
 
 impl Control {
-    /// Returns the control of the run that writes its results to `out`.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         Self::at(run::root_of(&absolute), out.to_owned()).ok_or_else(|| not_running(out.to_owned()))
@@ -232,13 +184,11 @@ impl Control {
         runs
     }
 
-    /// Returns the folder of the run's results.
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// Returns the state of the run.
     pub fn status(&self) -> Result<Status, StageError> {
         self.status_or("")
     }
@@ -246,7 +196,7 @@ impl Control {
     fn status_or(&self, otherwise: &str) -> Result<Status, StageError> {
         match self.ask(&Request::Status, otherwise)? {
             Answer::Status(status) => Ok(*status),
-            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+            answer => Err(self.silent(format_args!("its answer is {answer:?}"))),
         }
     }
 
@@ -255,7 +205,6 @@ impl Control {
         self.order(&Request::Stop)
     }
 
-    /// Starts a process of the run again.
     pub fn restart(&self, process: &str) -> Result<(), StageError> {
         let process = process.to_owned();
         self.order(&Request::Restart { process })
@@ -299,16 +248,17 @@ impl Control {
     fn is_done(&self, answer: Answer) -> Result<(), StageError> {
         match answer {
             Answer::Done => Ok(()),
-            Answer::Refused(reason) => Err(StageError::Refused(reason)),
-            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+            Answer::Refused(reason) => Err(StageError::Input(reason)),
+            answer => Err(self.silent(format_args!("its answer is {answer:?}"))),
         }
     }
 
     /// Asks. The error that there is no answer ends with `otherwise`.
     fn ask(&self, request: &Request, otherwise: &str) -> Result<Answer, StageError> {
         self.wait(self.send(request)?, ANSWER, |_| {
-            let reason = format!("there was no answer within {ANSWER:?}{otherwise}");
-            Err(self.silent(reason))
+            Err(self.silent(format_args!(
+                "there was no answer within {ANSWER:?}{otherwise}"
+            )))
         })
     }
 
@@ -327,7 +277,7 @@ impl Control {
         loop {
             let answer = sent.answer(period).map_err(|error| self.failed(&error))?;
             if let Some(line) = answer {
-                return serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()));
+                return serde_json::from_str(&line).map_err(|error| self.silent(error));
             }
             look(self)?;
         }
@@ -339,15 +289,15 @@ impl Control {
             | io::ErrorKind::ConnectionRefused
             | io::ErrorKind::ConnectionReset
             | io::ErrorKind::UnexpectedEof => not_running(self.out.clone()),
-            _ => self.silent(error.to_string()),
+            _ => self.silent(error),
         }
     }
 
-    fn silent(&self, reason: String) -> StageError {
-        StageError::Silent {
-            out: self.out.clone(),
-            reason,
-        }
+    fn silent(&self, reason: impl Display) -> StageError {
+        let out = self.out.display();
+        StageError::Input(format!(
+            "the run that writes to {out} does not answer: {reason}"
+        ))
     }
 }
 

@@ -1,12 +1,17 @@
-//! The counters of a stage.
+//! The counters of a stage, and of the heap allocations, to measure that `process` does not
+//! allocate.
 
-use std::{fs, path::PathBuf};
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+    fs,
+    path::PathBuf,
+};
 
 use gyre_run::StageCounters;
 
-use crate::{Manifest, StageError, allocations, run};
+use crate::{Manifest, StageError, clock, run};
 
-/// Returns the file in the run's root for a stage's counters.
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.root.join(format!("{stage}.counters.json"))
 }
@@ -31,9 +36,8 @@ pub(crate) fn write(
     run::write(path_of(manifest, stage), &text)
 }
 
-/// Counts the work on one item.
 pub(crate) fn record(counters: &mut StageCounters, allocations: u64, busy_ns: i64) {
-    if allocations::are_counted() {
+    if allocations_are_counted() {
         let count = match counters.processed < WARM_UP {
             true => &mut counters.allocations_in_first_five,
             false => &mut counters.allocations_after_five,
@@ -42,4 +46,94 @@ pub(crate) fn record(counters: &mut StageCounters, allocations: u64, busy_ns: i6
     }
     counters.processed += 1;
     counters.busy_ns += busy_ns.max(0) as u64;
+}
+
+pub(crate) struct Work {
+    pub started_ns: i64,
+    allocated: u64,
+}
+
+impl Work {
+    pub fn begin() -> Self {
+        Self {
+            started_ns: clock::now_ns(),
+            allocated: allocations_so_far(),
+        }
+    }
+
+    /// Counts the work; returns its end, ns.
+    pub fn end(&self, counters: &mut StageCounters) -> i64 {
+        let finished_ns = clock::now_ns();
+        let allocations = allocations_so_far() - self.allocated;
+        record(counters, allocations, finished_ns - self.started_ns);
+        finished_ns
+    }
+}
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system allocator with a count of the allocations of each thread. A program that makes it its
+/// global allocator has the allocations of its stages counted:
+///
+/// ```
+/// #[global_allocator]
+/// static ALLOCATOR: gyre_stage::CountingAllocator = gyre_stage::CountingAllocator;
+/// # fn main() {}
+/// ```
+#[derive(Debug)]
+pub struct CountingAllocator;
+
+fn count() {
+    // A thread that is being torn down has no counter.
+    let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+}
+
+// SAFETY: every call is forwarded to the system allocator unchanged; counting neither allocates nor
+// panics.
+unsafe impl GlobalAlloc for CountingAllocator {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        unsafe { System.realloc(block, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+fn allocations_so_far() -> u64 {
+    COUNT.with(Cell::get)
+}
+
+fn allocations_are_counted() -> bool {
+    // Every stage allocates before its first item.
+    allocations_so_far() > 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CountingAllocator, allocations_are_counted, allocations_so_far as so_far};
+
+    #[global_allocator]
+    static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+    #[test]
+    fn an_allocation_is_counted_once_and_its_release_is_not() {
+        let before = so_far();
+        drop(std::hint::black_box(Box::new(7)));
+        assert_eq!(so_far() - before, 1);
+        assert!(allocations_are_counted());
+    }
 }

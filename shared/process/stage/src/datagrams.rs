@@ -8,7 +8,6 @@ use std::{
 
 use crate::StageError;
 
-/// The largest datagram of UDP, bytes.
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
 /// Opens the non-blocking socket for the data of a section.

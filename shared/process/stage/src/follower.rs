@@ -1,29 +1,23 @@
 //! The loop of a follower: a process that reads durable logs at its own pace, and publishes for
-//! observers.
-//!
-//! A follower is not in the stream: no stage waits for it, and it gives no credit. It can be late
-//! by any time, since all that it needs is in the logs. An event wakes it when a log has grown; as
-//! events can be lost, it looks every 200 ms.
-
-mod growth;
-mod progress;
+//! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
+//! grown; as events can be lost, it looks every 200 ms.
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Header, Item, Message, flag};
+use gyre_messages::{Header, Item, Message};
 
-pub use crate::log_id::LogId;
+pub use crate::log_id::{Growth, LogId};
 use crate::{
-    Launch, Listener, StageCounters, StageError, allocations, clock, wake, writer::Writer,
+    Launch, Listener, Manifest, StageCounters, StageError,
+    counters::Work,
+    numbers::{self, Numbers},
+    wake,
+    writer::Writer,
 };
-pub use growth::Growth;
-use progress::ProgressWriter;
-pub use progress::{Progress, is_done, read as progress_of};
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
 
-/// A follower: a function of its logs.
 pub trait Follower {
     type Output: Message;
     /// The logs whose growth wakes it.
@@ -34,16 +28,15 @@ pub trait Follower {
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
     /// Makes its writes survive a power failure. A failure is found by nobody after the process.
-    fn sync(&mut self) -> Result<(), StageError>;
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
 
-    /// Returns the position in the logs.
     fn progress(&self) -> Progress;
 }
 
-/// The result of a step.
 #[derive(Debug)]
 pub enum Step<H> {
-    /// There is nothing new in the logs.
     Idle,
     /// Records were worked on, and there may be more. The message is published.
     Worked(Option<H>),
@@ -53,20 +46,17 @@ pub enum Step<H> {
 
 /// Runs a follower to the end of its logs, or until SIGTERM.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     // Only latency depends on it.
     let _ = rustix::process::nice(NICENESS);
-    let listeners: Vec<Listener> = F::LOGS
-        .iter()
-        .map(|log| Listener::open(&launch.node, log.event()))
-        .collect::<Result<_, _>>()?;
+    let logs = F::LOGS.iter();
+    let listeners = logs.map(|log| Listener::open(&launch.node, log.name()));
+    let listeners: Vec<Listener> = listeners.collect::<Result<_, _>>()?;
     let grown: Vec<&Listener> = listeners.iter().collect();
     launch.begin_heartbeat()?;
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
-        report: ProgressWriter::create(&launch.manifest, &launch.name)?,
+        report: Numbers::open(&launch.manifest, &file_of(&launch.name), 0)?,
         delay: launch.delay(),
         next_seq: 0,
         counters: StageCounters::default(),
@@ -99,7 +89,8 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
 
 struct Flow<M: Message> {
     output: Writer<M>,
-    report: ProgressWriter,
+    /// [`Progress::done`], [`Progress::total`], and 1 at the end of the logs.
+    report: Numbers<3>,
     delay: Duration,
     next_seq: u64,
     counters: StageCounters,
@@ -110,13 +101,13 @@ impl<M: Message> Flow<M> {
         &mut self,
         follower: &mut F,
     ) -> Result<Step<M::Header>, StageError> {
-        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let work = Work::begin();
         let mut step = follower.step()?;
         if let Step::Worked(message) = &mut step {
-            let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-            crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
+            work.end(&mut self.counters);
             if let Some(header) = message.take() {
-                self.publish(header)?;
+                self.next_seq = header.item().seq.saturating_add(1);
+                self.output.publish(header, None)?;
             }
             if !self.delay.is_zero() {
                 thread::sleep(self.delay);
@@ -125,26 +116,40 @@ impl<M: Message> Flow<M> {
         let has_ended = matches!(step, Step::Ended);
         if has_ended {
             follower.sync()?;
-            self.publish_end()?;
+            self.output.end(Item::numbered(self.next_seq), None)?;
         }
-        self.report.write(follower.progress(), has_ended)?;
+        let Progress { done, total } = follower.progress();
+        self.report.write([done, total, has_ended.into()])?;
         Ok(step)
     }
+}
 
-    fn publish(&mut self, header: M::Header) -> Result<(), StageError> {
-        self.next_seq = header.item().seq.saturating_add(1);
-        let mut draft = self.output.loan()?;
-        *draft.header() = header;
-        self.output.send_unchanged(draft)
-    }
+/// The position of a follower. The supervisor learns from its file whether the follower has come to
+/// its end, which no exit code shows: a follower that was asked to end exits as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    pub done: u64,
+    pub total: u64,
+}
 
-    fn publish_end(&mut self) -> Result<(), StageError> {
-        let mut draft = self.output.loan()?;
-        *draft.header().item_mut() = Item {
-            seq: self.next_seq,
-            flags: flag::END,
-            ..Item::default()
-        };
-        self.output.send_unchanged(draft)
+impl Progress {
+    pub fn of(done: usize, total: usize) -> Self {
+        let [done, total] = [done, total].map(|it| it as u64);
+        Self { done, total }
     }
+}
+
+/// Returns the progress of a follower and whether it has come to its end; `None` before its first
+/// step.
+pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
+    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)), 0)?;
+    Some((Progress { done, total }, ended == 1))
+}
+
+pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
+    progress_of(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
+}
+
+fn file_of(follower: &str) -> String {
+    format!("{follower}.progress")
 }

@@ -1,11 +1,7 @@
-//! Generations of numbers.
-//!
-//! In live mode masking numbers the scans that it takes. When it is started again it gives the
-//! numbers behind the newest pose to other scans, and what had been sent under them is void; a
-//! sensor's source does so when the run is started again. Each such start begins a generation,
-//! which its messages carry. So an observer, or a reader of a recording, can distinguish a scan
-//! that reuses a number from a scan that is sent again. The file of the generations has all of them
-//! with their first numbers, for one that has seen no message of some.
+//! Generations of numbers: masking that is started again in live mode gives the numbers behind the
+//! newest pose to other scans, and a sensor's source does so when the run is started again. Each
+//! such start begins a generation, which its messages carry, so that a reused number differs from a
+//! message that is sent again. The file has all generations, for one that has seen none of some.
 
 use std::{
     fmt, io,
@@ -13,16 +9,13 @@ use std::{
 };
 
 use gyre_messages::{GivenAnew, Item, NumberedBy};
-use gyre_storage::StorageError;
 
 use crate::{Manifest, StageError};
 
 /// Generations in the file of a run: the newest ones. Who looks on has missed far fewer.
 const KEPT: usize = 1000;
-/// The largest such file, bytes.
 const MAX_BYTES: u64 = 64 * KEPT as u64;
 
-/// The generation of the numbers of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Generation(GivenAnew);
 
@@ -47,19 +40,15 @@ impl Generation {
         });
         let kept = lines.iter().skip(lines.len().saturating_sub(KEPT));
         let text: String = kept.map(Line::to_string).collect();
-        let folder = path.parent().map_or(Ok(()), gyre_storage::create_folder);
-        folder
-            .and_then(|()| gyre_storage::write(&path, text))
-            .map_err(|StorageError { path, source, .. }| StageError::File { path, source })?;
+        gyre_storage::create_folder(&manifest.out.join("journal"))?;
+        gyre_storage::write(&path, text)?;
         Ok(Self(GivenAnew { generation, first }))
     }
 
-    /// Returns the file that keeps the generations of a run.
     pub fn path(out: &Path) -> PathBuf {
         out.join("journal").join("generation")
     }
 
-    /// Writes it into the item of a message.
     pub fn mark(&self, item: &mut Item) {
         (item.generation, item.numbered_from) = (self.0.generation, self.0.first);
     }
@@ -114,17 +103,10 @@ impl fmt::Display for Line {
     }
 }
 
-/// Reads the generations of a run; none before the first.
 fn read(path: &Path) -> Result<Vec<Line>, StageError> {
     let text = match gyre_storage::read_text(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(source) => {
-            return Err(StageError::File {
-                path: path.to_owned(),
-                source,
-            });
-        }
-        Ok(text) => text,
+        read => read.map_err(StageError::file(path))?,
     };
     let lines: Option<Vec<Line>> = text.lines().map(Line::parse).collect();
     lines.filter(|lines| !lines.is_empty()).ok_or_else(|| {

@@ -20,7 +20,6 @@ use crate::{
     datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
 };
 
-/// The first row of the log.
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
 /// The row of a line that is no fix: readers of the log count it.
 const UNREADABLE: &str = "unreadable\n";
@@ -29,7 +28,6 @@ const MAX_ROWS: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
 /// Maximum size of the log, bytes: several days of fixes.
 const MAX_LOG: u64 = 1 << 30;
-/// Time between two looks whether reception is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Receives fixes in a thread of its own, so that no fix waits while the trajectory is solved, and
@@ -37,11 +35,9 @@ const WAIT: Duration = Duration::from_millis(50);
 pub struct GnssReceiver {
     thread: Option<JoinHandle<Result<(), StageError>>>,
     shared: Arc<Shared>,
-    /// Number of datagrams when the log was last read.
     read: Option<u64>,
 }
 
-/// The state that both threads have.
 struct Shared {
     ends: AtomicBool,
     /// Datagrams in the log. It is written and read while this is locked.
@@ -60,7 +56,7 @@ impl GnssReceiver {
     /// Receives at an address, and continues the log if there is one.
     pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
         let socket = listen("fixes of GNSS", "gnss", address)?;
-        let log = Log::open(log).map_err(unwritten)?;
+        let log = Log::open(log)?;
         let timeout = socket.set_read_timeout(Some(WAIT));
         timeout.map_err(|error| StageError::transport("receive fixes", error))?;
         let shared = Arc::new(Shared {
@@ -101,10 +97,10 @@ impl GnssReceiver {
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(ended)) => ended,
-            Some(Err(_)) => {
-                let reason = "the thread has ended without a reason";
-                Err(StageError::transport("receive fixes", reason))
-            }
+            Some(Err(_)) => Err(StageError::transport(
+                "receive fixes",
+                "the thread has ended",
+            )),
         }
     }
 }
@@ -116,11 +112,6 @@ impl Drop for GnssReceiver {
     }
 }
 
-fn unwritten(StorageError { path, source, .. }: StorageError) -> StageError {
-    StageError::File { path, source }
-}
-
-/// The log, which is written at its end.
 struct Log {
     file: File,
     end: u64,
@@ -194,11 +185,10 @@ impl Reception {
             tracing::warn!(lost, "datagrams with fixes came faster than they are read");
         }
         let surplus = self.surplus();
-        self.log.append(&surplus).map_err(unwritten)?;
-        self.log.sync.finish().map_err(unwritten)
+        self.log.append(&surplus)?;
+        Ok(self.log.sync.finish()?)
     }
 
-    /// Returns the row that counts the surplus; nothing without one.
     fn surplus(&mut self) -> String {
         match std::mem::take(&mut self.surplus) {
             0 => String::new(),
@@ -216,43 +206,36 @@ impl Reception {
         for line in lines {
             self.rows += 1;
             match self.rows <= MAX_ROWS && self.log.end < MAX_LOG {
-                true => rows += &row(line),
+                true => rows += row(line).as_deref().unwrap_or(UNREADABLE),
                 false => self.surplus += 1,
             }
         }
         let mut datagrams = self.shared.lock();
-        self.log.append(&rows).map_err(unwritten)?;
+        self.log.append(&rows)?;
         *datagrams += 1;
         // Readers do not wait for the disk.
         drop(datagrams);
-        self.log.sync.changed().map_err(unwritten)
+        Ok(self.log.sync.changed()?)
     }
 }
 
 /// Returns the row of a line: a stamp, ns, latitude and longitude, degrees (both empty without a
-/// fix), and the standard deviation, m, if the receiver knows it.
-fn row(line: &str) -> String {
+/// fix), and the standard deviation, m, if the receiver knows it. `None`: it is no fix.
+fn row(line: &str) -> Option<String> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let row = match fields[..] {
-        [stamp, "", ""] | [stamp, "", "", _] => no_fix(stamp),
-        [stamp, latitude, longitude] | [stamp, latitude, longitude, ""] => {
-            fix(stamp, [latitude, longitude, "0"])
-        }
-        [stamp, latitude, longitude, sigma_m] => fix(stamp, [latitude, longitude, sigma_m]),
-        _ => None,
+    let (stamp, position, sigma_m) = match fields[..] {
+        [stamp, latitude, longitude] => (stamp, [latitude, longitude], ""),
+        [stamp, latitude, longitude, sigma_m] => (stamp, [latitude, longitude], sigma_m),
+        _ => return None,
     };
-    row.unwrap_or_else(|| UNREADABLE.to_owned())
-}
-
-fn no_fix(stamp: &str) -> Option<String> {
     let stamp_ns: i64 = stamp.parse().ok()?;
-    Some(format!("{stamp_ns},,,0\n"))
-}
-
-fn fix(stamp: &str, numbers: [&str; 3]) -> Option<String> {
-    let stamp_ns: i64 = stamp.parse().ok()?;
-    let numbers = numbers.map(|number| number.parse::<f64>().ok());
-    let [Some(latitude), Some(longitude), Some(sigma_m)] = numbers else {
+    if position == ["", ""] {
+        return Some(format!("{stamp_ns},,,0\n"));
+    }
+    let sigma_m = if sigma_m.is_empty() { "0" } else { sigma_m };
+    let [latitude, longitude] = position;
+    let numbers = [latitude, longitude, sigma_m].map(str::parse::<f64>);
+    let [Ok(latitude), Ok(longitude), Ok(sigma_m)] = numbers else {
         return None;
     };
     // The shortest text that is read back as the same number.
@@ -282,11 +265,11 @@ mod tests {
             ("stamp_ns,latitude_deg,longitude_deg", UNREADABLE),
             ("\"17", UNREADABLE),
         ] {
-            assert_eq!(row(line), expected, "{line}");
+            let row = row(line);
+            assert_eq!(row.as_deref().unwrap_or(UNREADABLE), expected, "{line}");
         }
     }
 
-    /// Sends datagrams to a receiver at this port.
     fn send(address: &str, datagrams: &[&[u8]]) {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         for datagram in datagrams {
@@ -294,7 +277,6 @@ mod tests {
         }
     }
 
-    /// Returns an address that stays free: senders take their ports on 127.0.0.1.
     /// Returns an address below the ports that the system gives to sockets: no socket of another
     /// test takes the port between two receivers.
     fn free_address() -> String {

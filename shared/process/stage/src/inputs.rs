@@ -9,7 +9,6 @@ use crate::{
     transport::Listener,
 };
 
-/// The next action of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Wait: an input is missing.
@@ -18,23 +17,18 @@ pub enum Action {
     Keep,
     /// Process this item, whose last input was received at the given time (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
-    /// Pass on the end of the stream.
     End(Item),
 }
 
-/// The inputs of a stage.
 pub trait Inputs: Sized {
-    /// The inputs of one item.
     type View<'a>
     where
         Self: 'a;
 
     fn open(launch: &Launch) -> Result<Self, StageError>;
-    /// Reads the queues and returns what to do next.
     fn next_action(&mut self) -> Result<Action, StageError>;
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
-    /// Advances to the next item.
     fn advance(&mut self);
     /// Returns the listeners to wait for after [`Action::Wait`]. Where two inputs are missing one
     /// of them is enough, best the one that comes last: each wake-up less leaves a processor to the
@@ -45,11 +39,8 @@ pub trait Inputs: Sized {
 }
 
 /// Two consecutive items of one topic.
-pub struct Pairs<M: Message> {
-    reader: Reader<M>,
-}
+pub type Pairs<M> = Reader<M>;
 
-/// A view of [`Pairs`].
 pub struct PairView<'a, M: Message> {
     pub current: &'a Received<M>,
     /// The previous item; `None` where the chain starts.
@@ -59,79 +50,69 @@ pub struct PairView<'a, M: Message> {
 impl<M: Message> PairView<'_, M> {
     /// Returns the time between the two scans, ns on the sensor's clock; 0 where the chain starts.
     pub fn interval_ns(&self) -> i64 {
-        let stamp_ns = self.current.item().stamp_ns;
+        let stamp_ns = |received: &Received<M>| received.item().stamp_ns;
         self.previous.map_or(0, |previous| {
-            stamp_ns.saturating_sub(previous.item().stamp_ns)
+            stamp_ns(self.current).saturating_sub(stamp_ns(previous))
         })
     }
 }
 
 impl PairView<'_, Masked> {
-    /// Returns the rasters to match.
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
-        let previous = self
-            .previous
-            .map(|previous| (previous.header(), previous.values()));
+        let previous = self.previous.map(|it| (it.header(), it.values()));
         let pair = self.current.header().pair(self.current.values(), previous);
-        pair.ok_or_else(|| {
+        let malformed = || {
             self.current
                 .malformed("its rasters do not fit their headers")
-        })
+        };
+        pair.ok_or_else(malformed)
     }
 }
 
-impl<M: Message> Inputs for Pairs<M> {
+impl<M: Message> Inputs for Reader<M> {
     type View<'a> = PairView<'a, M>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        Ok(Self {
-            reader: Reader::open(launch, None)?,
-        })
+        Self::open(launch, None)
     }
 
     fn next_action(&mut self) -> Result<Action, StageError> {
-        let Some(head) = self.reader.head()? else {
+        let Some(head) = self.head()? else {
             return Ok(Action::Wait);
         };
         let (item, received_ns) = (*head.item(), head.received_ns);
-        Ok(action_for(
-            &item,
-            self.reader.previous().is_some(),
-            received_ns,
-        ))
+        let has_previous = self.previous().is_some();
+        Ok(action_for(&item, has_previous, received_ns))
     }
 
     fn view(&self) -> Option<PairView<'_, M>> {
         Some(PairView {
-            current: self.reader.current()?,
-            previous: self.reader.previous(),
+            current: self.current()?,
+            previous: self.previous(),
         })
     }
 
     fn advance(&mut self) {
-        self.reader.advance();
+        Self::advance(self);
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        vec![self.reader.listener()]
+        vec![self.listener()]
     }
 
     fn duplicates(&self) -> u64 {
-        self.reader.duplicates()
+        self.duplicates
     }
 }
 
 /// Two consecutive items of one topic, and the item of another topic for the later one.
 pub struct Joined<A: Message, B: Message> {
-    pairs: Reader<A>,
+    pairs: Pairs<A>,
     other: Reader<B>,
 }
 
-/// A view of [`Joined`].
 pub struct JoinedView<'a, A: Message, B: Message> {
-    /// The current and the previous item of the first topic.
     pub pair: PairView<'a, A>,
-    /// The message of the other topic for the current item.
     pub other: &'a Received<B>,
 }
 
@@ -161,11 +142,8 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
                     hops: other.hops,
                     ..item
                 };
-                return Ok(action_for(
-                    &item,
-                    self.pairs.previous().is_some(),
-                    received_ns,
-                ));
+                let has_previous = self.pairs.previous().is_some();
+                return Ok(action_for(&item, has_previous, received_ns));
             }
             // After a restart the history of the other topic may reach further back; its items are
             // of no use alone.
@@ -175,21 +153,15 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
 
     fn view(&self) -> Option<JoinedView<'_, A, B>> {
         Some(JoinedView {
-            pair: PairView {
-                current: self.pairs.current()?,
-                previous: self.pairs.previous(),
-            },
+            pair: self.pairs.view()?,
             other: self.other.current()?,
         })
     }
 
     fn advance(&mut self) {
-        let together = match (self.pairs.current(), self.other.current()) {
-            (Some(a), Some(b)) => a.item().seq == b.item().seq,
-            _ => false,
-        };
+        let seq = self.pairs.current().map(|it| it.item().seq);
         self.pairs.advance();
-        if together {
+        if seq.is_some() && seq == self.other.current().map(|it| it.item().seq) {
             self.other.release();
         }
     }
@@ -203,7 +175,7 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     }
 
     fn duplicates(&self) -> u64 {
-        self.pairs.duplicates() + self.other.duplicates()
+        self.pairs.duplicates + self.other.duplicates
     }
 }
 
@@ -222,21 +194,12 @@ mod tests {
 
     #[test]
     fn an_item_without_a_previous_one_is_only_kept_unless_the_chain_starts_there() {
-        let item = Item {
-            seq: 7,
-            ..Item::default()
-        };
+        let item = Item::numbered(7);
         assert_eq!(action_for(&item, false, 1), Action::Keep);
         assert_eq!(action_for(&item, true, 1), Action::Process(item, 1));
-        let start = Item {
-            flags: flag::BREAK,
-            ..item
-        };
+        let start = item.flagged(flag::BREAK);
         assert_eq!(action_for(&start, false, 1), Action::Process(start, 1));
-        let end = Item {
-            flags: flag::END,
-            ..item
-        };
+        let end = item.flagged(flag::END);
         assert_eq!(action_for(&end, true, 1), Action::End(end));
     }
 }

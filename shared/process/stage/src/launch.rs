@@ -1,13 +1,7 @@
 //! Start and end of a process of a run.
 
 use std::{
-    cell::Cell,
-    fs::{self, OpenOptions},
-    io::Write,
-    os::{fd::AsFd, unix::fs::OpenOptionsExt},
-    path::PathBuf,
-    process::ExitCode,
-    sync::Mutex,
+    cell::Cell, fs, io::Write, os::fd::AsFd, path::PathBuf, process::ExitCode, sync::Mutex,
     time::Duration,
 };
 
@@ -24,7 +18,7 @@ use tracing_subscriber::{filter::Targets, prelude::*};
 use crate::{
     Manifest, StageCounters, StageError, counters,
     heartbeat::HeartbeatWriter,
-    run,
+    manifest, run,
     transport::Node,
     wake::{self, Signals},
 };
@@ -35,40 +29,32 @@ const FILTER: &str = "info,zenoh=error,rustdds=error,ros2_client=error";
 
 /// The environment of a stage: its run, its configuration, and its node in the transport.
 pub struct Launch {
-    /// The name of the stage.
     pub name: String,
-    /// The manifest of the run.
     pub manifest: Manifest,
-    /// The signals that the process waits for.
     pub signals: Signals,
     configuration: toml::Table,
     pub(crate) node: Node,
-    /// True from [`Launch::take_place`] on.
     has_place: Cell<bool>,
     _log: EnteredSpan,
 }
 
 impl Launch {
-    /// Joins the run that [`run::ENVIRONMENT`] names.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
-        let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun {
-            stage: name.to_owned(),
+        let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| {
+            StageError::Configuration(
+                "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
+                    .to_owned(),
+            )
         })?;
         // If a shell is between this process and the supervisor, the process ends with the shell.
         let _ = set_parent_process_death_signal(Some(Signal::KILL));
         let manifest = Manifest::read(&PathBuf::from(root))?;
         let log = start_log(&manifest, name)?;
         let path = manifest.root.join("config.toml");
-        let text = fs::read_to_string(&path).map_err(|source| StageError::File {
-            path: path.clone(),
-            source,
-        })?;
-        let configuration =
-            text.parse()
-                .map_err(|error: toml::de::Error| StageError::Manifest {
-                    path,
-                    reason: error.message().to_owned(),
-                })?;
+        let text = fs::read_to_string(&path).map_err(StageError::file(&path))?;
+        let configuration = text
+            .parse()
+            .map_err(|error: toml::de::Error| StageError::manifest(&path, error.message()))?;
         let signals = Signals::install()?;
         let node = manifest.transport()?.join(name)?;
         Ok(Self {
@@ -84,50 +70,48 @@ impl Launch {
 
     /// Takes this process's place in the run, after loading its data, and before opening its topics
     /// or output files. A process that stands by waits here until the one before it has ended (see
-    /// [`run::STANDBY`]). False on a request to stop.
+    /// [`run::STANDBY`]). [`StageError::Stopped`] on a request to stop.
     ///
     /// The loops of this crate call it. A stage with files of its own calls it before it opens
     /// them; once is enough.
-    pub fn take_place(&self) -> Result<bool, StageError> {
+    pub fn take_place(&self) -> Result<(), StageError> {
         if self.has_place.get() {
-            return Ok(true);
+            return Ok(());
         }
         self.lock_memory()?;
-        if stands_by() && !self.stand_by()? {
-            return Ok(false);
+        if stands_by() {
+            self.stand_by()?;
         }
         self.has_place.set(true);
         // A follower may still have long logs to read: its loop begins the heartbeat.
         if FollowerId::by_name(&self.name).is_none() {
             self.begin_heartbeat()?;
         }
-        Ok(true)
+        Ok(())
     }
 
-    /// Reports each wait of this process from here on.
     pub(crate) fn begin_heartbeat(&self) -> Result<(), StageError> {
         let heartbeat = HeartbeatWriter::create(&self.manifest, &self.name)?;
         self.signals.report_to(heartbeat);
         Ok(())
     }
 
-    fn stand_by(&self) -> Result<bool, StageError> {
+    fn stand_by(&self) -> Result<(), StageError> {
         let failed = |error: Errno| StageError::transport("read standard input", error);
         let input = std::io::stdin();
         ioctl_fionbio(&input, true).map_err(failed)?;
         run::write(run::ready_file(&self.manifest.root, &self.name), "")?;
         loop {
             match rustix::io::read(&input, &mut [0_u8; 64]) {
-                Ok(0) => return Ok(true),
+                Ok(0) => return Ok(()),
                 Ok(_) | Err(Errno::AGAIN | Errno::INTR) => {}
                 Err(error) => return Err(failed(error)),
             }
             let input = Some(input.as_fd());
-            let woken = self
-                .signals
-                .wait_or_readable(&[], &[], input, wake::MAX_WAIT)?;
+            let signals = &self.signals;
+            let woken = signals.wait_or_readable(&[], &[], input, wake::MAX_WAIT)?;
             if woken.stop {
-                return Ok(false);
+                return Err(StageError::Stopped);
             }
         }
     }
@@ -138,14 +122,12 @@ impl Launch {
             let key = table?.get("scheduling")?.get("lock_memory")?;
             key.as_bool()
         };
-        let own = self.configuration.get("stages");
-        let own = of(own.and_then(|stages| stages.get(&self.name)));
         // Followers have their own settings alone.
         let run = match FollowerId::by_name(&self.name) {
             Some(_) => None,
             None => of(self.configuration.get("run")),
         };
-        if !own.or(run).unwrap_or_default() {
+        if !of(self.own_section()).or(run).unwrap_or_default() {
             return Ok(());
         }
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
@@ -155,13 +137,22 @@ impl Launch {
         })
     }
 
+    fn own_section(&self) -> Option<&toml::Value> {
+        self.configuration.get("stages")?.get(&self.name)
+    }
+
+    /// Returns the delay that the configuration adds to the work on each item, to test behaviour
+    /// under load.
+    pub(crate) fn delay(&self) -> Duration {
+        let own = self.own_section().and_then(|own| own.get("delay_ms"));
+        let delay_ms = own.and_then(toml::Value::as_integer).unwrap_or_default();
+        Duration::from_millis(delay_ms.max(0) as u64)
+    }
+
     /// Returns a section of the run's configuration, or its defaults if the section is missing.
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
-        let table = self
-            .configuration
-            .get(section)
-            .cloned()
-            .unwrap_or_else(|| toml::Table::new().into());
+        let table = self.configuration.get(section).cloned();
+        let table = table.unwrap_or_else(|| toml::Table::new().into());
         table.try_into().map_err(|error: toml::de::Error| {
             StageError::Configuration(format!(
                 "[{section}] in the configuration: {}",
@@ -170,26 +161,15 @@ impl Launch {
         })
     }
 
-    /// Returns the delay that the configuration adds to the work on each item, to test behaviour
-    /// under load.
-    pub(crate) fn delay(&self) -> Duration {
-        let stages = self.configuration.get("stages");
-        let own = stages.and_then(|stages| stages.get(&self.name)?.get("delay_ms")?.as_integer());
-        Duration::from_millis(own.map_or(0, |delay_ms| delay_ms.max(0) as u64))
-    }
-
-    /// Returns whether the run's configuration has a section.
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
     }
 
-    /// Returns the process's node in the transport.
     pub fn node(&self) -> &Node {
         &self.node
     }
 }
 
-/// Returns whether this process was started to stand by.
 fn stands_by() -> bool {
     std::env::var_os(run::STANDBY).is_some()
 }
@@ -202,7 +182,10 @@ pub fn main(
 ) -> ExitCode {
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
-        let counters = work(&launch)?;
+        let counters = match work(&launch) {
+            Err(StageError::Stopped) => StageCounters::default(),
+            worked => worked?,
+        };
         counters::write(&counters, &launch.manifest, name)
     });
     match result {
@@ -238,7 +221,6 @@ fn leave_last_words(stage: &str, sentence: &str) {
     }
 }
 
-/// Returns the filter of the log: `GYRE_LOG`, or `FILTER` without it.
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {
@@ -252,12 +234,10 @@ fn log_filter() -> Result<Targets, StageError> {
 /// span lives, each line carries the name of the stage.
 pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.events();
-    let file = OpenOptions::new()
+    let file = manifest::options()
         .append(true)
-        .create(true)
-        .mode(0o600)
         .open(&path)
-        .map_err(|source| StageError::File { path, source })?;
+        .map_err(StageError::file(&path))?;
     let lines = tracing_subscriber::fmt::layer()
         .json()
         // They would be printed to standard error, and panic if that cannot be written either.

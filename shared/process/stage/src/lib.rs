@@ -1,33 +1,19 @@
 //! All inter-process communication of Gyre. Only this crate depends on the transport (iceoryx2).
 //!
-//! Reading order:
+//! Reading order: [`Manifest`], [`run`], [`launch`]; `transport`, [`writer`], [`reader`]; [`wake`];
+//! the loops [`source`], [`stage`] with [`inputs`], [`sink`] and [`follower`]; [`observer`],
+//! [`relay`]; and what the supervisor reads: [`schedule`], [`heartbeat`], [`services`].
 //!
-//! 1. [`Manifest`] and [`run`]: the manifest that a process reads, and the files of a run.
-//! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
-//! 3. `transport`: the boundary of iceoryx2; [`writer`], [`reader`]: publisher and subscriber of a
-//!    topic, with the handshake that gives a new reader the history.
-//! 4. [`wake`]: how a process sleeps until there is work.
-//! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes;
-//!    [`inputs`]: the next input of a middle process. [`Generation`]: distinguishes a reused number
-//!    from a message that is sent again.
-//! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream;
-//!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
-//! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
-//!    another machine.
-//! 8. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: files and services that the
-//!    supervisor (`gyre-supervise`) reads and creates.
-//!
-//! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W
-//! of them in flight; each pose is the credit for one more. A stage is a function of its inputs,
-//! and a publisher keeps a history for late readers. So a restarted stage processes the history of
-//! its inputs again, and its readers skip duplicates. A stage with state writes it to a file before
-//! it publishes; the sink starts by publishing its last poses again.
+//! The protocol: items carry consecutive sequence numbers. The source may have W of them in flight;
+//! each pose is the credit for one more. A stage is a function of its inputs, and a publisher keeps
+//! a history for late readers. So a restarted stage processes the history of its inputs again, and
+//! its readers skip duplicates. A stage with state writes it to a file before it publishes; the
+//! sink starts by publishing its last poses again.
 
 // Shared memory, raw file descriptors and `pre_exec` need `unsafe`; each use states why it is
 // sound.
 #![allow(unsafe_code)]
 
-mod allocations;
 pub mod clock;
 pub mod control;
 pub mod counters;
@@ -41,13 +27,12 @@ pub mod inputs;
 pub mod launch;
 mod log_id;
 mod manifest;
+mod numbers;
 pub mod observer;
-mod outlet;
 pub mod python_function;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;
-mod reservation;
 pub mod run;
 pub mod schedule;
 pub mod services;
@@ -62,7 +47,7 @@ pub mod transport;
 pub mod wake;
 pub mod writer;
 
-pub use allocations::CountingAllocator;
+pub use counters::CountingAllocator;
 pub use error::StageError;
 pub use follower::Follower;
 pub use generation::Generation;

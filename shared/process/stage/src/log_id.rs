@@ -1,23 +1,29 @@
 //! The logs of a run, and the events of their growth.
 
-/// A log of a run that followers read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LogId {
-    Keyframes,
-    Loops,
-    /// All scans with their points, by pose-integration.
-    Scans,
+use crate::{Launch, StageError, transport::Notifier};
+
+gyre_messages::named! {
+    /// A log of a run that followers read; its name is the event of its growth.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum LogId {
+        Keyframes = "keyframes_grown",
+        Loops = "loops_grown",
+        /// All scans with their points, by pose-integration.
+        Scans = "scans_grown",
+    }
 }
 
-pub(crate) const LOGS: [LogId; 3] = [LogId::Keyframes, LogId::Loops, LogId::Scans];
+/// Notifies the followers of a log. A run without SLAM and objects has no such events.
+pub struct Growth(Notifier);
 
-impl LogId {
-    /// Returns the name of the event of its growth.
-    pub(crate) const fn event(self) -> &'static str {
-        match self {
-            Self::Keyframes => "keyframes_grown",
-            Self::Loops => "loops_grown",
-            Self::Scans => "scans_grown",
-        }
+impl Growth {
+    /// Opens the event of a log, as the one process that appends to it.
+    pub fn of(launch: &Launch, log: LogId) -> Result<Self, StageError> {
+        Notifier::open(&launch.node, log.name()).map(Self)
+    }
+
+    /// Wakes the followers: a record was appended.
+    pub fn notify(&self) -> Result<(), StageError> {
+        self.0.notify()
     }
 }

@@ -15,15 +15,10 @@ use crate::StageError;
 /// The properties of a run that its processes need.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Prefix of all names of the run in shared memory.
     pub prefix: String,
-    /// The root of the run.
     pub root: PathBuf,
-    /// The folder of the results.
     pub out: PathBuf,
-    /// The window of scans in flight.
     pub window: Window,
-    /// Sizes of the largest messages.
     pub limits: Limits,
     /// True in live mode, which drops old scans; false in lossless mode, which processes every
     /// scan.
@@ -38,15 +33,10 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Reads the manifest of the run at `root`.
     pub fn read(root: &Path) -> Result<Self, StageError> {
         let path = Self::path(root);
-        let failed = |reason: String| StageError::Manifest {
-            path: path.clone(),
-            reason,
-        };
-        let text = fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
-        serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
+        let text = fs::read_to_string(&path).map_err(|error| StageError::manifest(&path, error))?;
+        serde_json::from_str(&text).map_err(|error| StageError::manifest(&path, error))
     }
 
     /// Returns the log where all processes append their events.
@@ -82,15 +72,16 @@ impl Manifest {
     }
 }
 
-/// Writes a file of a run, which is the owner's alone.
+/// Options for creating a file of a run, which is the owner's alone.
+pub(crate) fn options() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.create(true).mode(0o600);
+    options
+}
+
 pub(crate) fn write(path: PathBuf, text: &str) -> Result<(), StageError> {
-    let opened = OpenOptions::new()
-        .create(true)
-        .truncate(true)
-        .write(true)
-        .mode(0o600)
-        .open(&path);
+    let opened = options().write(true).truncate(true).open(&path);
     opened
         .and_then(|mut file| file.write_all(text.as_bytes()))
-        .map_err(|source| StageError::File { path, source })
+        .map_err(StageError::file(&path))
 }

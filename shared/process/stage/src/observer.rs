@@ -1,36 +1,34 @@
-//! Observers: subscribers that the run does not depend on, in processes of their own.
-//!
-//! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it:
-//! a full queue loses its oldest message, and the observer counts its missed messages. It looks at
-//! its queue at most every 10 ms, whatever the rate. It holds one message at a time, which the
-//! publishers' memory is sized for (see
-//! [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once,
-//! when it attaches, so that the publisher connects to it while it waits, and not while it sends.
-//! The supervisor frees the places of killed observers.
+//! Observers: subscribers that the run does not depend on, in processes of their own. They may
+//! attach, be slow, be stopped or be killed at any time: a full queue loses its oldest message, and
+//! the observer counts those that it has missed. It holds one message at a time, and notifies the
+//! publisher once, when it attaches. The supervisor frees the places of killed observers.
 
 mod sequence;
-mod topic;
 
 use std::{
-    fs::{self, File},
+    fs::File,
     path::{Path, PathBuf},
     process, thread,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
+use gyre_messages::{
+    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, NumberedBy, Objects, Pose,
+    Refined, Rotation, Scan, Sender, Topic,
+};
 
 use crate::{
     Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
+    numbers::{self, Numbers},
     reader::{self, Received},
     run, services,
     sessions::not_running,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
+    writer::RecordedMessage,
 };
 pub use sequence::Sequence;
-pub use topic::TopicObserver;
 
 /// The name of the nodes and the subscribers of observers. The observers of a topic are counted by
 /// this name.
@@ -42,7 +40,9 @@ const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
 /// all busy each wake-up takes time from the stages; at hundreds of messages in a second that is
 /// more than what most observers do with them. The queue holds 9 meanwhile.
 const REST: Duration = Duration::from_millis(10);
-/// Time between two attempts to get a place.
+/// The file in the run's root where the recorder writes its process and the number of missed
+/// messages.
+const MISSED: &str = "recorder.missed";
 const RETRY: Duration = Duration::from_millis(100);
 
 /// A running run, seen from outside.
@@ -53,26 +53,24 @@ pub struct ObservedRun {
     node: Node,
 }
 
-/// An observer of one topic.
 pub struct Observer<'run, M: Message> {
     run: &'run ObservedRun,
     subscriber: Subscriber,
     data: Listener,
     current: Option<Received<M>>,
     sequence: Sequence,
-    /// When it last looked at its queue after a sleep.
+    /// True if the last call of [`next`](Self::next) found the end. After the end of the stream
+    /// masking may still be killed, and reuse numbers.
+    has_ended: bool,
     looked: Instant,
 }
 
-/// The next message of a topic.
 pub enum Next<'a, M: Message> {
     /// A message, and the number of items that were missed directly before it. If masking was
     /// started again in live mode, it may have a number that was received before: see
     /// [`Item::generation`](gyre_messages::Item).
     Message(&'a Received<M>, u64),
-    /// No message within the limit.
     Idle,
-    /// The stream or the run has ended.
     Ended,
 }
 
@@ -93,7 +91,7 @@ impl ObservedRun {
         transport::silence();
         let manifest = Manifest::read(root)?;
         let path = Manifest::path(root);
-        let file = File::open(&path).map_err(|source| StageError::File { path, source })?;
+        let file = File::open(&path).map_err(StageError::file(&path))?;
         let node = manifest.transport()?.join(NAME)?;
         let run = Self {
             manifest,
@@ -106,7 +104,6 @@ impl ObservedRun {
         }
     }
 
-    /// Returns the properties of the run.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -120,11 +117,10 @@ impl ObservedRun {
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
-        let text = format!("{} {missed}", process::id());
-        run::write(missed_file(&self.manifest.root), &text)
+        let mut file = Numbers::open(&self.manifest, MISSED, 0)?;
+        file.write([process::id().into(), missed])
     }
 
-    /// Returns whether the run has ended and removed its files.
     pub fn has_ended(&self) -> bool {
         rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
     }
@@ -138,6 +134,7 @@ impl ObservedRun {
             data,
             current: None,
             sequence: Sequence::default(),
+            has_ended: false,
             looked: Instant::now(),
         })
     }
@@ -146,11 +143,12 @@ impl ObservedRun {
         if let Sender::Follower(follower) = topic.sender
             && !follower.is_in(&self.manifest.window)
         {
-            return Err(StageError::NoTopic {
-                topic: topic.name,
-                needs: follower.needs(),
-                out: self.manifest.out.clone(),
-            });
+            return Err(StageError::Input(format!(
+                "the run that writes to {} has no topic `{}`: only a run with {} has it",
+                self.manifest.out.display(),
+                topic.name,
+                follower.needs()
+            )));
         }
         let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
         loop {
@@ -178,7 +176,7 @@ impl ObservedRun {
         if service.subscribers_named(NAME) >= places {
             return Err(no_place());
         }
-        let subscriber = Subscriber::observe(&service, NAME)?;
+        let subscriber = Subscriber::create(&service, Some(NAME))?;
         // Another observer may have come at the same time. The places of the stages must stay free
         // for their restarts.
         if service.subscribers_named(NAME) > places {
@@ -195,19 +193,14 @@ pub fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
 }
 
-/// Returns the file in the run's root where the recorder writes its process and the number of
-/// missed messages.
-fn missed_file(root: &Path) -> PathBuf {
-    root.join("recorder.missed")
-}
-
 /// Returns the number of missed messages that the recorder, this process, has reported; 0 without a
 /// report.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
-    let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
-    // The recorder before has left its own.
-    let missed = told.strip_prefix(&format!("{recorder} "));
-    missed.and_then(|it| it.parse().ok()).unwrap_or_default()
+    match numbers::read(&root.join(MISSED), 0) {
+        Some([process, missed]) if process == u64::from(recorder) => missed,
+        // The recorder before has left its own.
+        _ => 0,
+    }
 }
 
 impl<M: Message> Observer<'_, M> {
@@ -215,16 +208,18 @@ impl<M: Message> Observer<'_, M> {
     /// message before it is released, and the next call releases this one.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
         self.current = None;
+        self.has_ended = false;
         let since = Instant::now();
         loop {
             while let Some(message) = self.receive()? {
                 let item = message.item();
-                let skipped = self.skipped(self.sequence.generation, item)?;
+                let skipped = self.skipped_by(self.sequence.generation, item)?;
                 if let Some(missed) = self.sequence.advance_past(item, skipped) {
                     return Ok(Next::Message(self.current.insert(message), missed));
                 }
             }
-            if self.sequence.ended || self.run.has_ended() {
+            self.has_ended = self.sequence.ended || self.run.has_ended();
+            if self.has_ended {
                 return Ok(Next::Ended);
             }
             let left = limit.saturating_sub(since.elapsed());
@@ -235,28 +230,9 @@ impl<M: Message> Observer<'_, M> {
         }
     }
 
-    /// Returns, among the generations after `known` and before the item's, the one that reused the
-    /// smallest number.
-    pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
-        generation::skipped(
-            &self.run.manifest.out,
-            NumberedBy::of(M::TOPIC),
-            known,
-            item,
-        )
-    }
-
-    /// Returns the listener that the publisher notifies: see [`wait_for_any`].
-    pub fn listener(&self) -> &Listener {
-        &self.data
-    }
-
-    /// Counts as missed all items between `next` and the first received item: all before it is
-    /// known already, as from an observer that was there earlier, whose newest item had this
-    /// generation.
-    pub fn expect(&mut self, next: u64, generation: u32) {
-        self.sequence.expected = Some(next);
-        self.sequence.generation = generation;
+    fn skipped_by(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        let out = &self.run.manifest.out;
+        generation::skipped(out, NumberedBy::of(M::TOPIC), known, item)
     }
 
     /// Returns the number of items missed since the observer attached, or since the expected item.
@@ -294,4 +270,88 @@ pub fn wait_for_any(
         return Ok(true);
     }
     signals.sleep(REST)
+}
+
+/// An observer of a topic that is known by its name, whose messages are taken as bytes.
+pub trait TopicObserver {
+    fn topic(&self) -> &'static str;
+
+    /// Takes the next message that is there; `None` without a message. A message that breaks its
+    /// contract is an error and counts as missed.
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
+
+    /// Returns whether the end of the stream or of the run has been taken.
+    fn has_ended(&self) -> bool;
+
+    /// Returns the listener that the publisher notifies: see
+    /// [`wait_for_any`].
+    fn listener(&self) -> &Listener;
+
+    /// Counts as missed all items between `next` and the first received item: all before it is
+    /// known already, as from an observer that was there earlier, whose newest item had this
+    /// generation.
+    fn expect(&mut self, next: u64, generation: u32);
+
+    fn missed(&self) -> u64;
+
+    /// Returns, among the generations after `known` and before the item's, the one that reused the
+    /// smallest number.
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
+}
+
+impl ObservedRun {
+    /// Subscribes to the topic of this name; `None` for an unknown topic.
+    pub fn observe_topic(
+        &self,
+        topic: &str,
+    ) -> Result<Option<Box<dyn TopicObserver + '_>>, StageError> {
+        let observer: Box<dyn TopicObserver + '_> = match topic {
+            Scan::TOPIC => Box::new(self.observe::<Scan>()?),
+            Masked::TOPIC => Box::new(self.observe::<Masked>()?),
+            Rotation::TOPIC => Box::new(self.observe::<Rotation>()?),
+            Motion::TOPIC => Box::new(self.observe::<Motion>()?),
+            Refined::TOPIC => Box::new(self.observe::<Refined>()?),
+            Pose::TOPIC => Box::new(self.observe::<Pose>()?),
+            Loop::TOPIC => Box::new(self.observe::<Loop>()?),
+            Correction::TOPIC => Box::new(self.observe::<Correction>()?),
+            Fix::TOPIC => Box::new(self.observe::<Fix>()?),
+            Objects::TOPIC => Box::new(self.observe::<Objects>()?),
+            _ => return Ok(None),
+        };
+        Ok(Some(observer))
+    }
+}
+
+impl<M: Message> TopicObserver for Observer<'_, M> {
+    fn topic(&self) -> &'static str {
+        M::TOPIC
+    }
+
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        Ok(match self.next(Duration::ZERO)? {
+            Next::Message(message, _) => Some(message.to_bytes()),
+            Next::Idle | Next::Ended => None,
+        })
+    }
+
+    fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    fn listener(&self) -> &Listener {
+        &self.data
+    }
+
+    fn expect(&mut self, next: u64, generation: u32) {
+        self.sequence.expected = Some(next);
+        self.sequence.generation = generation;
+    }
+
+    fn missed(&self) -> u64 {
+        self.sequence.missed
+    }
+
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        self.skipped_by(known, item)
+    }
 }

@@ -1,117 +1,42 @@
-//! A function in a file of Python, called from Rust.
-//!
-//! The function lives in a process of its own, an interpreter with numpy that ends with its caller.
-//! A call writes a line of JSON and the arrays to its standard input, and reads a line and the
-//! array that it returns: a scan of 1.5 MB takes about a millisecond. So any Python will do, its
-//! crash is not the stage's, and no interpreter is linked.
-
-mod interpreter;
+//! A function in a file of Python, called from Rust in a process of its own: a call writes a line
+//! of JSON and the arrays, and reads a line and the array that it returns. A scan of 1.5 MB takes
+//! about a millisecond. Any Python will do, its crash is not the stage's, and none is linked.
 
 use std::{
+    env,
     io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write},
     path::{Path, PathBuf},
-    process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio},
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
 };
 
 use crate::StageError;
 use ndarray::{Array2, ArrayViewD};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
-use thiserror::Error;
 
-pub use interpreter::{Interpreter, NoInterpreter};
-
-/// The program of the interpreter's side.
 const PROGRAM: &str = include_str!("python_function/function.py");
 /// Room in the pipes, bytes: the most that a process may ask for without privileges.
 const PIPE_BYTES: usize = 1 << 20;
 
-/// A function that cannot be called, or that has failed.
-#[derive(Debug, Error)]
-pub enum FunctionError {
-    #[error("there is no file {0}")]
-    Missing(PathBuf),
-    #[error(
-        "cannot start {python} for {file}: {source}; install Python 3, or name one with GYRE_PYTHON"
-    )]
-    Start {
-        python: String,
-        /// The file of the function.
-        file: PathBuf,
-        source: std::io::Error,
-    },
-    #[error(
-        "{python} has ended before it had loaded {file}: {status}; name a Python of version 3 with \
-         GYRE_PYTHON, and see that the file does not end it"
-    )]
-    NotLoaded {
-        python: String,
-        /// The file of the function.
-        file: PathBuf,
-        status: ExitStatus,
-    },
-    /// The interpreter was killed while it loaded the file, or has ended in the middle of a call.
-    #[error("Python has ended while it worked for {file}: {status}")]
-    Ended {
-        /// The file of the function.
-        file: PathBuf,
-        /// The exit code or the signal.
-        status: String,
-    },
-    /// An exception: the file, its line, and Python's message. The traceback is on standard error.
-    #[error("{0}")]
-    Exception(String),
-}
-
-impl From<FunctionError> for StageError {
-    /// For a function that is loaded: another attempt helps where a process was killed or not to
-    /// be had.
-    fn from(error: FunctionError) -> Self {
-        let sentence = error.to_string();
-        match error {
-            FunctionError::Start { source, .. } if !is_no_program(&source) => {
-                Self::Function(sentence)
-            }
-            FunctionError::Ended { .. } => Self::Function(sentence),
-            _ => Self::Configuration(sentence),
-        }
+gyre_messages::named! {
+    /// A function, whose name implies its arguments and results.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Name {
+        /// `mask(scan)`: factors from 0 to 1.
+        Mask = "mask",
+        /// `rotation(scan, previous)`: an angle, rad, and its standard deviation.
+        Rotation = "rotation",
+        /// `translation(scan, previous, rotation_rad)`: x, y, m, and their standard deviation or
+        /// covariance.
+        Translation = "translation",
     }
 }
 
-fn is_no_program(error: &std::io::Error) -> bool {
-    let kinds = [ErrorKind::NotFound, ErrorKind::PermissionDenied];
-    kinds.contains(&error.kind())
-}
-
-/// The name of a function, which implies its arguments and results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Name {
-    /// `mask(scan)`: factors from 0 to 1.
-    Mask,
-    /// `rotation(scan, previous)`: an angle, rad, and its standard deviation.
-    Rotation,
-    /// `translation(scan, previous, rotation_rad)`: x, y, m, and their standard deviation or
-    /// covariance.
-    Translation,
-}
-
-impl Name {
-    /// Returns the name as Python has it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Mask => "mask",
-            Self::Rotation => "rotation",
-            Self::Translation => "translation",
-        }
-    }
-}
-
-/// An argument of a call.
 pub enum Argument<'a> {
     Number(f64),
     Scan(Scan<'a>),
 }
 
-/// The attributes of a scan.
 pub struct Scan<'a> {
     pub values: Map<String, Value>,
     pub arrays: Vec<(&'static str, Array<'a>)>,
@@ -123,7 +48,6 @@ pub enum Array<'a> {
     Floats(ArrayViewD<'a, f32>),
 }
 
-/// The result of a call.
 #[derive(Debug)]
 pub enum Returned {
     Values(Vec<f64>),
@@ -131,7 +55,6 @@ pub enum Returned {
     Factors(Array2<f32>, String),
 }
 
-/// A function of Python that is ready to be called.
 #[derive(Debug)]
 pub struct Function {
     file: PathBuf,
@@ -141,21 +64,31 @@ pub struct Function {
 }
 
 impl Function {
-    /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the file.
-    pub fn load(file: &Path, name: Name) -> Result<Self, FunctionError> {
+    /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the file. Another
+    /// attempt helps where a process was killed or not to be had.
+    pub fn load(file: &Path, name: Name) -> Result<Self, StageError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
-        let file = absolute.ok_or_else(|| FunctionError::Missing(file.to_owned()))?;
-        let python = interpreter::name();
-        let start = |source| FunctionError::Start {
-            python: python.clone(),
-            file: file.clone(),
-            source,
+        let file = absolute.ok_or_else(|| {
+            StageError::Configuration(format!("there is no file {}", file.display()))
+        })?;
+        let python = interpreter();
+        let of = file.display();
+        let start = |error: std::io::Error| {
+            let sentence = format!(
+                "cannot start {python} for {of}: {error}; install Python 3, or name one with GYRE_PYTHON"
+            );
+            match error.kind() {
+                ErrorKind::NotFound | ErrorKind::PermissionDenied => {
+                    StageError::Configuration(sentence)
+                }
+                _ => StageError::Transient(sentence),
+            }
         };
         let mut command = Command::new(&python);
         command
             .args(["-u", "-c", PROGRAM])
             .arg(&file)
-            .arg(name.as_str());
+            .arg(name.name());
         let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -168,26 +101,26 @@ impl Function {
         let _ = rustix::pipe::fcntl_setpipe_size(&requests, PIPE_BYTES);
         let _ = rustix::pipe::fcntl_setpipe_size(&answers, PIPE_BYTES);
         let mut function = Self {
-            file,
+            file: file.clone(),
             python: child,
             requests: BufWriter::new(requests),
             answers: BufReader::with_capacity(PIPE_BYTES, answers),
         };
-        match (function.answer(), function.python.try_wait()) {
-            (Err(FunctionError::Ended { file, .. }), Ok(Some(status)))
-                if status.code().is_some() =>
-            {
-                Err(FunctionError::NotLoaded {
-                    python,
-                    file,
-                    status,
-                })
-            }
-            (answer, _) => answer.map(|_| function),
+        match function.answer() {
+            Ok(_) => Ok(function),
+            Err(StageError::Input(exception)) => Err(StageError::Configuration(exception)),
+            Err(ended) => Err(match function.python.try_wait() {
+                Ok(Some(status)) if status.code().is_some() => StageError::Configuration(format!(
+                    "{python} has ended before it had loaded {of}: {status}; name a Python of version 3 with \
+                     GYRE_PYTHON, and see that the file does not end it"
+                )),
+                _ => ended,
+            }),
         }
     }
 
-    pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, FunctionError> {
+    /// Calls the function. An exception is [`StageError::Input`].
+    pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, StageError> {
         if self.send(arguments).is_err() {
             return Err(self.ended());
         }
@@ -216,7 +149,10 @@ impl Function {
                 continue;
             };
             for (_, array) in &scan.arrays {
-                array.write(&mut self.requests)?;
+                match array {
+                    Array::Bytes(array) => rows(array, &mut self.requests)?,
+                    Array::Floats(array) => rows(array, &mut self.requests)?,
+                }
             }
         }
         self.requests.flush()
@@ -232,23 +168,27 @@ impl Function {
         Some(array)
     }
 
-    fn answer(&mut self) -> Result<Value, FunctionError> {
+    /// Reads a line. An exception is [`StageError::Input`]: the file, its line, and Python's
+    /// message. The traceback is on standard error.
+    fn answer(&mut self) -> Result<Value, StageError> {
         let mut line = String::new();
         let read = self.answers.read_line(&mut line);
         let header = read.ok().and_then(|_| serde_json::from_str(&line).ok());
         let header: Value = header.ok_or_else(|| self.ended())?;
         match header["error"].as_str() {
-            Some(sentence) => Err(FunctionError::Exception(sentence.to_owned())),
+            Some(sentence) => Err(StageError::Input(sentence.to_owned())),
             None => Ok(header),
         }
     }
 
-    fn ended(&mut self) -> FunctionError {
+    /// The interpreter was killed while it loaded the file, or has ended in the middle of a call.
+    fn ended(&mut self) -> StageError {
         let status = self.python.wait().map(|status| status.to_string());
-        FunctionError::Ended {
-            file: self.file.clone(),
-            status: status.unwrap_or_else(|error| error.to_string()),
-        }
+        StageError::Transient(format!(
+            "Python has ended while it worked for {}: {}",
+            self.file.display(),
+            status.unwrap_or_else(|error| error.to_string())
+        ))
     }
 }
 
@@ -278,16 +218,7 @@ impl Argument<'_> {
     }
 }
 
-impl Array<'_> {
-    /// Writes the values row by row, without what lies between rows.
-    fn write(&self, out: &mut impl Write) -> std::io::Result<()> {
-        match self {
-            Self::Bytes(array) => rows(array, out),
-            Self::Floats(array) => rows(array, out),
-        }
-    }
-}
-
+/// Writes the values row by row, without what lies between rows.
 fn rows<T: bytemuck::Pod>(array: &ArrayViewD<'_, T>, out: &mut impl Write) -> std::io::Result<()> {
     for row in array.rows() {
         match row.to_slice() {
@@ -296,4 +227,48 @@ fn rows<T: bytemuck::Pod>(array: &ArrayViewD<'_, T>, out: &mut impl Write) -> st
         }
     }
     Ok(())
+}
+
+const VARIABLE: &str = "GYRE_PYTHON";
+const OLDEST: [u32; 2] = [3, 8];
+const PROBE: &str = "
+import json, sys
+try:
+    import numpy
+    version = numpy.__version__
+except ImportError:
+    version = None
+print(json.dumps({'executable': sys.executable, 'version': list(sys.version_info[:3]), 'numpy': version}))
+";
+
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Interpreter {
+    pub executable: String,
+    pub version: [u32; 3],
+    /// The version of numpy; `None`: it cannot be imported.
+    pub numpy: Option<String>,
+}
+
+fn interpreter() -> String {
+    env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
+}
+
+impl Interpreter {
+    pub fn find() -> Result<Self, String> {
+        let python = interpreter();
+        let mut command = Command::new(&python);
+        command.args(["-c", PROBE]).stdin(Stdio::null());
+        let output = command.output().map_err(|error| {
+            format!(
+                "cannot start {python}: {error}; install Python 3, or name one with GYRE_PYTHON"
+            )
+        })?;
+        let found: Option<Self> = serde_json::from_slice(&output.stdout).ok();
+        let [major, minor] = OLDEST;
+        found
+            .filter(|found| found.version[..2] >= OLDEST[..])
+            .ok_or_else(|| {
+                format!("{python} is no Python of version {major}.{minor} or newer: name one with GYRE_PYTHON")
+            })
+    }
 }

@@ -6,10 +6,9 @@ use bytemuck::Pod;
 use gyre_messages::{Header, Item, Limits, Message, Topic};
 
 use crate::{
-    Launch, Manifest, StageError, clock,
-    outlet::RecordedMessage,
-    services,
+    Launch, Manifest, StageError, clock, services,
     transport::{Listener, Node, Notifier, Sample, Service, Subscriber},
+    writer::RecordedMessage,
 };
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
@@ -21,7 +20,6 @@ pub struct Received<M: Message> {
 }
 
 impl<M: Message> Received<M> {
-    /// Checks a message that another process has sent.
     pub(crate) fn checked(sample: Sample, limits: &Limits) -> Result<Self, StageError> {
         let received = Self {
             sample,
@@ -38,7 +36,6 @@ impl<M: Message> Received<M> {
         bytemuck::from_bytes(self.sample.header())
     }
 
-    /// Returns the scan that the message is about.
     pub fn item(&self) -> &Item {
         self.header().item()
     }
@@ -59,7 +56,6 @@ impl<M: Message> Received<M> {
         }
     }
 
-    /// Creates an error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
             topic: M::TOPIC,
@@ -70,7 +66,6 @@ impl<M: Message> Received<M> {
     }
 }
 
-/// The raw queue of a topic.
 pub struct Port<M: Message> {
     limits: Limits,
     subscriber: Subscriber,
@@ -96,7 +91,7 @@ impl<M: Message> Port<M> {
         let service = Service::open(node, &Topic::of::<M>())?;
         Ok(Self {
             limits: manifest.limits,
-            subscriber: Subscriber::create(&service)?,
+            subscriber: Subscriber::create(&service, None)?,
             data: Listener::open(node, &services::data_event(M::TOPIC))?,
             message: PhantomData,
         })
@@ -110,7 +105,6 @@ impl<M: Message> Port<M> {
             .transpose()
     }
 
-    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         &self.data
     }
@@ -118,8 +112,7 @@ impl<M: Message> Port<M> {
 
 /// Notifies the publisher of a topic, which then connects to its new readers.
 pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageError> {
-    Notifier::open(node, &services::handshake_event(topic))?
-        .notify(format_args!("notify the publisher of {topic}"))
+    Notifier::open(node, &services::handshake_event(topic))?.notify()
 }
 
 /// The items of a topic in order, each once: the current and the previous one.
@@ -128,7 +121,8 @@ pub struct Reader<M: Message> {
     next: Option<u64>,
     head: Option<Received<M>>,
     previous: Option<Received<M>>,
-    duplicates: u64,
+    /// Items that were skipped because they had been received before.
+    pub duplicates: u64,
 }
 
 impl<M: Message> Reader<M> {
@@ -161,20 +155,13 @@ impl<M: Message> Reader<M> {
             let got = received.item().seq;
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
-                Some(next) if got > next => {
-                    return Err(StageError::SequenceGap {
-                        topic: M::TOPIC,
-                        expected: next,
-                        got,
-                    });
-                }
+                Some(next) if got > next => return Err(StageError::gap(M::TOPIC, next, got)),
                 _ => self.head = Some(received),
             }
         }
         Ok(self.head.as_ref())
     }
 
-    /// Returns the current item if it has been received.
     pub fn current(&self) -> Option<&Received<M>> {
         self.head.as_ref()
     }
@@ -187,7 +174,6 @@ impl<M: Message> Reader<M> {
         follows.then_some(previous)
     }
 
-    /// Makes the current item the previous one.
     pub fn advance(&mut self) {
         if let Some(head) = self.head.take() {
             self.next = Some(head.item().seq.saturating_add(1));
@@ -208,12 +194,6 @@ impl<M: Message> Reader<M> {
         Ok(message)
     }
 
-    /// Returns the number of items that were skipped because they had been received before.
-    pub fn duplicates(&self) -> u64 {
-        self.duplicates
-    }
-
-    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         self.port.listener()
     }

@@ -1,8 +1,5 @@
-//! A run: its name and its files.
-//!
-//! The root of a run is on tmpfs (`/dev/shm/gyre-<uid>/<name>`), where the transport's bookkeeping
-//! makes recovery four times faster than on a disk. It holds the manifest, the resolved
-//! configuration and the transport's sockets, and is removed at the end.
+//! A run: its name and its files. Its root is on tmpfs (`/dev/shm/gyre-<uid>/<name>`), where the
+//! transport's bookkeeping makes recovery four times faster than on a disk.
 
 mod root;
 
@@ -27,7 +24,6 @@ pub const ENVIRONMENT: &str = "GYRE_RUN";
 /// input ends.
 pub const STANDBY: &str = "GYRE_STANDBY";
 
-/// Returns the path of the file that marks a process as ready on standby.
 pub fn ready_file(root: &Path, process: &str) -> PathBuf {
     root.join(format!("{process}.ready"))
 }

@@ -1,12 +1,12 @@
 //! The services of the transport: the supervisor creates them once with the sizes of the window,
 //! and stages only open them. So no restart finds a service missing or of another size.
 
-use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, TopicSizes, Window};
+use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, Window};
 
 use crate::{
     StageError,
-    log_id::LOGS,
-    transport::{Event, EventSizes, Node, Service},
+    log_id::LogId,
+    transport::{Event, Node, Service},
 };
 
 /// All services of a run. They exist as long as this value.
@@ -18,18 +18,21 @@ pub struct Services {
 impl Services {
     pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let (mut topics, mut events) = (Vec::new(), Vec::new());
+        let mut event = |name: &str, ports, nodes| -> Result<(), StageError> {
+            events.push(Event::create(node, name, ports, nodes)?);
+            Ok(())
+        };
         for topic in gyre_messages::topics(window) {
-            events.extend(create_events(node, topic.name, &(topic.sizes)(window))?);
+            let (name, sizes) = (topic.name, (topic.sizes)(window));
+            let (subscribers, nodes) = (sizes.subscribers(), sizes.nodes());
+            event(&data_event(name), [subscribers, 1], nodes)?;
+            event(&handshake_event(name), [1, subscribers], nodes)?;
             topics.push((topic, Service::create(node, topic, window)?));
         }
         if window.logs_points() {
-            let sizes = EventSizes {
-                listeners: FollowerId::ALL.len(),
-                notifiers: 1,
-                nodes: Pose::sizes(window).nodes(),
-            };
-            for log in LOGS {
-                events.push(Event::create(node, log.event(), sizes)?);
+            let nodes = Pose::sizes(window).nodes();
+            for log in LogId::ALL {
+                event(log.name(), [FollowerId::ALL.len(), 1], nodes)?;
             }
         }
         Ok(Self {
@@ -50,34 +53,10 @@ impl Services {
     }
 }
 
-/// Returns the name of a publisher's event to wake the readers of a topic.
 pub(crate) fn data_event(topic: &str) -> String {
     format!("{topic}_data")
 }
 
-/// Returns the name of a new reader's event to notify the publisher of a topic.
 pub(crate) fn handshake_event(topic: &str) -> String {
     format!("{topic}_handshake")
-}
-
-/// Creates the two events of a topic: with its messages, and with its new readers.
-pub(crate) fn create_events(
-    node: &Node,
-    topic: &str,
-    sizes: &TopicSizes,
-) -> Result<[Event; 2], StageError> {
-    let data = EventSizes {
-        listeners: sizes.subscribers(),
-        notifiers: 1,
-        nodes: sizes.nodes(),
-    };
-    let handshake = EventSizes {
-        listeners: 1,
-        notifiers: sizes.subscribers(),
-        nodes: sizes.nodes(),
-    };
-    Ok([
-        Event::create(node, &data_event(topic), data)?,
-        Event::create(node, &handshake_event(topic), handshake)?,
-    ])
 }

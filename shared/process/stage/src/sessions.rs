@@ -1,9 +1,7 @@
 //! The log of when a run began and when and why it ended, for whoever asks for a run that is over.
 
 use std::{
-    fs::OpenOptions,
     io::Write,
-    os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
 };
 
@@ -12,21 +10,21 @@ use tracing_subscriber::fmt::{
     time::{FormatTime, SystemTime},
 };
 
-use crate::{Manifest, StageError, run};
+use crate::{Manifest, StageError, manifest, run};
 
 const SESSIONS: &str = "log/supervisor.txt";
 /// The line of a begin.
 pub const BEGUN: &str = "the run begins";
 
 /// Logs that the run begins, or why it ends. Without a place for that the run is the same.
-pub fn log_session(manifest: &Manifest, event: &str) {
+pub fn log_session(run: &Manifest, event: &str) {
     let mut line = String::new();
     // Writing to a string does not fail.
     let _ = SystemTime.format_time(&mut Writer::new(&mut line));
     line += &format!(" {event}\n");
-    let mut options = OpenOptions::new();
-    let options = options.append(true).create(true).mode(0o600);
-    let file = options.open(manifest.out.join(SESSIONS));
+    let file = manifest::options()
+        .append(true)
+        .open(run.out.join(SESSIONS));
     let _ = file.and_then(|mut file| file.write_all(line.as_bytes()));
 }
 

@@ -2,10 +2,11 @@
 
 use std::fs;
 
-use gyre_messages::{Header, Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
 use crate::{
-    Launch, Manifest, StageCounters, StageError, allocations, clock,
+    Launch, Manifest, StageCounters, StageError,
+    counters::Work,
     reader::{Reader, Received},
     run,
     transport::Listener,
@@ -43,15 +44,12 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     launch: &Launch,
     sink: &mut S,
 ) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
     republish(&poses, &restored, S::HOP)?;
-    let next = restored
-        .last()
-        .map_or(0, |pose| pose.item.seq.saturating_add(1));
+    let last = restored.last().map(|pose| pose.item);
+    let next = last.map_or(0, |last| last.seq.saturating_add(1));
     let mut integration = Integration {
         sink,
         poses,
@@ -59,7 +57,8 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
         counters: StageCounters::default(),
     };
     if ended {
-        integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
+        let last = last.unwrap_or_default();
+        integration.poses.end(last, Some(S::HOP))?;
     }
     let mut inputs = Motions::<M>::open(launch, next, integration.sink.takes_scans())?;
     integration.drain(&mut inputs)?;
@@ -100,42 +99,22 @@ pub(crate) fn republish(
     restored: &[PoseHeader],
     hop: StageId,
 ) -> Result<(), StageError> {
-    let base = PoseHeader {
-        item: Item {
-            flags: flag::BASE | flag::SYNC,
-            ..Item::default()
-        },
-        ..PoseHeader::default()
-    };
     let Some((last, earlier)) = restored.split_last() else {
-        return publish(poses, base, hop);
+        let mut base = PoseHeader::default();
+        base.item.flags = flag::BASE | flag::SYNC;
+        return poses.publish(base, Some(hop));
     };
     for pose in earlier {
-        publish(poses, *pose, hop)?;
+        poses.publish(*pose, Some(hop))?;
     }
-    publish(poses, newest(*last), hop)
+    poses.publish(newest(*last), Some(hop))
 }
 
 /// Marks a pose as the newest. Older ones that are published again are not marked: a source that
 /// resumed at one of them would send more scans than its readers have room for.
-pub(crate) fn newest(pose: PoseHeader) -> PoseHeader {
-    PoseHeader {
-        item: Item {
-            flags: pose.item.flags | flag::SYNC,
-            ..pose.item
-        },
-        ..pose
-    }
-}
-
-pub(crate) fn publish(
-    poses: &Writer<Pose>,
-    pose: PoseHeader,
-    hop: StageId,
-) -> Result<(), StageError> {
-    let mut draft = poses.loan()?;
-    *draft.header() = pose;
-    poses.send(draft, hop)
+pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
+    pose.item.flags |= flag::SYNC;
+    pose
 }
 
 /// The motions in order, each with its scan if the sink takes scans.
@@ -168,11 +147,8 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
                 return Ok(None);
             };
             if head.item().seq != input.motion.item.seq {
-                return Err(StageError::SequenceGap {
-                    topic: Masked::TOPIC,
-                    expected: input.motion.item.seq,
-                    got: head.item().seq,
-                });
+                let expected = input.motion.item.seq;
+                return Err(StageError::gap(Masked::TOPIC, expected, head.item().seq));
             }
             input.received_ns = input.received_ns.max(head.received_ns);
             input.scan = Some(head);
@@ -197,11 +173,10 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
     }
 
     fn duplicates(&self) -> u64 {
-        self.motions.duplicates() + self.scans.as_ref().map_or(0, Reader::duplicates)
+        self.motions.duplicates + self.scans.as_ref().map_or(0, |scans| scans.duplicates)
     }
 }
 
-/// The inputs of one pose.
 struct Input<'a> {
     motion: MotionHeader,
     scan: Option<&'a Received<Masked>>,
@@ -230,7 +205,7 @@ impl<S: Sink> Integration<'_, S> {
             match item.is(flag::END) {
                 true => {
                     self.sink.end(&item)?;
-                    self.publish_end(item)?;
+                    self.poses.end(item, Some(S::HOP))?;
                     self.ended = true;
                 }
                 false => self.integrate(input)?,
@@ -242,25 +217,12 @@ impl<S: Sink> Integration<'_, S> {
     }
 
     fn integrate(&mut self, input: Input<'_>) -> Result<(), StageError> {
-        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let work = Work::begin();
         let mut motion = input.motion;
         let hop = motion.item.hop_mut(S::HOP);
-        (hop.received_ns, hop.started_ns) = (input.received_ns, started_ns);
+        (hop.received_ns, hop.started_ns) = (input.received_ns, work.started_ns);
         let pose = self.sink.integrate(&motion, input.scan)?;
-        crate::counters::record(
-            &mut self.counters,
-            allocations::so_far() - allocated,
-            clock::now_ns() - started_ns,
-        );
-        publish(&self.poses, newest(pose), S::HOP)
-    }
-
-    fn publish_end(&mut self, item: Item) -> Result<(), StageError> {
-        let mut draft = self.poses.loan()?;
-        *draft.header().item_mut() = Item {
-            flags: flag::END,
-            ..item
-        };
-        self.poses.send(draft, S::HOP)
+        work.end(&mut self.counters);
+        self.poses.publish(newest(pose), Some(S::HOP))
     }
 }

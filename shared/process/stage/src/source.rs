@@ -1,8 +1,7 @@
 //! The loop of the first stage: publishes a scan when the window admits it and, at a given rate,
 //! when it is due.
 
-mod attempts;
-mod credit;
+mod feed;
 mod live_samples;
 mod pace;
 mod playback;
@@ -14,20 +13,19 @@ mod sensor;
 use std::{
     num::{NonZeroU64, NonZeroUsize},
     ops::Range,
+    time::{Duration, Instant},
 };
 
 use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
 
-use crate::{Launch, StageCounters, StageError, schedule::ScheduleWriter, writer::Writer};
-pub(crate) use credit::Credit;
+use crate::{Launch, StageCounters, StageError, writer::Writer};
+pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
-pub(crate) use sensor::ALIVE_NS;
 
-pub use crate::outlet::RecordedMessage;
-pub use attempts::{Tolerance, Unreadable, open};
+pub use crate::writer::RecordedMessage;
 pub use player::{Recorded, run_player};
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
@@ -71,26 +69,82 @@ pub fn run(
     source: &mut impl Source,
     tolerance: &Tolerance,
 ) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
-    let credit = Credit::open(launch)?;
-    let schedule = ScheduleWriter::create(&launch.manifest)?;
-    let scans = Writer::open(&launch.node, &launch.manifest)?;
+    launch.take_place()?;
     let mut playback = Playback {
-        launch,
+        feed: Feed::open(launch, || Writer::open(&launch.node, &launch.manifest))?,
         source,
         tolerance,
-        credit,
-        scans,
-        schedule,
-        counters: StageCounters::default(),
-        may_have_new_readers: false,
     };
     // By default the system ends a wait up to 50 us late. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
-    if let Some(position) = playback.wait_for_start()? {
-        playback.play(position)?;
+    let ended = playback.play();
+    playback.feed.finish(ended)
+}
+
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Why a scan cannot be read: one sentence each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unreadable {
+    /// The content is invalid: it is skipped and counted.
+    Damaged(String),
+    /// The file or device fails, whatever its content: it is tried again, and nothing is skipped.
+    Io(String),
+}
+
+/// The limits on input that cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tolerance {
+    /// Time for which failing input is tried again.
+    pub retry: Duration,
+    /// Number of damaged scans in a row that are skipped; one more ends the source.
+    pub max_unreadable: usize,
+}
+
+/// Opens the input of a source, and tries again while that fails with a sentence.
+pub fn open<T>(
+    launch: &Launch,
+    tolerance: &Tolerance,
+    mut open: impl FnMut() -> Result<T, String>,
+) -> Result<T, StageError> {
+    let mut attempts = Attempts::new(tolerance);
+    loop {
+        match open() {
+            Ok(input) => return Ok(input),
+            Err(reason) => attempts.failed(reason)?,
+        }
+        if launch.signals.sleep(PAUSE)? {
+            return Err(StageError::Stopped);
+        }
     }
-    Ok(playback.counters)
+}
+
+/// The attempts to read the same input.
+struct Attempts {
+    retry: Duration,
+    first_failure: Option<Instant>,
+}
+
+impl Attempts {
+    fn new(tolerance: &Tolerance) -> Self {
+        Self {
+            retry: tolerance.retry,
+            first_failure: None,
+        }
+    }
+
+    /// Allows another attempt after one that failed.
+    fn failed(&mut self, reason: String) -> Result<(), StageError> {
+        if self.first_failure.is_none() {
+            tracing::warn!("tried again: {reason}");
+        }
+        let since = self.first_failure.get_or_insert_with(Instant::now);
+        match since.elapsed() < self.retry {
+            true => Ok(()),
+            false => Err(StageError::Input(format!(
+                "{reason}, and was tried again for {} s (source.retry_s): is the disk or the network folder still there?",
+                self.retry.as_secs_f64()
+            ))),
+        }
+    }
 }

@@ -2,10 +2,11 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Header, Item, Message, flag};
+use gyre_messages::{Header, Hop, Item, Message};
 
 use crate::{
-    Launch, StageCounters, StageError, allocations, clock,
+    Launch, StageCounters, StageError,
+    counters::Work,
     inputs::{Action, Inputs},
     wake::{self, Signals},
     writer::{Draft, Writer},
@@ -34,9 +35,7 @@ pub trait Stage {
 
 /// Runs a stage until SIGTERM.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
     let mut flow = Flow {
@@ -45,7 +44,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
         inputs,
         output,
         delay: launch.delay(),
-        last_sent: None,
+        last: None,
         ended: false,
         counters: StageCounters::default(),
     };
@@ -76,7 +75,7 @@ struct Flow<'a, S: Stage> {
     inputs: S::Inputs,
     output: Writer<S::Output>,
     delay: Duration,
-    last_sent: Option<u64>,
+    last: Option<u64>,
     ended: bool,
     counters: StageCounters,
 }
@@ -105,50 +104,39 @@ impl<S: Stage> Flow<'_, S> {
         let mut draft = self.output.loan()?;
         let missing = || StageError::transport("read the inputs of an item", item.seq);
         let view = self.inputs.view().ok_or_else(missing)?;
-        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let work = Work::begin();
         self.stage.process(view, &mut draft)?;
         if !self.delay.is_zero() {
             thread::sleep(self.delay);
         }
-        let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-        *item.hop_mut(S::HOP) = gyre_messages::Hop {
+        *item.hop_mut(S::HOP) = Hop {
             received_ns,
-            started_ns,
-            finished_ns,
+            started_ns: work.started_ns,
+            finished_ns: work.end(&mut self.counters),
             published_ns: 0,
         };
         self.stage.identify(&mut item);
         *draft.header().item_mut() = item;
-        crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
-        self.send(item.seq, draft)
+        self.output.send(draft, S::HOP)
     }
 
     fn end(&mut self, item: Item) -> Result<(), StageError> {
         self.require_next(&item)?;
         self.ended = true;
-        let mut draft = self.output.loan()?;
-        *draft.header().item_mut() = Item {
-            flags: flag::END,
-            ..item
-        };
-        self.send(item.seq, draft)
-    }
-
-    fn send(&mut self, seq: u64, draft: Draft<S::Output>) -> Result<(), StageError> {
-        self.output.send(draft, S::HOP)?;
-        self.last_sent = Some(seq);
-        Ok(())
+        self.output.end(item, Some(S::HOP))
     }
 
     /// Requires consecutive output: a gap in its history would stop every reader that restarts on
     /// it.
-    fn require_next(&self, item: &Item) -> Result<(), StageError> {
-        match self.last_sent.map(|last| last.saturating_add(1)) {
-            Some(expected) if item.seq != expected => Err(StageError::SequenceGap {
-                topic: S::Output::TOPIC,
-                expected,
-                got: item.seq,
-            }),
+    fn require_next(&mut self, item: &Item) -> Result<(), StageError> {
+        match self
+            .last
+            .replace(item.seq)
+            .map(|last| last.saturating_add(1))
+        {
+            Some(expected) if item.seq != expected => {
+                Err(StageError::gap(S::Output::TOPIC, expected, item.seq))
+            }
             _ => Ok(()),
         }
     }

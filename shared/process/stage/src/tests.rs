@@ -32,8 +32,8 @@ const WINDOW: Window = Window {
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.
-struct Run {
-    manifest: Manifest,
+pub(crate) struct Run {
+    pub(crate) manifest: Manifest,
     _services: Services,
     _supervisor: Node,
     // Last: removes all files of the run.
@@ -42,7 +42,7 @@ struct Run {
 }
 
 impl Run {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::writing_to(&Rc::new(tempfile::tempdir().unwrap()))
     }
 
@@ -58,8 +58,7 @@ impl Run {
                 raster_cells: 100,
                 cell_m: 1.0,
                 rasters: 1,
-                points: 0,
-                samples: 0,
+                ..Limits::default()
             },
             live: false,
             refines: false,
@@ -94,10 +93,6 @@ fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
 /// A pose is the smallest message.
 fn send(poses: &Writer<Pose>, seq: u64, flags: u32) {
     let mut draft = poses.loan().unwrap();
-    draft.header().item = Item {
-        seq,
-        flags,
-        ..Item::default()
-    };
+    draft.header().item = Item::numbered(seq).flagged(flags);
     poses.send(draft, StageId::PoseIntegration).unwrap();
 }

@@ -1,16 +1,13 @@
-//! The transport, iceoryx2, behind a boundary without its types.
-//!
-//! The ports are generic in the message. Here each is instantiated once, for messages of any type:
-//! header and payload are bytes, and a topic is opened with the names, sizes and alignments of
-//! [`gyre_messages::Topic`], as by the transport's bindings for other languages. So no other crate
-//! compiles its code again; [`writer`](crate::writer) and [`reader`](crate::reader) give the bytes
-//! their types.
+//! The transport, iceoryx2, behind a boundary without its types. Its ports are generic in the
+//! message; here each is instantiated once, for bytes, and a topic is opened with the names, sizes
+//! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
-mod publisher;
+mod port;
 mod sealed;
 mod service;
-mod subscriber;
+
+use std::{fmt::Debug, path::Path};
 
 use iceoryx2::{
     node::NodeView,
@@ -28,18 +25,15 @@ use sealed::Sealed;
 pub use event::Listener;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
-pub(crate) use event::{Event, EventSizes, Notifier};
-pub(crate) use publisher::{Loan, Publisher};
+pub(crate) use event::{Event, Notifier};
+pub(crate) use port::{Loan, Publisher, Sample, Subscriber};
 pub use service::Service;
-pub(crate) use subscriber::{Sample, Subscriber};
 
 type Ipc = ipc::Service;
 /// Stands for a header of any type. It has no bytes itself.
 type AnyHeader = CustomHeaderMarker;
-/// Stands for the elements of any type: their bytes.
 type AnyPayload = [CustomPayloadMarker];
 
-/// The transport of one run.
 #[derive(Clone)]
 pub struct Transport(Config);
 
@@ -52,39 +46,30 @@ pub fn silence() {
 }
 
 impl Manifest {
-    /// Returns the transport of the run.
+    /// Returns the transport of the run. Names and paths are unique to the run, and only the
+    /// supervisor cleans up.
     pub fn transport(&self) -> Result<Transport, StageError> {
-        Transport::of(self)
-    }
-}
-
-impl Transport {
-    /// The transport of a run. Names and paths are unique to the run, and only the supervisor
-    /// cleans up.
-    pub(crate) fn of(manifest: &Manifest) -> Result<Self, StageError> {
         let mut config = Config::default();
-        config.global.prefix = FileName::new(manifest.prefix.as_bytes())
+        config.global.prefix = FileName::new(self.prefix.as_bytes())
             .map_err(|e| StageError::transport("name the run", e))?;
-        let root = format!("{}/", manifest.root.display());
+        let root = format!("{}/", self.root.display());
         let root = TransportPath::new(root.as_bytes())
             .map_err(|e| StageError::transport("use the run's root", e))?;
         config.global.set_root_path(&root);
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
-        Ok(Self(config))
+        Ok(Transport(config))
     }
+}
 
+impl Transport {
     /// Makes the configuration in a file the global one, which the transport uses to clean up
     /// incomplete nodes.
-    pub fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
-        let failed = |reason: String| StageError::Manifest {
-            path: path.to_owned(),
-            reason,
-        };
-        let file = FilePath::new(path.as_os_str().as_encoded_bytes())
-            .map_err(|e| failed(format!("{e:?}")))?;
-        Config::setup_global_config_from_file(&file).map_err(|e| failed(format!("{e:?}")))?;
+    pub fn use_as_global(path: &Path) -> Result<(), StageError> {
+        let failed = |error: &dyn Debug| StageError::manifest(path, format_args!("{error:?}"));
+        let file = FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(&e))?;
+        Config::setup_global_config_from_file(&file).map_err(|e| failed(&e))?;
         Ok(())
     }
 
@@ -110,7 +95,6 @@ impl Transport {
         self.0.global.service.directory.to_string()
     }
 
-    /// Returns the ids of the nodes of dead processes.
     pub fn dead_nodes(&self) -> Vec<String> {
         let mut dead = Vec::new();
         self.for_each_node(|state| {
@@ -146,7 +130,6 @@ impl Transport {
         all && listed
     }
 
-    /// Returns whether the nodes could be listed.
     fn for_each_node(&self, mut visit: impl FnMut(NodeState<Ipc>)) -> bool {
         let listed = iceoryx2::node::Node::<Ipc>::list(&self.0, |state| {
             visit(state);

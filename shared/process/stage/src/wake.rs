@@ -1,8 +1,6 @@
-//! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed.
-//!
-//! The transport can lose a wake-up, rarely (a race between its datagram and its flag). So every
-//! wait has a limit after which the queues are read anyway, and each wake-up that was caught so is
-//! counted.
+//! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed. The
+//! transport can lose a wake-up, rarely (a race between its datagram and its flag). So every wait
+//! has a limit after which the queues are read anyway, and a wake-up that was caught so is counted.
 
 use std::{
     cell::{Cell, OnceCell},
@@ -48,10 +46,8 @@ pub fn let_signals_end_the_process() -> Result<(), StageError> {
     Ok(())
 }
 
-/// The signals that request a stop.
 const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
-/// Signals as file descriptors to wait for.
 #[derive(Debug)]
 pub struct Signals {
     stop: UnixStream,
@@ -62,16 +58,12 @@ pub struct Signals {
     heartbeat: OnceCell<HeartbeatWriter>,
 }
 
-/// The reasons why a wait ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Woken {
     /// SIGTERM, SIGINT or SIGHUP has arrived, now or earlier.
     pub stop: bool,
-    /// A child process has exited.
     pub child: bool,
-    /// A new reader has opened the topic.
     pub handshake: bool,
-    /// The limit was reached without any event.
     pub timed_out: bool,
 }
 
@@ -127,8 +119,8 @@ impl Signals {
 
     /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is
     /// first. Consumes the notifications of `data`: read all queues afterwards. A notification of
-    /// `handshake` is left for [`Writer::accept_readers`](crate::writer::Writer::accept_readers),
-    /// to be called if [`Woken::may_have_new_readers`].
+    /// `handshake` is left for `accept_readers` of the writer, to be called if
+    /// [`Woken::may_have_new_readers`].
     pub fn wait(
         &self,
         data: &[&Listener],
@@ -166,7 +158,7 @@ impl Signals {
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
         for listener in data {
             if next() {
-                consume(listener)?;
+                listener.take()?;
             }
         }
         self.stopped.set(stop || self.stopped.get());
@@ -195,11 +187,10 @@ pub(crate) fn wait_for(listener: &Listener, limit: Duration) -> Result<(), Stage
     let polled = PollFd::new(listener, PollFlags::IN);
     match sleep_until_ready(&mut [polled], limit)? {
         true => Ok(()),
-        false => consume(listener),
+        false => listener.take().map(drop),
     }
 }
 
-/// Returns whether the limit has passed without any event.
 fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool, StageError> {
     let limit = Timespec {
         tv_sec: limit.as_secs() as i64,
@@ -210,10 +201,6 @@ fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool,
         Err(Errno::INTR) => Ok(false),
         Err(error) => Err(StageError::transport("wait", error)),
     }
-}
-
-fn consume(listener: &Listener) -> Result<(), StageError> {
-    listener.take(format_args!("read notifications")).map(drop)
 }
 
 fn drain(mut socket: &UnixStream) -> bool {

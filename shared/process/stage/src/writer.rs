@@ -1,40 +1,41 @@
 //! The publisher of a topic.
 
-use std::marker::PhantomData;
+use std::{fs::File, marker::PhantomData, ops::Deref, path::Path, slice};
 
-use gyre_messages::{Message, StageId, Topic};
+use gyre_messages::{Item, Message, Pose, Sender, StageId, Topic, flag};
+use rustix::fs::{FallocateFlags, fallocate};
 
 use crate::{
-    Manifest, StageError, clock, reservation, services,
+    Launch, Manifest, StageError, clock,
+    run::{self, SHARED_MEMORY},
+    services,
     transport::{Listener, Loan, Node, Notifier, Publisher, Service},
 };
 
 /// Publishes the messages of a topic and keeps a history for late readers: see
-/// [`Writer::accept_readers`].
+/// [`TopicWriter::accept_readers`].
 pub struct Writer<M: Message> {
-    untyped: UntypedWriter,
+    untyped: TopicWriter,
     message: PhantomData<M>,
 }
 
-/// A message that is being written in shared memory.
 pub struct Draft<M: Message> {
     loan: Loan,
     message: PhantomData<M>,
 }
 
 /// A [`Writer`] of messages of any type, as bytes.
-pub(crate) struct UntypedWriter {
-    topic: &'static str,
+pub struct TopicWriter {
+    pub(crate) topic: &'static str,
     handshake: Listener,
     data: Notifier,
     publisher: Publisher,
 }
 
 impl<M: Message> Writer<M> {
-    /// Opens the topic for publishing.
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         Ok(Self {
-            untyped: UntypedWriter::open(node, manifest, &Topic::of::<M>())?,
+            untyped: TopicWriter::open(node, manifest, &Topic::of::<M>())?,
             message: PhantomData,
         })
     }
@@ -47,36 +48,42 @@ impl<M: Message> Writer<M> {
         })
     }
 
+    pub(crate) fn publish(
+        &self,
+        header: M::Header,
+        hop: Option<StageId>,
+    ) -> Result<(), StageError> {
+        let mut draft = self.loan()?;
+        *draft.header() = header;
+        self.untyped.send(draft.loan, hop)
+    }
+
     /// Publishes a message without copying: readers receive its offset in shared memory.
     pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
-        self.untyped.send(draft.loan, hop)
+        self.untyped.send(draft.loan, Some(hop))
     }
 
     /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
     pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
-        self.untyped.send_unchanged(draft.loan)
-    }
-
-    /// Sends the history to readers that have subscribed since the last call, and wakes them.
-    ///
-    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
-    /// topics, so unconditional wake-ups would circulate for ever.
-    pub fn accept_readers(&self) -> Result<(), StageError> {
-        self.untyped.accept_readers()
-    }
-
-    /// The same for readers that have notified alone; returns whether there were any.
-    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
-        self.untyped.answer_handshakes()
-    }
-
-    /// Returns the listener that new readers notify.
-    pub fn listener(&self) -> &Listener {
-        self.untyped.listener()
+        self.untyped.send(draft.loan, None)
     }
 }
 
-impl UntypedWriter {
+impl<M: Message> Deref for Writer<M> {
+    type Target = TopicWriter;
+
+    fn deref(&self) -> &TopicWriter {
+        &self.untyped
+    }
+}
+
+impl<M: Message> AsRef<[TopicWriter]> for Writer<M> {
+    fn as_ref(&self) -> &[TopicWriter] {
+        slice::from_ref(&self.untyped)
+    }
+}
+
+impl TopicWriter {
     pub(crate) fn open(
         node: &Node,
         manifest: &Manifest,
@@ -87,7 +94,7 @@ impl UntypedWriter {
         // Last, since a publisher connects to all existing readers at once.
         let service = Service::open(node, topic)?;
         let publisher = Publisher::create(&service, &manifest.window, &manifest.limits)?;
-        reservation::reserve(manifest, topic.name, publisher.id())?;
+        reserve(manifest, topic.name, publisher.id())?;
         Ok(Self {
             topic: topic.name,
             handshake,
@@ -96,54 +103,76 @@ impl UntypedWriter {
         })
     }
 
-    pub(crate) fn topic(&self) -> &'static str {
-        self.topic
-    }
-
     pub(crate) fn loan(&self) -> Result<Loan, StageError> {
         self.publisher.loan()
     }
 
-    pub(crate) fn send(&self, mut loan: Loan, hop: StageId) -> Result<(), StageError> {
-        loan.item().hop_mut(hop).published_ns = clock::now_ns();
-        self.send_unchanged(loan)
-    }
-
-    fn send_unchanged(&self, loan: Loan) -> Result<(), StageError> {
+    pub(crate) fn send(&self, mut loan: Loan, hop: Option<StageId>) -> Result<(), StageError> {
+        if let Some(hop) = hop {
+            loan.item().hop_mut(hop).published_ns = clock::now_ns();
+        }
         self.publisher.send(loan)?;
-        self.notify()
+        self.data.notify()
     }
 
-    pub(crate) fn accept_readers(&self) -> Result<(), StageError> {
-        let new_reader = self.has_new_reader()?;
+    pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
+        let mut loan = self.loan()?;
+        *loan.item() = item.flagged(flag::END);
+        self.send(loan, hop)
+    }
+
+    /// Sends the history to readers that have subscribed since the last call, and wakes them.
+    ///
+    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
+    /// topics, so unconditional wake-ups would circulate for ever.
+    pub fn accept_readers(&self) -> Result<(), StageError> {
+        let new_reader = self.handshake.take()? > 0;
         // Unconditionally: after a lost handshake the reader finds the history at the end of its
         // own wait.
         self.publisher.connect()?;
-        if new_reader { self.notify() } else { Ok(()) }
+        if new_reader {
+            self.data.notify()
+        } else {
+            Ok(())
+        }
     }
 
-    fn answer_handshakes(&self) -> Result<bool, StageError> {
-        let new_reader = self.has_new_reader()?;
+    /// The same for readers that have notified alone; returns whether there were any.
+    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
+        let new_reader = self.handshake.take()? > 0;
         if new_reader {
             self.publisher.connect()?;
-            self.notify()?;
+            self.data.notify()?;
         }
         Ok(new_reader)
     }
 
-    fn has_new_reader(&self) -> Result<bool, StageError> {
-        let action = format_args!("read the handshakes of {}", self.topic);
-        Ok(self.handshake.take(action)? > 0)
-    }
-
+    /// Returns the listener that new readers notify.
     pub fn listener(&self) -> &Listener {
         &self.handshake
     }
+}
 
-    fn notify(&self) -> Result<(), StageError> {
-        self.data
-            .notify(format_args!("wake the readers of {}", self.topic))
-    }
+/// Allocates the segment of the publisher with this id. The transport creates segments without
+/// memory, and a first write to a page without memory kills the process. A dead process may have
+/// left memory that is about to be freed.
+fn reserve(manifest: &Manifest, topic: &str, publisher: u128) -> Result<(), StageError> {
+    let suffix = format!("_{publisher}.data");
+    let (path, segment) = run::own_files(Path::new(SHARED_MEMORY), &manifest.prefix)
+        .find(|(path, _)| path.to_string_lossy().ends_with(&suffix))
+        .ok_or_else(|| StageError::transport(format!("find the memory of {topic}"), publisher))?;
+    let file = File::options().write(true).open(path);
+    let allocated = file.and_then(|file| {
+        let whole = fallocate(&file, FallocateFlags::empty(), 0, segment.len());
+        whole.map_err(Into::into)
+    });
+    allocated.map_err(|error| {
+        StageError::Transient(format!(
+            "shared memory at {SHARED_MEMORY} has no room for the {:.1} MB of topic `{topic}` ({error}): free some, enlarge it \
+             (containers: --shm-size), or lower run.window or raster.n",
+            segment.len() as f64 / 1e6
+        ))
+    })
 }
 
 impl<M: Message> Draft<M> {
@@ -162,5 +191,78 @@ impl<M: Message> Draft<M> {
             bytemuck::from_bytes_mut(header),
             bytemuck::cast_slice_mut(payload),
         )
+    }
+}
+
+/// A wire message outside of shared memory.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordedMessage {
+    pub header: Vec<u8>,
+    /// The bytes of its payload that the header describes.
+    pub payload: Vec<u8>,
+}
+
+impl RecordedMessage {
+    /// Returns the scan that it is about; `None` if its header is too short.
+    pub fn item(&self) -> Option<Item> {
+        let item = self.header.get(..size_of::<Item>())?;
+        Some(bytemuck::pod_read_unaligned(item))
+    }
+}
+
+impl TopicWriter {
+    /// Opens topics of the stream for publishing, in the place of the source.
+    pub(crate) fn of_stream(launch: &Launch, topics: &[&str]) -> Result<Vec<Self>, StageError> {
+        let of_stream = |topic: &&str| {
+            let found = gyre_messages::topic(topic)
+                .filter(|it| matches!(it.sender, Sender::Stage(_)) && it.name != Pose::TOPIC);
+            let topic = found.ok_or_else(|| {
+                let reason = format!("a source does not publish the topic `{topic}`");
+                StageError::Configuration(reason)
+            })?;
+            Self::open(&launch.node, &launch.manifest, topic)
+        };
+        topics.iter().map(of_stream).collect()
+    }
+
+    /// Publishes a message with this item, in the place of the source.
+    pub(crate) fn republish(
+        &self,
+        message: &RecordedMessage,
+        item: Item,
+    ) -> Result<(), StageError> {
+        let mut loan = self.loan()?;
+        let (header, payload) = loan.parts();
+        let (bytes, room) = (message.payload.len(), payload.len());
+        let is_whole = message.header.len() == header.len();
+        let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
+            return Err(StageError::Input(format!(
+                "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
+                item.seq, self.topic
+            )));
+        };
+        content.copy_from_slice(&message.payload);
+        // The memory behind it has no meaning, and must not differ from run to run.
+        payload[bytes..].fill(0);
+        header.copy_from_slice(&message.header);
+        *loan.item() = item;
+        self.send(loan, Some(StageId::RadarReplay))
+    }
+}
+
+/// Returns the item of the messages of a scan without the times of the run that they are from.
+pub(crate) fn item_of<'a>(
+    messages: impl IntoIterator<Item = &'a RecordedMessage>,
+    seq: u64,
+) -> Result<Item, StageError> {
+    let item = messages.into_iter().next().and_then(RecordedMessage::item);
+    match item.filter(|item| item.seq == seq) {
+        Some(item) => Ok(Item {
+            hops: Default::default(),
+            ..item
+        }),
+        None => Err(StageError::Input(format!(
+            "the recorded message {seq} is another one"
+        ))),
     }
 }

@@ -17,7 +17,6 @@ pub(super) struct Sent {
 }
 
 impl Sent {
-    /// Sends a request to the socket.
     pub fn to(socket: &Path, request: &Request, limit: Duration) -> io::Result<Self> {
         let mut line = serde_json::to_string(request)?;
         line.push('\n');

@@ -8,12 +8,10 @@ use gyre_messages::{GivenAnew, Item, flag};
 pub struct Sequence {
     /// The number behind the newest item.
     pub next: Option<u64>,
-    /// The generation of the newest item.
     pub generation: u32,
     /// The first item that counts if it is missing; `None`: from the first one received.
     pub expected: Option<u64>,
     pub missed: u64,
-    /// True if the newest item was the end of the stream.
     pub ended: bool,
 }
 
@@ -54,23 +52,25 @@ mod tests {
     use super::*;
 
     fn item(seq: u64, flags: u32) -> Item {
-        Item {
-            seq,
-            flags,
-            ..Item::default()
-        }
+        Item::numbered(seq).flagged(flags)
     }
 
     #[test]
     fn gaps_are_counted_and_repeated_items_skipped() {
         let mut sequence = Sequence::default();
-        assert_eq!(sequence.advance(&item(0, flag::BASE | flag::SYNC)), None);
-        assert_eq!(sequence.advance(&item(5, 0)), Some(0));
-        assert_eq!(sequence.advance(&item(9, 0)), Some(3));
-        assert_eq!(sequence.advance(&item(8, 0)), None);
-        assert_eq!(sequence.advance(&item(10, flag::SYNC)), Some(0));
-        assert_eq!(sequence.missed, 3);
-        assert!(!sequence.ended);
+        for (seq, flags, missed) in [
+            (0, flag::BASE | flag::SYNC, None),
+            (5, 0, Some(0)),
+            (9, 0, Some(3)),
+            (8, 0, None),
+            (10, flag::SYNC, Some(0)),
+        ] {
+            assert_eq!(sequence.advance(&item(seq, flags)), missed, "{seq}");
+        }
+        assert!(sequence.missed == 3 && !sequence.ended);
+        // The end is no message, but what was missed before it counts.
+        assert_eq!(sequence.advance(&item(13, flag::END)), None);
+        assert!(sequence.missed == 5 && sequence.ended);
     }
 
     #[test]
@@ -92,44 +92,37 @@ mod tests {
         assert_eq!(sequence.missed, 3);
     }
 
-    #[test]
-    fn numbers_that_are_given_anew_replace_those_received_and_are_counted_anew() {
-        let of = |generation, numbered_from, seq| Item {
+    fn of(generation: u32, numbered_from: u64, seq: u64) -> Item {
+        Item {
             generation,
             numbered_from,
             ..item(seq, 0)
-        };
-        let mut sequence = Sequence::default();
-        for seq in 5..10 {
-            assert_eq!(sequence.advance(&of(1, 0, seq)), Some(0));
         }
-        assert_eq!(
-            sequence.advance(&of(2, 7, 6)),
-            None,
-            "the newest pose's again"
-        );
-        assert_eq!(sequence.advance(&of(2, 7, 7)), Some(0));
-        assert_eq!(
-            sequence.advance(&of(1, 0, 6)),
-            None,
-            "a pose of the journal"
-        );
-        assert_eq!(sequence.advance(&of(2, 7, 8)), Some(0));
-        assert_eq!(sequence.missed, 0);
-        // The queue has lost the first ones of another generation.
-        assert_eq!(sequence.advance(&of(4, 8, 12)), Some(4));
-        assert_eq!(sequence.advance(&of(4, 8, 11)), None);
-        let end = Item {
-            flags: flag::END,
-            ..of(4, 8, 13)
-        };
+    }
+
+    #[test]
+    fn numbers_that_are_given_anew_replace_those_received_and_are_counted_anew() {
+        let mut sequence = Sequence::default();
+        for (item, missed) in [
+            (of(1, 0, 5), Some(0)),
+            (of(1, 0, 6), Some(0)),
+            (of(1, 0, 7), Some(0)),
+            // The newest pose's again, and a pose of the journal.
+            (of(2, 7, 6), None),
+            (of(2, 7, 7), Some(0)),
+            (of(1, 0, 6), None),
+            (of(2, 7, 8), Some(0)),
+            // The queue has lost the first ones of another generation.
+            (of(4, 8, 12), Some(4)),
+            (of(4, 8, 11), None),
+        ] {
+            assert_eq!(sequence.advance(&item), missed, "{item:?}");
+        }
+        let end = of(4, 8, 13).flagged(flag::END);
         assert_eq!(sequence.advance(&end), None);
         assert!(sequence.ended);
         assert_eq!(sequence.advance(&of(5, 13, 13)), Some(0));
-        assert!(
-            !sequence.ended,
-            "masking was killed after the end of the stream"
-        );
+        assert!(!sequence.ended, "masking was killed after the end");
     }
 
     #[test]
@@ -140,11 +133,7 @@ mod tests {
                 generation: 3,
                 ..Sequence::default()
             };
-            let first = Item {
-                generation,
-                numbered_from,
-                ..item(9, 0)
-            };
+            let first = of(generation, numbered_from, 9);
             assert_eq!(sequence.advance(&first), Some(missed));
         }
     }
@@ -153,37 +142,18 @@ mod tests {
     fn what_a_skipped_generation_gave_anew_is_missed() {
         // Items up to 14 of generation 1 are there. Generation 2 reused 7 and 8, and 3 begins
         // behind its poses.
-        let skipped = |first| GivenAnew {
-            generation: 2,
-            first,
-        };
-        for (skipped, missed) in [
-            (None, 0),
-            (Some(skipped(7)), 2),
-            (Some(skipped(9)), 0),
-            (Some(skipped(12)), 0),
-        ] {
+        for (first, missed) in [(None, 0), (Some(7), 2), (Some(9), 0), (Some(12), 0)] {
             let mut sequence = Sequence {
                 next: Some(15),
                 generation: 1,
                 ..Sequence::default()
             };
-            let first = Item {
-                generation: 3,
-                numbered_from: 9,
-                ..item(9, 0)
-            };
-            assert_eq!(sequence.advance_past(&first, skipped), Some(missed));
+            let skipped = first.map(|first| GivenAnew {
+                generation: 2,
+                first,
+            });
+            assert_eq!(sequence.advance_past(&of(3, 9, 9), skipped), Some(missed));
             assert_eq!((sequence.next, sequence.missed), (Some(10), missed));
         }
-    }
-
-    #[test]
-    fn the_end_is_no_message_but_what_was_missed_before_it_counts() {
-        let mut sequence = Sequence::default();
-        assert_eq!(sequence.advance(&item(1, 0)), Some(0));
-        assert_eq!(sequence.advance(&item(4, flag::END)), None);
-        assert!(sequence.ended);
-        assert_eq!(sequence.missed, 2);
     }
 }

@@ -1,9 +1,6 @@
-//! The place of a run in shared memory: its root, its lock, and the removal of both.
-//!
-//! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of
-//! each run lies its lock, and as long as the run lives its supervisor holds it. So a lock that is
-//! free belongs to a dead run, and whoever holds it may remove that run. No lock is shared between
-//! runs, and no run waits for one.
+//! The place of a run in shared memory, `/dev/shm/gyre-<uid>`, which is the user's alone. Beside
+//! the root of each run lies its lock, which its supervisor holds as long as the run lives. So a
+//! lock that is free belongs to a dead run, and whoever holds it may remove that run.
 
 use std::{
     collections::BTreeSet,
@@ -21,7 +18,7 @@ use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use rustix::{
     fs::{Mode, OFlags},
     io::Errno,
-    process::{Uid, geteuid},
+    process::geteuid,
 };
 use thiserror::Error;
 
@@ -30,7 +27,6 @@ use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 const OWNER_ONLY: u32 = 0o700;
 /// Modes of a directory where others could have put something, or of a special directory.
 const NOT_OWN: u32 = 0o7022;
-/// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
 /// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some
 /// milliseconds, while it removes it.
@@ -46,25 +42,16 @@ pub struct RunRoot {
     _lock: File,
 }
 
-/// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    #[error("another run is writing to {out}{holder}: wait for it, or choose another --out")]
-    Busy {
-        out: PathBuf,
-        /// The process of the other run, after a comma.
-        holder: String,
-    },
+    #[error("{0}")]
+    Busy(String),
     #[error(
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
     Unusable { path: PathBuf, source: io::Error },
-    #[error("{path} {state}, so the shared memory of a run would not be safe in it: {remedy}")]
-    Unsafe {
-        path: PathBuf,
-        state: String,
-        remedy: String,
-    },
+    #[error("{0}")]
+    Unsafe(String),
     #[error("interrupted before the start")]
     Interrupted,
     #[error(transparent)]
@@ -76,9 +63,9 @@ impl RootError {
     /// user has ended and removed the user's directory.
     fn may_pass(&self) -> bool {
         match self {
-            Self::Busy { .. } => true,
+            Self::Busy(_) => true,
             Self::Unusable { source, .. } => source.kind() == io::ErrorKind::NotFound,
-            Self::Unsafe { .. } | Self::Interrupted | Self::Signals(_) => false,
+            Self::Unsafe(_) | Self::Interrupted | Self::Signals(_) => false,
         }
     }
 }
@@ -87,15 +74,12 @@ impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
     pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
-        let name = name(out, geteuid());
+        let name = name(out);
         let deadline = Instant::now() + LIMIT;
         loop {
-            let failed = match Self::try_acquire(out, &name) {
-                Err(failed) if failed.may_pass() => failed,
+            match Self::try_acquire(out, &name) {
+                Err(failed) if failed.may_pass() && Instant::now() <= deadline => {}
                 acquired => return acquired,
-            };
-            if Instant::now() > deadline {
-                return Err(failed);
             }
             if signals.sleep(PAUSE)? {
                 return Err(RootError::Interrupted);
@@ -105,7 +89,7 @@ impl RunRoot {
 
     fn try_acquire(out: &Path, name: &str) -> Result<Self, RootError> {
         let runs = user_directory()?;
-        remove_dead_runs(&runs);
+        roots_in(&runs).for_each(|root| remove_if_dead(&root));
         let path = runs.join(name);
         let unusable = |source| RootError::Unusable {
             path: path.clone(),
@@ -123,14 +107,16 @@ impl RunRoot {
                     _lock: lock,
                 })
             }
-            Attempt::Held(holder) => Err(RootError::Busy {
-                out: out.to_owned(),
-                holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
-            }),
+            Attempt::Held(holder) => {
+                let holder = holder.map_or(String::new(), |holder| format!(", {holder}"));
+                Err(RootError::Busy(format!(
+                    "another run is writing to {}{holder}: wait for it, or choose another --out",
+                    out.display()
+                )))
+            }
         }
     }
 
-    /// Returns the prefix of all names of the run in shared memory.
     pub fn prefix(&self) -> String {
         self.prefix.clone()
     }
@@ -149,23 +135,25 @@ impl Drop for RunRoot {
 /// Returns the root of this user's run that writes to `out`, an absolute path, whether there is one
 /// or not.
 pub fn root_of(out: &Path) -> PathBuf {
-    path_of(geteuid()).join(name(out, geteuid()))
+    user_path().join(name(out))
 }
 
 /// Returns the name of the run that writes to `out`. It differs between users, since names in
 /// `/dev/shm` are common to all.
-fn name(out: &Path, user: Uid) -> String {
-    let user = user.as_raw().to_le_bytes();
+fn name(out: &Path) -> String {
+    let user = geteuid().as_raw().to_le_bytes();
     let hash = hash(out.as_os_str().as_encoded_bytes().iter().chain(&user));
     format!("gyre{:0DIGITS$x}", hash & 0xff_ffff_ffff)
 }
 
-fn path_of(user: Uid) -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("gyre-{}", user.as_raw()))
+fn user_path() -> PathBuf {
+    Path::new(SHARED_MEMORY).join(format!("gyre-{}", geteuid().as_raw()))
 }
 
-fn is_name(name: &str) -> bool {
-    let digits = name.strip_prefix("gyre").unwrap_or_default();
+fn is_root(root: &Path) -> bool {
+    let name = root.file_name().and_then(|name| name.to_str());
+    let digits = name.and_then(|name| name.strip_prefix("gyre"));
+    let digits = digits.unwrap_or_default();
     let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
     digits.len() == DIGITS && digits.bytes().all(is_digit)
 }
@@ -179,7 +167,7 @@ fn lock_of(root: &Path) -> PathBuf {
 /// all users, so an entry there is used only if it is a directory of this user that no other can
 /// write to.
 fn user_directory() -> Result<PathBuf, RootError> {
-    let path = path_of(geteuid());
+    let path = user_path();
     make_directory(&path).map_err(|source| RootError::Unusable {
         path: path.clone(),
         source,
@@ -205,10 +193,11 @@ fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
 /// all others. A process with another umask may have created it, as the transport does in a process
 /// whose run has been removed.
 fn make_owner_only(path: &Path) -> Result<(), RootError> {
-    let unsafe_ = |state: String, remedy: String| RootError::Unsafe {
-        path: path.to_owned(),
-        state,
-        remedy,
+    let unsafe_ = |state: &str, remedy: &str| {
+        let path = path.display();
+        RootError::Unsafe(format!(
+            "{path} {state}, so the shared memory of a run would not be safe in it: {remedy}"
+        ))
     };
     let unusable = |source| RootError::Unusable {
         path: path.to_owned(),
@@ -217,8 +206,10 @@ fn make_owner_only(path: &Path) -> Result<(), RootError> {
     let directory = match open_directory(path) {
         Ok(directory) => directory,
         Err(Errno::NOTDIR | Errno::LOOP) => {
-            let remedy = "remove it, or ask its owner to".to_owned();
-            return Err(unsafe_("is not a directory".to_owned(), remedy));
+            return Err(unsafe_(
+                "is not a directory",
+                "remove it, or ask its owner to",
+            ));
         }
         Err(error) => return Err(unusable(error.into())),
     };
@@ -227,17 +218,14 @@ fn make_owner_only(path: &Path) -> Result<(), RootError> {
     match (owner == geteuid().as_raw(), mode) {
         (true, OWNER_ONLY) => Ok(()),
         (true, mode) if mode & NOT_OWN == 0 => set_owner_only(&directory).map_err(unusable),
-        (true, _) => {
-            let remedy = format!("remove it, or `chmod 700 {}`", path.display());
-            Err(unsafe_(
-                format!("has mode {mode:04o} instead of 0700"),
-                remedy,
-            ))
-        }
-        (false, _) => {
-            let remedy = "ask that user or the administrator to remove it".to_owned();
-            Err(unsafe_(format!("belongs to user {owner}"), remedy))
-        }
+        (true, _) => Err(unsafe_(
+            &format!("has mode {mode:04o} instead of 0700"),
+            &format!("remove it, or `chmod 700 {}`", path.display()),
+        )),
+        (false, _) => Err(unsafe_(
+            &format!("belongs to user {owner}"),
+            "ask that user or the administrator to remove it",
+        )),
     }
 }
 
@@ -253,18 +241,13 @@ fn make_directory(path: &Path) -> io::Result<()> {
 
 /// Removes what dead runs of this user left in shared memory. [`RunRoot::acquire`] does this too.
 pub fn sweep() {
-    let runs = path_of(geteuid());
-    if make_owner_only(&runs).is_ok() {
-        remove_dead_runs(&runs);
-    }
+    roots().iter().for_each(|root| remove_if_dead(root));
 }
 
 /// Removes the remains of the run with this root in shared memory, if its supervisor is dead and no
 /// other run has its place.
 pub fn sweep_run(root: &Path) {
-    let is_run = root.file_name().and_then(|name| name.to_str());
-    let of_user = root.parent() == Some(path_of(geteuid()).as_path());
-    if of_user && is_run.is_some_and(is_name) {
+    if root.parent() == Some(&*user_path()) && is_root(root) {
         remove_if_dead(root);
     }
 }
@@ -276,7 +259,7 @@ pub(crate) fn is_alive(root: &Path) -> bool {
 
 /// Returns the roots of this user's runs, dead ones too.
 pub(crate) fn roots() -> Vec<PathBuf> {
-    let runs = path_of(geteuid());
+    let runs = user_path();
     match make_owner_only(&runs) {
         Ok(()) => roots_in(&runs).collect(),
         Err(_) => Vec::new(),
@@ -284,23 +267,16 @@ pub(crate) fn roots() -> Vec<PathBuf> {
 }
 
 /// Returns the roots of the runs in a directory: a run has a root or a lock or both.
-fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> {
+fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let entries = fs::read_dir(runs).into_iter().flatten().flatten();
-    let names: BTreeSet<String> = entries
-        .filter_map(|entry| {
-            let path = PathBuf::from(entry.file_name());
-            Some(path.file_stem()?.to_str()?.to_owned())
-        })
-        .filter(|name| is_name(name))
+    let roots: BTreeSet<PathBuf> = entries
+        .map(|entry| entry.path().with_extension(""))
+        .filter(|root| is_root(root))
         .collect();
-    names.into_iter().map(|name| runs.join(name))
+    roots.into_iter()
 }
 
-/// Removes runs whose supervisor was killed: their locks are free.
-fn remove_dead_runs(runs: &Path) {
-    roots_in(runs).for_each(|root| remove_if_dead(&root));
-}
-
+/// Removes a run whose supervisor was killed: its lock is free.
 fn remove_if_dead(root: &Path) {
     // A run that has just ended has removed its lock last. Created again, that would stay if this
     // process were killed here.
@@ -315,7 +291,6 @@ fn remove_if_dead(root: &Path) {
     }
 }
 
-/// Removes a run whose lock this process holds.
 fn remove(root: &Path) {
     remove_files(root);
     // Last: with it the name is free.

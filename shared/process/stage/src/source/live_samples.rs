@@ -2,6 +2,7 @@
 //! radar, is handed over with the scan that it belongs to.
 
 use std::{
+    mem,
     net::UdpSocket,
     os::fd::{AsFd, BorrowedFd},
     str::FromStr,
@@ -22,18 +23,19 @@ use crate::{
 
 /// The live sensors beside a radar.
 pub(super) struct LiveSensors {
-    gyro: Option<Live>,
-    wheels: Option<Live>,
+    sensors: Vec<Live>,
     datagram: Vec<u8>,
     /// The samples of the last scan.
     of_scan: Vec<Sample>,
-    max_wait: Duration,
+    /// The longest time for which a scan waits for its samples.
+    pub max_wait: Duration,
     /// Samples that were left out so far, and the number for the next report.
     left_out: usize,
     said_at: usize,
 }
 
 struct Live {
+    kind: SampleKind,
     samples: LiveSamples,
     socket: Option<UdpSocket>,
     /// Parses a line of a datagram; `None` for one that is no sample.
@@ -49,23 +51,21 @@ impl LiveSensors {
     pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);
-        let at_gyro = (gyro.kind == GyroKind::Udp).then_some(gyro.listen.as_str());
-        let at_wheels = (wheels.kind == WheelsKind::Udp).then_some(wheels.listen.as_str());
-        let waits_ms = [
-            gyro.is_live().then_some(gyro.max_wait_ms),
-            wheels.is_live().then_some(wheels.max_wait_ms),
-        ];
-        let Some(max_wait_ms) = waits_ms.into_iter().flatten().reduce(f64::max) else {
-            return Ok(None);
-        };
-        let of_gyro = || Live::open("gyro", at_gyro, LiveSensor::Gyro(gyro.clone()), rates);
-        let of_wheels = || {
-            let sensor = LiveSensor::Wheels(wheels.clone());
-            Live::open("wheels", at_wheels, sensor, speed)
-        };
-        Ok(Some(Self {
-            gyro: gyro.is_live().then(of_gyro).transpose()?,
-            wheels: wheels.is_live().then(of_wheels).transpose()?,
+        let (mut sensors, mut max_wait_ms) = (Vec::new(), 0_f64);
+        if gyro.is_live() {
+            max_wait_ms = max_wait_ms.max(gyro.max_wait_ms);
+            let listens = (gyro.kind == GyroKind::Udp).then(|| gyro.listen.clone());
+            let sensor = LiveSensor::Gyro(gyro);
+            sensors.push(Live::open(SampleKind::Gyro, listens, sensor, rates)?);
+        }
+        if wheels.is_live() {
+            max_wait_ms = max_wait_ms.max(wheels.max_wait_ms);
+            let listens = (wheels.kind == WheelsKind::Udp).then(|| wheels.listen.clone());
+            let sensor = LiveSensor::Wheels(wheels);
+            sensors.push(Live::open(SampleKind::Wheels, listens, sensor, speed)?);
+        }
+        Ok((!sensors.is_empty()).then(|| Self {
+            sensors,
             datagram: vec![0; MAX_DATAGRAM],
             of_scan: Vec::new(),
             max_wait: Duration::from_secs_f64(max_wait_ms * 1e-3),
@@ -74,26 +74,16 @@ impl LiveSensors {
         }))
     }
 
-    /// The longest time for which a scan waits for its samples.
-    pub fn max_wait(&self) -> Duration {
-        self.max_wait
-    }
-
     /// The sockets to wait for.
     pub fn sockets(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
-        let sockets = self.all().filter_map(|live| live.socket.as_ref());
+        let sockets = self.sensors.iter().filter_map(|live| live.socket.as_ref());
         sockets.map(AsFd::as_fd)
     }
 
     /// Takes the samples that have arrived, at most one turn of them.
     pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
-        let sensors = [
-            (SampleKind::Gyro, &mut self.gyro),
-            (SampleKind::Wheels, &mut self.wheels),
-        ];
-        for (kind, live) in sensors {
-            let Some(live) = live else { continue };
-            let arrived = (0..MAX_SAMPLES).map_while(|_| radar.sample(kind));
+        for live in &mut self.sensors {
+            let arrived = (0..MAX_SAMPLES).map_while(|_| radar.sample(live.kind));
             arrived.for_each(|sample| live.samples.add(&sample));
             live.receive(&mut self.datagram)?;
         }
@@ -103,17 +93,17 @@ impl LiveSensors {
     /// Returns whether a complete scan has all its samples.
     pub fn cover(&self, header: &ScanHeader) -> bool {
         let until_ns = header.span_ns()[1];
-        self.all().all(|live| live.samples.cover(until_ns))
+        self.sensors.iter().all(|live| live.samples.cover(until_ns))
     }
 
     /// Stores the samples of a complete scan behind its powers.
     pub fn store(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) {
         self.of_scan.clear();
         let mut left_out = 0;
-        for live in [&mut self.gyro, &mut self.wheels].into_iter().flatten() {
+        for live in &mut self.sensors {
             let (samples, of_sensor) = live.samples.of_scan(header.span_ns());
             self.of_scan.extend_from_slice(samples);
-            left_out += of_sensor + std::mem::take(&mut live.unreadable) + live.newly_dropped();
+            left_out += of_sensor + mem::take(&mut live.unreadable) + live.newly_dropped();
         }
         self.of_scan.sort_unstable_by_key(Sample::order);
         header.set_samples(bytes, &self.of_scan, left_out);
@@ -127,23 +117,22 @@ impl LiveSensors {
             self.said_at = 2 * so_far;
         }
     }
-
-    fn all(&self) -> impl Iterator<Item = &Live> {
-        [&self.gyro, &self.wheels].into_iter().flatten()
-    }
 }
 
 impl Live {
-    /// Opens the sensor of a section, whose datagrams are received at an address if there is one.
+    /// Opens a sensor, whose datagrams are received at an address if there is one.
     fn open(
-        section: &str,
-        listens: Option<&str>,
+        kind: SampleKind,
+        listens: Option<String>,
         sensor: LiveSensor,
         parse: fn(&str) -> Option<Sample>,
     ) -> Result<Self, StageError> {
+        let section = kind.section();
+        let socket = listens.map(|at| listen(section, section, &at));
         Ok(Self {
+            kind,
             samples: LiveSamples::new(sensor),
-            socket: listens.map(|at| listen(section, section, at)).transpose()?,
+            socket: socket.transpose()?,
             parse,
             unreadable: 0,
             dropped: 0,
@@ -153,7 +142,7 @@ impl Live {
     /// Returns the datagrams that the system has dropped since the last call.
     fn newly_dropped(&mut self) -> usize {
         let so_far = self.socket.as_ref().map_or(0, dropped);
-        so_far.wrapping_sub(std::mem::replace(&mut self.dropped, so_far)) as usize
+        so_far.wrapping_sub(mem::replace(&mut self.dropped, so_far)) as usize
     }
 
     fn receive(&mut self, datagram: &mut [u8]) -> Result<(), StageError> {
@@ -217,6 +206,10 @@ mod tests {
                 expected(second, [0.0, 0.0, 1e-3, 0.5, 0.0, 9.8]),
             ]
         );
+        let text = b"1700000000000000001, 8.25\n17,-1\n";
+        let found: Vec<_> = lines(text).map(speed).collect();
+        let expected = [Sample::speed(first, 8.25), Sample::speed(17, -1.0)];
+        assert_eq!(found, expected.map(Some));
     }
 
     #[test]
@@ -238,14 +231,5 @@ mod tests {
             let found: Vec<_> = lines(text).map(speed).collect();
             assert_eq!(found, [None], "{text:?}");
         }
-    }
-
-    #[test]
-    fn a_line_of_the_wheels_has_a_stamp_and_a_speed() {
-        let found: Vec<_> = lines(b"1700000000000000001, 8.25\n17,-1\n")
-            .map(speed)
-            .collect();
-        let first = Sample::speed(1_700_000_000_000_000_001, 8.25);
-        assert_eq!(found, [Some(first), Some(Sample::speed(17, -1.0))]);
     }
 }

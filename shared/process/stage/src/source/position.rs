@@ -95,14 +95,6 @@ impl Position {
         };
     }
 
-    /// Returns the header of the end of the stream.
-    pub fn end(&self) -> Item {
-        Item {
-            flags: flag::END,
-            ..self.item()
-        }
-    }
-
     /// Returns the header of the scan.
     pub fn item(&self) -> Item {
         let flags = if self.starts_chain { flag::BREAK } else { 0 };
@@ -134,49 +126,31 @@ mod tests {
 
     #[test]
     fn a_restart_begins_with_the_scan_of_the_newest_pose() {
-        assert_eq!(
-            Position::resume(&newest_pose(), 5, false),
-            Position {
-                index: 40,
-                published: 31,
-                previous: Some(37),
-                starts_chain: false
-            }
-        );
-        assert_eq!(
-            Position::resume(&newest_pose(), 5, true),
-            Position {
-                index: 37,
-                published: 30,
-                previous: None,
-                starts_chain: false
-            }
-        );
-        let base = Item {
-            flags: flag::BASE,
-            ..newest_pose()
+        let resumed = |masks_pairs| Position::resume(&newest_pose(), 5, masks_pairs);
+        let position = |index, published, previous| Position {
+            index,
+            published,
+            previous,
+            starts_chain: false,
         };
+        assert_eq!(resumed(false), position(40, 31, Some(37)));
+        assert_eq!(resumed(true), position(37, 30, None));
+        let base = newest_pose().flagged(flag::BASE);
         assert_eq!(Position::resume(&base, 5, false), Position::start(5));
     }
 
     #[test]
-    fn a_restart_in_live_mode_continues_the_sources_own_count() {
-        let position = Position::resume(&newest_pose(), 5, false);
-        assert_eq!((position.index, position.item().published), (40, 31));
-    }
-
-    #[test]
     fn a_sensor_goes_on_after_all_that_was_published() {
-        let position = |published| Position::after(&newest_pose(), published);
-        assert_eq!(position(0).published, 32);
-        assert_eq!(position(40).published, 40);
-        assert!(!position(40).item().is(flag::BREAK));
-        let base = Item {
-            flags: flag::BASE,
-            ..newest_pose()
-        };
-        assert!(Position::after(&base, 0).item().is(flag::BREAK));
-        assert_eq!(Position::after(&base, 0).published, 0);
+        let base = newest_pose().flagged(flag::BASE);
+        for (newest, published, next) in [
+            (newest_pose(), 0, 32),
+            (newest_pose(), 40, 40),
+            (base, 0, 0),
+        ] {
+            let position = Position::after(&newest, published);
+            assert_eq!(position.published, next);
+            assert_eq!(position.item().is(flag::BREAK), next == 0);
+        }
     }
 
     #[test]

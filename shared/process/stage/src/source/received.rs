@@ -1,21 +1,15 @@
 //! Counts of the deliveries and losses of a sensor, in a file of the run's root: a source that
 //! replaces a dead one continues to count, and observers see the counts while the run works.
 
-use std::{
-    fs::{File, OpenOptions},
-    os::unix::fs::{FileExt, OpenOptionsExt},
-    path::PathBuf,
-};
-
 use serde::{Deserialize, Serialize};
 
-use crate::{Manifest, StageCounters, StageError};
+use crate::{
+    Manifest, StageCounters, StageError,
+    numbers::{self, Numbers},
+};
 
-/// The name of the file: the numbers of [`Received`] in their order, each as eight bytes,
-/// little-endian.
+/// The name of the file: the numbers of [`Received`] in their order.
 const FILE: &str = "source.received";
-const NUMBERS: usize = 9;
-const BYTES: usize = 8 * NUMBERS;
 
 /// Counts of the deliveries and losses of a live sensor since the start of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,7 +30,7 @@ pub struct Received {
 }
 
 /// A scan that was published.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LastScan {
     /// Time of its middle by the sensor, ns.
     pub stamp_ns: i64,
@@ -60,12 +54,9 @@ impl Received {
         counters.reconnections = self.reconnections();
     }
 
-    fn to_bytes(self) -> [u8; BYTES] {
-        let scan = self.last_scan.unwrap_or(LastScan {
-            stamp_ns: 0,
-            at_ns: 0,
-        });
-        let numbers: [u64; NUMBERS] = [
+    pub(super) fn to_numbers(self) -> [u64; 9] {
+        let scan = self.last_scan.unwrap_or_default();
+        [
             self.missing_azimuths,
             self.scans_left_out,
             self.damaged_messages,
@@ -75,78 +66,44 @@ impl Received {
             self.last_scan.is_some().into(),
             scan.stamp_ns as u64,
             scan.at_ns as u64,
-        ];
-        let mut bytes = [0; BYTES];
-        for (k, number) in numbers.into_iter().enumerate() {
-            bytes[8 * k..][..8].copy_from_slice(&number.to_le_bytes());
-        }
-        bytes
+        ]
     }
 
-    fn from_bytes(bytes: &[u8; BYTES]) -> Self {
-        let number = |k: usize| {
-            let mut number = [0; 8];
-            number.copy_from_slice(&bytes[8 * k..][..8]);
-            u64::from_le_bytes(number)
-        };
-        let scan = LastScan {
-            stamp_ns: number(7) as i64,
-            at_ns: number(8) as i64,
-        };
+    fn of(
+        [
+            missing,
+            left_out,
+            damaged,
+            foreign,
+            connections,
+            receives,
+            has_scan,
+            stamp_ns,
+            at_ns,
+        ]: [u64; 9],
+    ) -> Self {
         Self {
-            missing_azimuths: number(0),
-            scans_left_out: number(1),
-            damaged_messages: number(2),
-            foreign_messages: number(3),
-            connections: number(4),
-            is_receiving: number(5) != 0,
-            last_scan: (number(6) != 0).then_some(scan),
+            missing_azimuths: missing,
+            scans_left_out: left_out,
+            damaged_messages: damaged,
+            foreign_messages: foreign,
+            connections,
+            is_receiving: receives != 0,
+            last_scan: (has_scan != 0).then_some(LastScan {
+                stamp_ns: stamp_ns as i64,
+                at_ns: at_ns as i64,
+            }),
         }
     }
 }
 
 /// Returns the deliveries of a run's sensor; `None` if its source is no sensor.
 pub fn read(manifest: &Manifest) -> Option<Received> {
-    let mut bytes = [0; BYTES];
-    let file = File::open(manifest.root.join(FILE)).ok()?;
-    file.read_exact_at(&mut bytes, 0).ok()?;
-    Some(Received::from_bytes(&bytes))
+    numbers::read(&manifest.root.join(FILE), 0).map(Received::of)
 }
 
-pub(super) struct ReceivedWriter {
-    path: PathBuf,
-    file: File,
-    written: Option<Received>,
-}
-
-impl ReceivedWriter {
-    pub fn open(manifest: &Manifest) -> Result<Self, StageError> {
-        let path = manifest.root.join(FILE);
-        let mut options = OpenOptions::new();
-        options.create(true).truncate(false).write(true).mode(0o600);
-        match options.open(&path) {
-            Ok(file) => Ok(Self {
-                path,
-                file,
-                written: None,
-            }),
-            Err(source) => Err(StageError::File { path, source }),
-        }
-    }
-
-    /// Writes the numbers, if they are others than before.
-    pub fn write(&mut self, received: Received) -> Result<(), StageError> {
-        if self.written == Some(received) {
-            return Ok(());
-        }
-        let written = self.file.write_all_at(&received.to_bytes(), 0);
-        written.map_err(|source| StageError::File {
-            path: self.path.clone(),
-            source,
-        })?;
-        self.written = Some(received);
-        Ok(())
-    }
+pub(super) fn open(manifest: &Manifest) -> Result<Numbers<9>, StageError> {
+    Numbers::open(manifest, FILE, 0)
 }
 
 #[cfg(test)]
@@ -155,20 +112,9 @@ mod tests {
 
     #[test]
     fn what_is_received_is_read_as_it_was_written() {
-        let received = Received {
-            missing_azimuths: 1,
-            scans_left_out: 2,
-            damaged_messages: 3,
-            foreign_messages: 4,
-            connections: u64::MAX,
-            is_receiving: true,
-            last_scan: Some(LastScan {
-                stamp_ns: -7,
-                at_ns: i64::MAX,
-            }),
-        };
-        for received in [received, Received::default()] {
-            assert_eq!(Received::from_bytes(&received.to_bytes()), received);
+        let numbers = [1, 2, 3, 4, u64::MAX, 1, 1, 5, 6];
+        for numbers in [numbers, [0; 9]] {
+            assert_eq!(Received::of(numbers).to_numbers(), numbers);
         }
     }
 }

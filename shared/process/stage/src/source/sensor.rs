@@ -3,28 +3,22 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{Hop, NumberedBy, Scan, ScanHeader, StageId};
+use gyre_messages::{NumberedBy, Scan, ScanHeader, StageId};
 use gyre_samples::{Sample, SampleKind};
 
 use super::{
-    Credit,
+    Feed, hop,
     live_samples::LiveSensors,
     position::Position,
-    received::{self, Received, ReceivedWriter},
+    received::{self, Received},
 };
 use crate::{
-    Generation, Launch, StageCounters, StageError, allocations, clock,
-    schedule::ScheduleWriter,
+    Generation, Launch, StageCounters, StageError, clock,
+    counters::Work,
+    numbers::Numbers,
     wake,
     writer::{Draft, Writer},
 };
-
-/// Time without need for the supervisor to intervene: this loop repeatedly reports that it is not
-/// late, since a radar that is switched off is no reason to restart it.
-pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
-/// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
-/// file.
-const SAID_EVERY_NS: i64 = 1_000_000_000;
 
 /// A sensor that delivers scans at its own pace.
 pub trait Sensor {
@@ -80,179 +74,106 @@ pub fn run_sensor(
     sensor: &mut impl Sensor,
     scans: Option<u64>,
 ) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
+    launch.take_place()?;
     sensor.resume(received::read(&launch.manifest).unwrap_or_default());
+    let open_scans = || Writer::open(&launch.node, &launch.manifest);
     let mut stream = Stream {
-        launch,
-        received: ReceivedWriter::open(&launch.manifest)?,
-        credit: Credit::open(launch)?,
-        schedule: ScheduleWriter::resume(&launch.manifest)?,
-        scans: Writer::open(&launch.node, &launch.manifest)?,
-        counters: StageCounters::default(),
+        received: received::open(&launch.manifest)?,
         live: LiveSensors::open(launch)?,
-        said_ns: 0,
+        feed: Feed::open(launch, open_scans)?.never_late(),
     };
-    if let Some(start) = stream.wait_for_start()? {
-        stream.publish(sensor, start, scans)?;
-    }
+    let ended = stream.publish(sensor, scans);
     let received = sensor.received();
-    stream.received.write(received)?;
-    received.count(&mut stream.counters);
-    Ok(stream.counters)
+    stream.received.write(received.to_numbers())?;
+    received.count(&mut stream.feed.counters);
+    stream.feed.finish(ended)
 }
 
 struct Stream<'a> {
-    launch: &'a Launch,
-    credit: Credit,
-    schedule: ScheduleWriter,
-    scans: Writer<Scan>,
-    counters: StageCounters,
-    received: ReceivedWriter,
+    feed: Feed<'a, Writer<Scan>>,
+    /// The counts of [`Sensor::received`].
+    received: Numbers<9>,
     live: Option<LiveSensors>,
-    /// Time of the last sign of life to the supervisor, `CLOCK_MONOTONIC`, ns.
-    said_ns: i64,
 }
 
 impl Stream<'_> {
-    /// Waits until the sink has reported the newest pose; `None` on a request to stop.
-    fn wait_for_start(&mut self) -> Result<Option<Position>, StageError> {
-        loop {
-            // The sink republishes its last poses one by one and notifies after all of them.
-            if self.sleep(None, wake::MAX_WAIT)? {
-                return Ok(None);
-            }
-            self.credit.update()?;
-            if let Some(newest) = self.credit.resume_at {
-                let position = Position::after(&newest, self.schedule.published_before());
-                return Ok(Some(position));
-            }
-        }
-    }
-
-    fn publish<S: Sensor>(
-        &mut self,
-        sensor: &mut S,
-        mut position: Position,
-        scans: Option<u64>,
-    ) -> Result<(), StageError> {
-        let newest = self.credit.resume_at.unwrap_or_default();
+    fn publish<S: Sensor>(&mut self, sensor: &mut S, scans: Option<u64>) -> Result<(), StageError> {
+        let newest = self.feed.wait_for_start()?;
+        let mut position = Position::after(&newest, self.feed.schedule.before);
         // A restarted run knows the number of scans published up to its newest pose.
-        let (manifest, first) = (&self.launch.manifest, position.published);
+        let (manifest, first) = (&self.feed.launch.manifest, position.published);
         let generation = Generation::begin(manifest, NumberedBy::Source, &newest, first)?;
         while scans.is_none_or(|scans| position.published < scans) {
-            let mut draft = self.scans.loan()?;
-            let started_ns = loop {
-                let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
-                let (header, bytes) = draft.parts();
-                let arrival = sensor.take(header, bytes)?;
-                let finished_ns = clock::now_ns();
-                match arrival {
-                    Arrival::Scan => {
-                        let allocations = allocations::so_far() - allocated;
-                        crate::counters::record(
-                            &mut self.counters,
-                            allocations,
-                            finished_ns - started_ns,
-                        );
-                        break started_ns;
-                    }
-                    Arrival::Nothing(limit) => {
-                        self.received.write(sensor.received())?;
-                        if self.sleep(sensor.connection(), limit)? {
-                            return Ok(());
-                        }
-                    }
-                    Arrival::Later(time) => {
-                        if self.sleep(None, time)? {
-                            return Ok(());
-                        }
-                    }
-                }
-            };
-            if !self.add_samples(sensor, &mut draft)? {
-                return Ok(());
-            }
-            let header = draft.header();
-            position.identify(&mut header.item);
-            generation.mark(&mut header.item);
-            *header.item.hop_mut(S::HOP) = Hop {
-                received_ns: started_ns,
-                started_ns,
-                finished_ns: clock::now_ns(),
-                published_ns: 0,
-            };
-            let due_ns = sensor.due_ns().unwrap_or(started_ns);
-            header.item.due_ns = due_ns.min(started_ns);
+            let mut draft = self.feed.outputs.loan()?;
+            let started_ns = self.take(sensor, &mut draft)?;
+            self.add_samples(sensor, &mut draft)?;
+            let item = &mut draft.header().item;
+            position.identify(item);
+            generation.mark(item);
+            *item.hop_mut(S::HOP) = hop(started_ns, clock::now_ns());
+            item.due_ns = sensor.due_ns().unwrap_or(started_ns).min(started_ns);
             // In this order a death in between leaves a number without a scan, which counts as
             // dropped, and no scan without a number.
-            self.schedule.has_published(position.published)?;
-            self.received.write(sensor.received())?;
-            self.scans.send(draft, S::HOP)?;
+            self.feed.schedule.has_published(position.published)?;
+            self.received.write(sensor.received().to_numbers())?;
+            self.feed.outputs.send(draft, S::HOP)?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.
-            if self.sleep(sensor.connection(), Duration::ZERO)? {
-                return Ok(());
-            }
+            self.feed
+                .sleep_until(None, sensor.connection(), Duration::ZERO)?;
         }
-        let mut draft = self.scans.loan()?;
-        draft.header().item = position.end();
-        generation.mark(&mut draft.header().item);
-        self.scans.send(draft, S::HOP)?;
-        self.schedule.has_published(position.published)?;
-        while !self.sleep(None, wake::MAX_WAIT)? {}
-        Ok(())
+        let mut end = position.item();
+        generation.mark(&mut end);
+        self.feed.end(end)?;
+        loop {
+            self.feed.sleep(wake::MAX_WAIT)?;
+        }
     }
 
-    /// Waits for the samples of a complete scan, and adds them; false on a request to stop.
-    fn add_samples<S: Sensor>(
+    /// Waits for the next scan; returns when the reading of its end began, ns.
+    fn take(
         &mut self,
-        sensor: &mut S,
+        sensor: &mut impl Sensor,
         draft: &mut Draft<Scan>,
-    ) -> Result<bool, StageError> {
-        let Some(mut live) = self.live.take() else {
-            return Ok(true);
+    ) -> Result<i64, StageError> {
+        loop {
+            let work = Work::begin();
+            let (header, bytes) = draft.parts();
+            match sensor.take(header, bytes)? {
+                Arrival::Scan => {
+                    work.end(&mut self.feed.counters);
+                    return Ok(work.started_ns);
+                }
+                Arrival::Nothing(limit) => {
+                    self.received.write(sensor.received().to_numbers())?;
+                    self.feed.sleep_until(None, sensor.connection(), limit)?;
+                }
+                Arrival::Later(time) => self.feed.sleep(time)?,
+            }
+        }
+    }
+
+    /// Waits for the samples of a complete scan, and adds them.
+    fn add_samples(
+        &mut self,
+        sensor: &mut impl Sensor,
+        draft: &mut Draft<Scan>,
+    ) -> Result<(), StageError> {
+        let Some(live) = &mut self.live else {
+            return Ok(());
         };
-        let until_ns = clock::now_ns() + live.max_wait().as_nanos() as i64;
+        let until_ns = clock::now_ns() + live.max_wait.as_nanos() as i64;
         loop {
             live.receive(sensor)?;
             let left = clock::until(until_ns);
             if live.cover(draft.header()) || left.is_zero() {
                 break;
             }
-            if self.sleep(live.sockets().chain(sensor.samples()), left)? {
-                return Ok(false);
-            }
+            let sockets = live.sockets().chain(sensor.samples());
+            self.feed.sleep_until(None, sockets, left)?;
         }
         let (header, bytes) = draft.parts();
         live.store(header, bytes);
-        self.live = Some(live);
-        Ok(true)
-    }
-
-    /// Sleeps until a connection has something to read, and answers the handshakes of new readers;
-    /// true on a request to stop.
-    fn sleep<'fd>(
-        &mut self,
-        connections: impl IntoIterator<Item = BorrowedFd<'fd>>,
-        limit: Duration,
-    ) -> Result<bool, StageError> {
-        let now_ns = clock::now_ns();
-        if now_ns >= self.said_ns + SAID_EVERY_NS {
-            self.schedule.due_at(now_ns + ALIVE_NS)?;
-            self.said_ns = now_ns;
-        }
-        let woken = self.launch.signals.wait_or_readable(
-            &[self.credit.poses.listener()],
-            &[self.scans.listener()],
-            connections,
-            limit.min(wake::MAX_WAIT),
-        )?;
-        self.counters.wakes += 1;
-        if woken.may_have_new_readers() {
-            self.scans.accept_readers()?;
-        }
-        Ok(woken.stop)
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_messages::{Fix, Header, Item, Loop, Message};
+use gyre_messages::{Fix, Item, Loop, LoopHeader, Message};
 
 use super::{Run, WINDOW, node, writer};
 use crate::{
@@ -18,14 +18,14 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
     let loops = writer::<Loop>(&run.manifest);
     let kept = Loop::sizes(&WINDOW).history as u64;
     for seq in 0..kept + 5 {
-        let mut draft = loops.loan().unwrap();
-        let header = draft.header();
-        (header.later_seq, header.loops) = (seq + 1, seq + 1);
-        *header.item_mut() = Item {
-            seq,
-            ..Item::default()
+        let item = Item::numbered(seq);
+        let header = LoopHeader {
+            item,
+            later_seq: seq + 1,
+            loops: seq + 1,
+            ..LoopHeader::default()
         };
-        loops.send_unchanged(draft).unwrap();
+        loops.publish(header, None).unwrap();
     }
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
     let mut observer = observed.observe::<Loop>().unwrap();
@@ -58,14 +58,13 @@ fn all_followers_of_a_log_are_woken_and_a_dead_one_does_not_matter() {
     let run = Run::new();
     let manifest: &Manifest = &run.manifest;
     let node = node(manifest);
-    let event = LogId::Keyframes.event();
+    let event = LogId::Keyframes.name();
     let notifier = Notifier::open(&node, event).unwrap();
     let [first, second] = [(); 2].map(|()| Listener::open(&node, event).unwrap());
-    let notify = || notifier.notify(format_args!("notify")).unwrap();
-    let woken = |listener: &Listener| listener.take(format_args!("read")).unwrap() > 0;
-    notify();
+    let woken = |listener: &Listener| listener.take().unwrap() > 0;
+    notifier.notify().unwrap();
     assert!(woken(&first) && woken(&second) && !woken(&first));
     drop(first);
-    notify();
+    notifier.notify().unwrap();
     assert!(woken(&second));
 }

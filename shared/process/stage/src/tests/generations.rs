@@ -18,15 +18,24 @@ fn begun(run: &Run, newest: &Item, first: u64) -> (u32, u64) {
 #[test]
 fn each_start_begins_another_generation_also_behind_that_of_the_journal() {
     let run = Run::new();
-    let none = Item::default();
-    assert_eq!(begun(&run, &none, 0), (1, 0));
-    assert_eq!(begun(&run, &none, 0), (2, 0));
-    let newest = Item {
-        generation: 9,
-        ..none
+    let item = |generation| Item {
+        generation,
+        ..Item::default()
     };
-    assert_eq!(begun(&run, &newest, 31), (10, 31));
-    assert_eq!(begun(&run, &newest, 31), (11, 31));
+    for (newest, first, generation) in [(0, 0, 1), (0, 0, 2), (9, 31, 10), (9, 31, 11)] {
+        assert_eq!(begun(&run, &item(newest), first), (generation, first));
+    }
+    // A program in the place of masking may keep only the number.
+    let path = Generation::path(&run.manifest.out);
+    fs::write(&path, "6").unwrap();
+    assert_eq!(begun(&run, &item(0), 3), (7, 3));
+    assert_eq!(fs::read_to_string(&path).unwrap(), "6\n7 3 masking\n");
+    for text in ["one", "", "2 3\n", "2 3 someone\n", "2 3 masking 4\n"] {
+        fs::write(&path, text).unwrap();
+        let by = NumberedBy::Masking;
+        let error = Generation::begin(&run.manifest, by, &item(0), 0).unwrap_err();
+        assert!(error.to_string().contains("holds no number"), "{error}");
+    }
 }
 
 #[test]
@@ -57,27 +66,4 @@ fn of_the_generations_in_between_the_one_with_the_smallest_number_is_known() {
     assert_eq!(skipped_by(masking, 1, 3), None, "the source's is another's");
     assert_eq!(skipped_by(NumberedBy::Source, 1, 5), given(2, 2));
     assert_eq!(skipped_by(NumberedBy::Follower, 0, 5), None);
-}
-
-#[test]
-fn a_program_that_keeps_only_the_number_is_followed() {
-    let run = Run::new();
-    let path = Generation::path(&run.manifest.out);
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    fs::write(&path, "6").unwrap();
-    assert_eq!(begun(&run, &Item::default(), 3), (7, 3));
-    assert_eq!(fs::read_to_string(path).unwrap(), "6\n7 3 masking\n");
-}
-
-#[test]
-fn a_file_without_a_number_is_refused() {
-    let run = Run::new();
-    begun(&run, &Item::default(), 0);
-    let path = run.manifest.out.join("journal").join("generation");
-    for text in ["one", "", "2 3\n", "2 3 someone\n", "2 3 masking 4\n"] {
-        fs::write(&path, text).unwrap();
-        let by = NumberedBy::Masking;
-        let error = Generation::begin(&run.manifest, by, &Item::default(), 0).unwrap_err();
-        assert!(error.to_string().contains("holds no number"), "{error}");
-    }
 }

@@ -3,7 +3,7 @@
 use gyre_messages::{Message, Pose, flag};
 
 use super::{Run, WINDOW, reader, send, writer};
-use crate::{StageError, reader::Reader};
+use crate::reader::Reader;
 
 /// Takes all items from the queue and returns their sequence numbers.
 fn take_all(reader: &mut Reader<Pose>) -> Vec<u64> {
@@ -32,38 +32,21 @@ fn a_late_reader_receives_the_history_in_order_and_each_item_once() {
 }
 
 #[test]
-fn duplicates_are_skipped_and_counted() {
-    let run = Run::new();
-    let mut restarted = reader(&run.manifest, Some(3));
-    let poses = writer::<Pose>(&run.manifest);
-    (1..6).for_each(|seq| send(&poses, seq, 0));
-    assert_eq!(take_all(&mut restarted), [3, 4, 5]);
-    assert_eq!(restarted.duplicates(), 2);
-}
-
-#[test]
 fn a_sequence_gap_is_an_error() {
     let run = Run::new();
     let mut reader = reader::<Pose>(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
     [4, 5, 7].into_iter().for_each(|seq| send(&poses, seq, 0));
-    reader.head().unwrap();
-    reader.advance();
-    reader.head().unwrap();
-    reader.advance();
-    let error = reader.head().map(|head| head.map(|head| head.item().seq));
-    assert!(matches!(
-        error,
-        Err(StageError::SequenceGap {
-            topic: "pose",
-            expected: 6,
-            got: 7
-        })
-    ));
+    for _ in 0..2 {
+        reader.head().unwrap();
+        reader.advance();
+    }
+    let gap = reader.head().map(drop).unwrap_err().to_string();
+    assert_eq!(gap, "topic `pose`: expected item 6, but got 7");
 }
 
 #[test]
-fn a_restarted_publisher_repeats_items_and_continues_the_sequence() {
+fn a_restarted_publisher_repeats_items_which_are_skipped_and_counted() {
     let run = Run::new();
     let mut reader = reader(&run.manifest, None);
     let first_process = writer::<Pose>(&run.manifest);
@@ -73,7 +56,7 @@ fn a_restarted_publisher_repeats_items_and_continues_the_sequence() {
     let second_process = writer::<Pose>(&run.manifest);
     (1..5).for_each(|seq| send(&second_process, seq, 0));
     assert_eq!(take_all(&mut reader), [0, 1, 2, 3, 4]);
-    assert_eq!(reader.duplicates(), 2);
+    assert_eq!(reader.duplicates, 2);
 }
 
 #[test]
@@ -83,14 +66,9 @@ fn the_previous_item_stays_readable() {
     let poses = writer::<Pose>(&run.manifest);
     for seq in 0..100 {
         send(&poses, seq, 0);
-        assert_eq!(
-            reader.head().unwrap().map(|head| head.item().seq),
-            Some(seq)
-        );
-        assert_eq!(
-            reader.previous().map(|previous| previous.item().seq),
-            seq.checked_sub(1)
-        );
+        let head = reader.head().unwrap().map(|head| head.item().seq);
+        let previous = reader.previous().map(|previous| previous.item().seq);
+        assert_eq!((head, previous), (Some(seq), seq.checked_sub(1)));
         reader.advance();
     }
 }
@@ -113,8 +91,6 @@ fn the_largest_sequence_number_does_not_overflow() {
     let run = Run::new();
     let mut reader = reader(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
-    [u64::MAX, u64::MAX]
-        .into_iter()
-        .for_each(|seq| send(&poses, seq, flag::BREAK));
+    (0..2).for_each(|_| send(&poses, u64::MAX, flag::BREAK));
     assert_eq!(take_all(&mut reader), [u64::MAX, u64::MAX]);
 }

@@ -16,36 +16,29 @@ use super::{Run, reader, send, writer};
 
 type Typed<M> = PortFactory<ipc::Service, [TypedElement<M>], TypedHeader<M>>;
 
-#[repr(transparent)]
-struct TypedHeader<M: Message>(M::Header);
-#[repr(transparent)]
-struct TypedElement<M: Message>(M::Element);
+/// Defines a type of the bytes of a message, as another language has it.
+macro_rules! typed {
+    ($typed:ident, $bytes:ident) => {
+        #[repr(transparent)]
+        struct $typed<M: Message>(M::$bytes);
 
-// SAFETY: plain data.
-unsafe impl<M: Message> ZeroCopySend for TypedHeader<M> {
-    unsafe fn type_name() -> &'static str {
-        M::Header::TYPE_NAME
-    }
+        // SAFETY: plain data.
+        unsafe impl<M: Message> ZeroCopySend for $typed<M> {
+            unsafe fn type_name() -> &'static str {
+                M::$bytes::TYPE_NAME
+            }
+        }
+
+        impl<M: Message> fmt::Debug for $typed<M> {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.fmt(f)
+            }
+        }
+    };
 }
 
-// SAFETY: plain data.
-unsafe impl<M: Message> ZeroCopySend for TypedElement<M> {
-    unsafe fn type_name() -> &'static str {
-        M::Element::TYPE_NAME
-    }
-}
-
-impl<M: Message> fmt::Debug for TypedHeader<M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl<M: Message> fmt::Debug for TypedElement<M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
+typed!(TypedHeader, Header);
+typed!(TypedElement, Element);
 
 impl<M: Message> Default for TypedHeader<M> {
     fn default() -> Self {
@@ -103,10 +96,7 @@ fn gyre_receives_what_a_typed_publisher_sends() {
     publisher.update_connections().unwrap();
     let mut sample = publisher.loan_slice_uninit(elements).unwrap();
     let header = &mut sample.user_header_mut().0;
-    *header.item_mut() = Item {
-        seq: 7,
-        ..Item::default()
-    };
+    *header.item_mut() = Item::numbered(7);
     (header.n, header.rasters) = (limits.side() as u32, 1);
     header.cell_m = limits.cell_m;
     let sample = sample.write_from_fn(|block| TypedElement(bytemuck::cast([block as f32; 16])));
@@ -114,11 +104,7 @@ fn gyre_receives_what_a_typed_publisher_sends() {
     let received = masked.head().unwrap().unwrap();
     let (header, values) = (received.header(), received.values::<f32>());
     assert_eq!((header.item.seq, header.n), (7, 10));
-    assert!(
-        values
-            .iter()
-            .enumerate()
-            .all(|(i, v)| *v == (i / 16) as f32)
-    );
+    let mut cells = values.iter().enumerate();
+    assert!(cells.all(|(i, v)| *v == (i / 16) as f32));
     assert_eq!(values.len(), elements * 16);
 }

@@ -31,12 +31,8 @@ fn a_waiting_reader_is_woken_by_a_message() {
     });
     // Children of other tests may wake this process too.
     while waiting.head().unwrap().is_none() {
-        assert!(
-            !signals
-                .wait(&[waiting.listener()], None, LONG)
-                .unwrap()
-                .timed_out
-        );
+        let woken = signals.wait(&[waiting.listener()], None, LONG).unwrap();
+        assert!(!woken.timed_out);
     }
     let awake = Instant::now();
     received.send(()).unwrap();
@@ -50,7 +46,7 @@ fn a_handshake_is_answered_once() {
     let run = Run::new();
     let poses = writer::<Pose>(&run.manifest);
     let late = reader::<Pose>(&run.manifest, None);
-    let woken = || late.listener().take(format_args!("read")).unwrap();
+    let woken = || late.listener().take().unwrap();
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 1);
     // A second answer without a handshake would let wake-ups circulate for ever.

@@ -1,17 +1,10 @@
-//! Zero copy: a payload is read where another process wrote it.
+//! Zero copy: a payload is read where its publisher wrote it.
 
-use std::{
-    env, fs,
-    io::{BufRead, BufReader},
-    process::{Child, Command, Stdio},
-};
+use std::fs;
 
 use gyre_messages::{Masked, MaskedHeader, StageId};
 
 use super::{Run, reader, writer};
-use crate::{Manifest, run, wake::Signals};
-
-const RASTER: usize = 96;
 
 /// The mapping of an address: file, offset and access rights.
 #[derive(Debug, PartialEq)]
@@ -39,87 +32,36 @@ fn place_of<T>(values: &[T]) -> Mapping {
     found.unwrap()
 }
 
-fn value(cell: usize) -> f32 {
-    cell as f32 * 0.5
-}
-
-/// The publishing process, started by the test below.
 #[test]
-fn publisher() {
-    let Some(root) = env::var_os(run::ENVIRONMENT) else {
-        return;
-    };
-    let manifest = Manifest::read(root.as_ref()).unwrap();
-    let masked = writer::<Masked>(&manifest);
+fn a_reader_maps_the_publishers_memory_and_cannot_write_to_it() {
+    let run = Run::new();
+    let limits = &run.manifest.limits;
+    let mut reader = reader::<Masked>(&run.manifest, None);
+    let masked = writer::<Masked>(&run.manifest);
     let mut draft = masked.loan().unwrap();
     *draft.header() = MaskedHeader {
-        n: manifest.limits.side() as u32,
+        n: limits.side() as u32,
         rasters: 1,
-        cell_m: manifest.limits.cell_m,
+        cell_m: limits.cell_m,
         ..MaskedHeader::default()
     };
-    draft.header().item.seq = 7;
     let cells = draft.values::<f32>();
-    cells
-        .iter_mut()
-        .enumerate()
-        .for_each(|(cell, v)| *v = value(cell));
-    let place = place_of(cells);
+    let values = cells.iter_mut().zip(0_u8..);
+    values.for_each(|(cell, value)| *cell = f32::from(value));
+    let written = place_of(cells);
     masked.send(draft, StageId::Masking).unwrap();
-    println!(
-        "\nWROTE {} {} {} {}",
-        place.inode, place.offset, place.path, place.rights
-    );
-    // Wait until the reader is done.
-    let _ = std::io::stdin().lines().next();
-}
-
-fn start_publisher(manifest: &Manifest) -> Child {
-    Command::new(env::current_exe().unwrap())
-        .args(["--exact", "tests::zero_copy::publisher", "--nocapture"])
-        .env(run::ENVIRONMENT, &manifest.root)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
-#[test]
-fn a_reader_in_another_process_maps_the_publishers_memory() {
-    let run = Run::new();
-    let signals = Signals::install().unwrap();
-    let mut masked = reader::<Masked>(&run.manifest, None);
-    let mut child = start_publisher(&run.manifest);
-    let mut said = BufReader::new(child.stdout.take().unwrap())
-        .lines()
-        .map_while(Result::ok);
-    let wrote = said.find(|line| line.starts_with("WROTE")).unwrap();
-    while masked.head().unwrap().is_none() {
-        let woken = signals
-            .wait(
-                &[masked.listener()],
-                None,
-                std::time::Duration::from_secs(5),
-            )
-            .unwrap();
-        assert!(!woken.timed_out);
-    }
-    let received = masked.current().unwrap();
-    let cells = &received.values::<f32>()[..RASTER];
-    assert!(cells.iter().enumerate().all(|(cell, v)| *v == value(cell)));
-    let place = place_of(cells);
-    assert_eq!(
-        wrote,
-        format!("WROTE {} {} {} rw-s", place.inode, place.offset, place.path)
-    );
-    assert!(
-        place
-            .path
-            .starts_with(&format!("/dev/shm/{}", run.manifest.prefix))
-            && place.path.ends_with(".data")
-    );
-    assert_eq!(place.rights, "r--s", "readers map the payload read-only");
+    let received = reader.head().unwrap().unwrap();
+    let cells = received.values::<f32>();
+    let mut values = cells.iter().zip(0_u8..100);
+    assert!(values.all(|(cell, value)| *cell == f32::from(value)));
+    let read = place_of(cells);
+    assert_eq!((&*written.rights, &*read.rights), ("rw-s", "r--s"));
+    let prefix = format!("/dev/shm/{}", run.manifest.prefix);
+    assert!(read.path.starts_with(&prefix) && read.path.ends_with(".data"));
+    let of_writer = Mapping {
+        rights: written.rights.clone(),
+        ..read
+    };
+    assert_eq!(of_writer, written);
     assert_eq!(cells.as_ptr() as usize % 64, 0, "aligned for vector units");
-    drop(child.stdin.take());
-    assert!(child.wait().unwrap().success());
 }

@@ -1,7 +1,6 @@
 //! Events: notifications without content.
 
 use std::{
-    fmt::Arguments,
     os::fd::{AsFd, BorrowedFd},
     sync::{Mutex, MutexGuard, PoisonError},
 };
@@ -29,31 +28,33 @@ pub(crate) fn bind_alone() -> MutexGuard<'static, ()> {
     BINDING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Numbers of ports that an event has room for, without the spare ones.
-#[derive(Clone, Copy)]
-pub(crate) struct EventSizes {
-    pub(crate) listeners: usize,
-    pub(crate) notifiers: usize,
-    pub(crate) nodes: usize,
-}
-
 /// An event. It exists as long as a process has it open.
 pub(crate) struct Event(Sealed<event::PortFactory<Ipc>>);
 
-/// The receiver of an event's notifications.
-pub struct Listener(Sealed<listener::Listener<Ipc>>);
+pub struct Listener {
+    event: String,
+    port: Sealed<listener::Listener<Ipc>>,
+}
 
-/// The sender of an event's notifications.
-pub(crate) struct Notifier(Sealed<notifier::Notifier<Ipc>>);
+pub(crate) struct Notifier {
+    event: String,
+    port: Sealed<notifier::Notifier<Ipc>>,
+}
 
 impl Event {
-    pub(crate) fn create(node: &Node, name: &str, sizes: EventSizes) -> Result<Self, StageError> {
+    /// Creates an event with room for listeners, notifiers, and the nodes of both.
+    pub(crate) fn create(
+        node: &Node,
+        name: &str,
+        [listeners, notifiers]: [usize; 2],
+        nodes: usize,
+    ) -> Result<Self, StageError> {
         node.0
             .service_builder(&service_name(name)?)
             .event()
-            .max_listeners(sizes.listeners + HEADROOM)
-            .max_notifiers(sizes.notifiers + HEADROOM)
-            .max_nodes(sizes.nodes)
+            .max_listeners(listeners + HEADROOM)
+            .max_notifiers(notifiers + HEADROOM)
+            .max_nodes(nodes)
             .event_id_max_value(1)
             .create()
             .map(|event| Self(Sealed::new(event)))
@@ -75,17 +76,17 @@ impl Listener {
         let event_service = Event::open(node, event)?;
         let _alone = bind_alone();
         let created = event_service.0.listener_builder().create();
-        created
-            .map(|listener| Self(Sealed::new(listener)))
-            .map_err(|e| StageError::transport(format!("listen to {event}"), e))
+        let port = created.map_err(|e| StageError::transport(format!("listen to {event}"), e))?;
+        Ok(Self {
+            event: event.to_owned(),
+            port: Sealed::new(port),
+        })
     }
 
-    /// Takes the notifications that have arrived, and returns their number. `action` is named in an
-    /// error.
-    pub(crate) fn take(&self, action: Arguments<'_>) -> Result<usize, StageError> {
+    pub(crate) fn take(&self) -> Result<usize, StageError> {
         let mut notifications = 0;
-        let taken = self.0.try_wait(|_| notifications += 1);
-        taken.map_err(|e| StageError::transport(action.to_string(), e))?;
+        let taken = self.port.try_wait(|_| notifications += 1);
+        taken.map_err(|e| StageError::transport(format!("read {}", self.event), e))?;
         Ok(notifications)
     }
 }
@@ -93,25 +94,22 @@ impl Listener {
 impl AsFd for Listener {
     fn as_fd(&self) -> BorrowedFd<'_> {
         // SAFETY: the listener owns the descriptor, and the borrow has the listener's lifetime.
-        unsafe { BorrowedFd::borrow_raw(self.0.file_descriptor().native_handle()) }
+        unsafe { BorrowedFd::borrow_raw(self.port.file_descriptor().native_handle()) }
     }
 }
 
 impl Notifier {
     pub(crate) fn open(node: &Node, event: &str) -> Result<Self, StageError> {
-        Event::open(node, event)?
-            .0
-            .notifier_builder()
-            .create()
-            .map(|notifier| Self(Sealed::new(notifier)))
-            .map_err(|e| StageError::transport(format!("notify {event}"), e))
+        let created = Event::open(node, event)?.0.notifier_builder().create();
+        let port = created.map_err(|e| StageError::transport(format!("notify {event}"), e))?;
+        Ok(Self {
+            event: event.to_owned(),
+            port: Sealed::new(port),
+        })
     }
 
-    /// Wakes the listeners. `action` is named in an error.
-    pub(crate) fn notify(&self, action: Arguments<'_>) -> Result<(), StageError> {
-        let notified = self.0.notify();
-        notified
-            .map(drop)
-            .map_err(|e| StageError::transport(action.to_string(), e))
+    pub(crate) fn notify(&self) -> Result<(), StageError> {
+        let notified = self.port.notify().map(drop);
+        notified.map_err(|e| StageError::transport(format!("notify {}", self.event), e))
     }
 }

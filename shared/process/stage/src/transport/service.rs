@@ -13,14 +13,12 @@ use iceoryx2::{
 use super::{AnyHeader, AnyPayload, Ipc, Node, Sealed, service_name};
 use crate::StageError;
 
-/// A topic that this process has open.
 pub struct Service {
     pub(super) topic: Topic,
     pub(super) factory: Sealed<publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>>,
 }
 
 impl Service {
-    /// Creates a topic with the sizes of the window.
     pub(crate) fn create(node: &Node, topic: &Topic, window: &Window) -> Result<Self, StageError> {
         let sizes = (topic.sizes)(window);
         let factory = builder(node, topic)?
@@ -33,7 +31,10 @@ impl Service {
             .max_nodes(sizes.nodes())
             .create()
             .map_err(|e| StageError::transport(format!("create the topic {}", topic.name), e))?;
-        Ok(Self::new(topic, factory))
+        Ok(Self {
+            topic: *topic,
+            factory: Sealed::new(factory),
+        })
     }
 
     /// Opens a topic, which the supervisor has created.
@@ -41,17 +42,10 @@ impl Service {
         let factory = builder(node, topic)?
             .open()
             .map_err(|e| StageError::transport(format!("open the topic {}", topic.name), e))?;
-        Ok(Self::new(topic, factory))
-    }
-
-    fn new(
-        topic: &Topic,
-        factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
-    ) -> Self {
-        Self {
+        Ok(Self {
             topic: *topic,
             factory: Sealed::new(factory),
-        }
+        })
     }
 
     /// Returns whether a process publishes it. A dead one counts until its resources are removed.
@@ -63,7 +57,6 @@ impl Service {
         self.factory.dynamic_config().number_of_subscribers()
     }
 
-    /// Returns the number of subscribers of this name.
     pub(crate) fn subscribers_named(&self, name: &str) -> usize {
         let mut named = 0;
         self.factory

@@ -1,18 +1,21 @@
-//! The port that publishes a topic.
+//! The ports that publish and receive a topic.
 
 use std::slice;
 
 use gyre_messages::{Item, Limits, Window};
 use iceoryx2::{
-    port::{publisher, update_connections::UpdateConnections},
+    port::{
+        ReceiveError, port_name::PortName, publisher, subscriber,
+        update_connections::UpdateConnections,
+    },
     prelude::BackpressureStrategy,
+    sample,
     sample_mut::SampleMut,
 };
 
 use super::{AnyHeader, AnyPayload, Ipc, Sealed, Service};
 use crate::StageError;
 
-/// The port that publishes a topic.
 pub(crate) struct Publisher {
     topic: &'static str,
     header_bytes: usize,
@@ -20,14 +23,12 @@ pub(crate) struct Publisher {
     port: Sealed<publisher::Publisher<Ipc, AnyPayload, AnyHeader>>,
 }
 
-/// A message that is being written in shared memory.
 pub(crate) struct Loan {
     sample: Sealed<SampleMut<Ipc, AnyPayload, AnyHeader>>,
     header_bytes: usize,
 }
 
 impl Publisher {
-    /// Creates the port, which connects to all existing readers at once.
     pub(crate) fn create(
         service: &Service,
         window: &Window,
@@ -81,7 +82,6 @@ impl Publisher {
             .map_err(|e| StageError::transport(format!("send {}", self.topic), e))
     }
 
-    /// Connects to new readers, and sends them the history.
     pub(crate) fn connect(&self) -> Result<(), StageError> {
         self.port
             .update_connections()
@@ -90,7 +90,6 @@ impl Publisher {
 }
 
 impl Loan {
-    /// Returns the bytes of header and payload.
     pub(crate) fn parts(&mut self) -> (&mut [u8], &mut [u8]) {
         let header = std::ptr::from_mut(self.sample.user_header_mut()).cast::<u8>();
         let payload = self.sample.payload_mut();
@@ -113,5 +112,71 @@ impl Loan {
     /// Returns the item of the message's scan, which is at the start of every header.
     pub(crate) fn item(&mut self) -> &mut Item {
         bytemuck::from_bytes_mut(&mut self.header()[..size_of::<Item>()])
+    }
+}
+
+pub(crate) struct Subscriber {
+    topic: &'static str,
+    header_bytes: usize,
+    is_observer: bool,
+    port: Sealed<subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>>,
+}
+
+/// A message in shared memory, borrowed from its publisher until it is dropped.
+pub(crate) struct Sample {
+    sample: Sealed<sample::Sample<Ipc, AnyPayload, AnyHeader>>,
+    header_bytes: usize,
+}
+
+impl Subscriber {
+    /// Subscribes as a process of the run, or as an observer, under a name for counting observers.
+    pub(crate) fn create(service: &Service, observer: Option<&str>) -> Result<Self, StageError> {
+        let topic = service.topic.name;
+        let mut builder = service.factory.subscriber_builder();
+        if let Some(name) = observer {
+            let name = PortName::new(name);
+            builder =
+                builder.name(&name.map_err(|e| StageError::transport("name the observer", e))?);
+        }
+        let port = builder.create();
+        let port = port.map_err(|e| StageError::transport(format!("subscribe to {topic}"), e))?;
+        Ok(Self {
+            topic,
+            header_bytes: service.topic.header.bytes,
+            is_observer: observer.is_some(),
+            port: Sealed::new(port),
+        })
+    }
+
+    /// Receives the next message; `None` if the queue is empty, or cannot be read now.
+    pub(crate) fn receive(&self) -> Result<Option<Sample>, StageError> {
+        match self.port.receive() {
+            Ok(sample) => Ok(sample.map(|sample| Sample {
+                sample: Sealed::new(sample),
+                header_bytes: self.header_bytes,
+            })),
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are
+            // released.
+            Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
+            // The publisher has just died or is being restarted. Its next message is found at the
+            // next wake-up.
+            Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
+            Err(e) => Err(StageError::transport(format!("receive {}", self.topic), e)),
+        }
+    }
+}
+
+impl Sample {
+    pub(crate) fn header(&self) -> &[u8] {
+        let header = std::ptr::from_ref(self.sample.user_header()).cast::<u8>();
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
+        // bytes there, which its publisher does not write any more.
+        unsafe { slice::from_raw_parts(header, self.header_bytes) }
+    }
+
+    pub(crate) fn payload(&self) -> &[u8] {
+        let payload = self.sample.payload();
+        // SAFETY: an element of `AnyPayload` is one byte.
+        unsafe { slice::from_raw_parts(payload.as_ptr().cast::<u8>(), payload.len()) }
     }
 }

@@ -1,0 +1,77 @@
+//! Small files of numbers in the run's root: one process writes them, and others read them. Each
+//! number is eight bytes, little-endian.
+
+use std::{
+    fs::File,
+    io,
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+};
+
+use crate::{Manifest, StageError, manifest};
+
+#[derive(Debug)]
+pub(crate) struct Numbers<const N: usize> {
+    path: PathBuf,
+    file: File,
+    /// Their position in the file, bytes.
+    at: u64,
+    written: Option<[u64; N]>,
+}
+
+impl<const N: usize> Numbers<N> {
+    pub fn open(manifest: &Manifest, name: &str, at: u64) -> Result<Self, StageError> {
+        let path = manifest.root.join(name);
+        Ok(Self {
+            file: manifest::options()
+                .write(true)
+                .open(&path)
+                .map_err(StageError::file(&path))?,
+            path,
+            at,
+            written: None,
+        })
+    }
+
+    /// Writes the numbers, if they are others than before.
+    pub fn write(&mut self, numbers: [u64; N]) -> Result<(), StageError> {
+        if self.written == Some(numbers) {
+            return Ok(());
+        }
+        self.put(numbers).map_err(StageError::file(&self.path))?;
+        self.written = Some(numbers);
+        Ok(())
+    }
+
+    pub fn put(&self, numbers: [u64; N]) -> io::Result<()> {
+        let bytes = numbers.map(u64::to_le_bytes);
+        self.file.write_all_at(bytes.as_flattened(), self.at)
+    }
+}
+
+/// Returns numbers of a file; `None` where it has none.
+pub(crate) fn read<const N: usize>(path: &Path, at: u64) -> Option<[u64; N]> {
+    let mut bytes = [[0; 8]; N];
+    let file = File::open(path).ok()?;
+    file.read_exact_at(bytes.as_flattened_mut(), at).ok()?;
+    Some(bytes.map(u64::from_le_bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::tests::Run;
+
+    #[test]
+    fn numbers_are_read_as_they_were_written_at_their_place() {
+        let run = Run::new();
+        let mut first = Numbers::<2>::open(&run.manifest, "numbers", 0).unwrap();
+        let mut second = Numbers::<1>::open(&run.manifest, "numbers", 16).unwrap();
+        first.write([1 << 40, u64::MAX]).unwrap();
+        let path = run.manifest.root.join("numbers");
+        assert_eq!(read::<1>(&path, 16), None);
+        second.write([7]).unwrap();
+        assert_eq!(read(&path, 0), Some([1 << 40, u64::MAX, 7]));
+    }
+}

@@ -1,0 +1,195 @@
+//! The parts of every source: the progress of the run, its schedule, and its topics.
+
+use std::{mem, os::fd::BorrowedFd, time::Duration};
+
+use gyre_messages::{Hop, Item, Pose, StageId, flag};
+
+use crate::{
+    Launch, Listener, StageCounters, StageError, clock, reader::Port, schedule::ScheduleWriter,
+    wake, writer::TopicWriter,
+};
+
+/// Time without need for the supervisor to intervene: a source that waits for a sensor or for
+/// another machine repeatedly reports that it is not late, since no restart would help.
+const ALIVE_NS: i64 = 5_000_000_000;
+/// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
+/// file.
+const SAID_EVERY_NS: i64 = 1_000_000_000;
+
+/// A source without its input.
+pub(crate) struct Feed<'a, O> {
+    pub launch: &'a Launch,
+    pub credit: Credit,
+    pub schedule: ScheduleWriter,
+    pub outputs: O,
+    pub counters: StageCounters,
+    /// True if readers may have come since the last wait.
+    may_have_new_readers: bool,
+    /// Time of the last sign of life of a source that is never late, `CLOCK_MONOTONIC`, ns.
+    said_ns: Option<i64>,
+}
+
+impl<'a, O: AsRef<[TopicWriter]>> Feed<'a, O> {
+    /// Reads the poses, and opens the topics afterwards.
+    pub fn open(
+        launch: &'a Launch,
+        outputs: impl FnOnce() -> Result<O, StageError>,
+    ) -> Result<Self, StageError> {
+        Ok(Self {
+            launch,
+            credit: Credit::open(launch)?,
+            schedule: ScheduleWriter::create(&launch.manifest)?,
+            outputs: outputs()?,
+            counters: StageCounters::default(),
+            may_have_new_readers: false,
+            said_ns: None,
+        })
+    }
+
+    pub fn never_late(self) -> Self {
+        Self {
+            said_ns: Some(0),
+            ..self
+        }
+    }
+
+    /// Waits until the sink has reported the newest pose.
+    pub fn wait_for_start(&mut self) -> Result<Item, StageError> {
+        loop {
+            // Sleep first. The sink republishes its last poses one by one and notifies after all of
+            // them. Reading earlier could take an older pose for the newest, and more scans would
+            // be sent than the readers have room for.
+            self.sleep(wake::MAX_WAIT)?;
+            self.credit.update()?;
+            if let Some(newest) = self.credit.resume_at {
+                return Ok(newest);
+            }
+        }
+    }
+
+    /// Waits until an item is due and the window admits it, or all are admitted.
+    pub fn wait_for_admission(
+        &mut self,
+        seq: u64,
+        due_ns: Option<i64>,
+        admits_all: bool,
+    ) -> Result<(), StageError> {
+        self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
+        let window = self.launch.manifest.window;
+        let mut has_slept = false;
+        loop {
+            self.credit.update()?;
+            let wait = due_ns.map_or(Duration::ZERO, clock::until);
+            let has_credit = admits_all || window.admits(seq, self.credit.newest);
+            if has_credit && wait.is_zero() && has_slept {
+                return Ok(());
+            }
+            // However slowly scans are read, there is time for signals, new readers and a beat.
+            self.sleep(match has_credit {
+                true => wait.min(wake::MAX_WAIT),
+                false => wake::MAX_WAIT,
+            })?;
+            has_slept = true;
+        }
+    }
+
+    pub fn sleep(&mut self, limit: Duration) -> Result<(), StageError> {
+        self.sleep_until(None, None, limit)
+    }
+
+    /// Answers the handshakes of new readers, and sleeps until there is a pose, or something to
+    /// read on a connection or at a listener. In this order, since the scan that has become due
+    /// when the sleep ends goes first.
+    pub fn sleep_until<'fd>(
+        &mut self,
+        listener: Option<&Listener>,
+        connections: impl IntoIterator<Item = BorrowedFd<'fd>>,
+        limit: Duration,
+    ) -> Result<(), StageError> {
+        let now_ns = clock::now_ns();
+        if self.said_ns.is_some_and(|ns| now_ns >= ns + SAID_EVERY_NS) {
+            self.schedule.due_at(now_ns + ALIVE_NS)?;
+            self.said_ns = Some(now_ns);
+        }
+        let outputs = self.outputs.as_ref();
+        if mem::take(&mut self.may_have_new_readers) {
+            outputs.iter().try_for_each(TopicWriter::accept_readers)?;
+        }
+        let handshakes: Vec<_> = outputs.iter().map(TopicWriter::listener).collect();
+        let mut data = vec![self.credit.poses.listener()];
+        data.extend(listener);
+        let signals = &self.launch.signals;
+        let limit = limit.min(wake::MAX_WAIT);
+        let woken = signals.wait_or_readable(&data, &handshakes, connections, limit)?;
+        self.counters.wakes += 1;
+        self.may_have_new_readers = woken.may_have_new_readers();
+        match woken.stop {
+            true => Err(StageError::Stopped),
+            false => Ok(()),
+        }
+    }
+
+    pub fn end(&mut self, item: Item) -> Result<(), StageError> {
+        let mut outputs = self.outputs.as_ref().iter();
+        outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;
+        self.schedule.has_published(item.published)
+    }
+
+    /// Returns the counters of a source that was asked to stop.
+    pub fn finish(self, ended: Result<(), StageError>) -> Result<StageCounters, StageError> {
+        match ended {
+            Ok(()) | Err(StageError::Stopped) => Ok(self.counters),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// The time stamps of a source before the publication.
+pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
+    Hop {
+        received_ns: started_ns,
+        started_ns,
+        finished_ns,
+        published_ns: 0,
+    }
+}
+
+/// The progress of the run, from its poses.
+pub(crate) struct Credit {
+    pub poses: Port<Pose>,
+    /// Sequence number of the newest pose.
+    pub newest: Option<u64>,
+    /// The same at the source.
+    pub published: Option<u64>,
+    /// The newest pose of the trajectory at the last start of the sink.
+    pub resume_at: Option<Item>,
+    /// True if the sink has journalled the end of the stream.
+    pub has_ended: bool,
+}
+
+impl Credit {
+    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            poses: Port::open(launch)?,
+            newest: None,
+            published: None,
+            resume_at: None,
+            has_ended: false,
+        })
+    }
+
+    pub fn update(&mut self) -> Result<(), StageError> {
+        while let Some(pose) = self.poses.receive()? {
+            let item = pose.item();
+            self.has_ended |= item.is(flag::END);
+            if item.is(flag::SYNC) {
+                self.resume_at = Some(*item);
+            }
+            if !item.is(flag::BASE) && !item.is(flag::END) {
+                self.newest = self.newest.max(Some(item.seq));
+                self.published = self.published.max(Some(item.published));
+            }
+        }
+        Ok(())
+    }
+}
