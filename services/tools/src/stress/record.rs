@@ -20,9 +20,7 @@ const MAX_GAP: u64 = 1 << 20;
 /// Counts of scans within the time that is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Scans that were due.
     pub due: u64,
-    /// Scans with a pose.
     pub posed: u64,
     /// Scans without a pose, including `never`.
     pub dropped: u64,
@@ -36,11 +34,9 @@ pub struct Counts {
 impl Counts {
     /// Returns the reason why the distributions are incomplete: poses were not seen.
     pub fn omitted(&self) -> Option<String> {
-        (self.unseen > 0).then(|| {
-            format!(
-                "{} poses were not seen by the process that measures: the machine was too busy for it",
-                self.unseen
-            )
+        let unseen = self.unseen;
+        (unseen > 0).then(|| {
+            format!("{unseen} poses were not seen by the process that measures: the machine was too busy for it")
         })
     }
 }
@@ -71,7 +67,6 @@ pub struct Hop {
 /// The latency of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLatency {
-    /// Counts of scans.
     pub counts: Counts,
     /// From the time when a scan was due to its pose; a dropped scan counts until the pose that
     /// replaced it.
@@ -80,7 +75,6 @@ pub struct RunLatency {
     pub posed: Distribution,
     /// The figure of a closed loop: from the publication of a scan to its pose.
     pub closed_loop: Distribution,
-    /// Stage by stage.
     pub hops: Vec<Hop>,
     /// The scans in the order of their due times; written as CSV.
     #[serde(skip)]
@@ -88,7 +82,7 @@ pub struct RunLatency {
 }
 
 /// Records poses whose scans were due within a time.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Recorder {
     /// `CLOCK_MONOTONIC`, ns.
     window: Range<i64>,
@@ -109,14 +103,8 @@ impl Recorder {
     pub fn new(window: Range<i64>, burst: u64) -> Self {
         Self {
             window,
-            burst: burst.max(1),
-            before: None,
-            counts: Counts::default(),
-            meter: LatencyMeter::default(),
-            all: Durations::default(),
-            posed: Durations::default(),
-            closed_loop: Durations::default(),
-            timeline: Vec::new(),
+            burst,
+            ..Self::default()
         }
     }
 
@@ -190,9 +178,8 @@ impl Recorder {
     /// has replaced count until now.
     pub fn finish(mut self, period_ns: i64, now_ns: i64) -> RunLatency {
         let period_ns = period_ns.max(1);
-        let after = self
-            .before
-            .map_or(self.window.start - period_ns, |item| item.due_ns);
+        let before = self.before.map(|item| item.due_ns);
+        let after = before.unwrap_or(self.window.start - period_ns);
         let mut due_ns = after.saturating_add(period_ns);
         while due_ns < self.window.end.min(now_ns) {
             if due_ns >= self.window.start {

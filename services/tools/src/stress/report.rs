@@ -2,20 +2,16 @@
 
 mod figures;
 mod outcome;
-mod step;
 
-use std::{fmt::Write, fs, path::Path};
+use std::{fs, path::Path};
 
+use gyre_terminal::Failure;
 use serde::Serialize;
 
-use crate::stress::{
-    StressError,
-    record::{RunLatency, Sample},
-};
+use crate::stress::record::RunLatency;
 
 pub use figures::Figures;
-pub use outcome::{ScenarioOutcome, Verdict};
-pub use step::Step;
+pub use outcome::{Check, ScenarioOutcome, Verdict};
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is
 /// added does not.
@@ -41,13 +37,11 @@ pub struct Provenance {
     pub load_before: Option<f64>,
 }
 
-/// All outcomes.
+/// All outcomes, in the order of their execution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     version: u32,
-    /// The origin of the report.
     pub provenance: Provenance,
-    /// The scenarios in the order of their execution.
     pub outcomes: Vec<ScenarioOutcome>,
 }
 
@@ -63,25 +57,21 @@ impl Report {
 
     /// Returns whether a scenario has this verdict.
     pub fn has(&self, verdict: Verdict) -> bool {
-        self.outcomes
-            .iter()
-            .any(|outcome| outcome.verdict == verdict)
+        self.outcomes.iter().any(|it| it.verdict == verdict)
     }
 
     /// Writes all its files.
-    pub fn write(&self, out: &Path) -> Result<(), StressError> {
+    pub fn write(&self, out: &Path) -> Result<(), Failure> {
         let write = |name: &str, text: String| {
             let path = out.join(name);
-            fs::write(&path, text).map_err(StressError::file(path))
+            fs::write(&path, text)
+                .map_err(|error| format!("cannot use {}: {error}", path.display()))
         };
-        let json = serde_json::to_string_pretty(self);
-        write(
-            "report.json",
-            json.map_err(|error| StressError::Usage(error.to_string()))?,
-        )?;
+        write("report.json", serde_json::to_string_pretty(self)?)?;
         for outcome in &self.outcomes {
-            let measured = outcome.figures.iter();
-            for figures in measured.filter(|it| !it.latency.timeline.is_empty()) {
+            if let Some(figures) = &outcome.figures
+                && !figures.latency.timeline.is_empty()
+            {
                 write(&format!("{}.csv", outcome.scenario), csv(&figures.latency))?;
             }
         }
@@ -90,14 +80,10 @@ impl Report {
 }
 
 fn csv(latency: &RunLatency) -> String {
-    let mut text = "due_s,latency_ms,dropped\n".to_owned();
-    for Sample {
-        due_s,
-        latency_ms,
-        dropped,
-    } in &latency.timeline
-    {
-        let _ = writeln!(text, "{due_s:.6},{latency_ms:.6},{dropped}");
-    }
-    text
+    let rows = latency.timeline.iter().map(|it| {
+        let (due_s, latency_ms, dropped) = (it.due_s, it.latency_ms, it.dropped);
+        format!("{due_s:.6},{latency_ms:.6},{dropped}\n")
+    });
+    let header = "due_s,latency_ms,dropped\n".to_owned();
+    std::iter::once(header).chain(rows).collect()
 }

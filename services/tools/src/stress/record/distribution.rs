@@ -10,24 +10,16 @@ const FIRM: f64 = 10.0;
 /// 1 / (1 - q) samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Distribution {
-    /// Number of samples.
     pub samples: u64,
-    /// Median.
     pub p50_ms: Option<f64>,
-    /// 90th percentile.
     pub p90_ms: Option<f64>,
-    /// 99th percentile.
     pub p99_ms: Option<f64>,
-    /// 99.9th percentile.
     pub p99_9_ms: Option<f64>,
-    /// 99.99th percentile.
     pub p99_99_ms: Option<f64>,
-    /// Maximum.
     pub max_ms: Option<f64>,
 }
 
 impl Distribution {
-    /// Returns the distribution of durations.
     pub fn of(durations: &Durations) -> Self {
         let samples = durations.count();
         let at = |share: f64| durations.at(share).map(|ns| ns as f64 * 1e-6);

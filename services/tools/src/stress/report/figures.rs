@@ -18,18 +18,15 @@ use crate::stress::{
 pub struct Figures {
     #[serde(flatten)]
     pub latency: RunLatency,
-    /// Faults and recoveries.
     pub faults: Vec<Fault>,
     /// Faults of gyro, wheels and radar, and recoveries.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub witness_faults: Vec<WitnessFault>,
     /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
-    /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
     /// Lost wake-ups by stage, each found after up to 200 ms.
     pub wakes_caught_late: BTreeMap<String, u64>,
-    /// The resources of each process.
     pub processes: Vec<Cost>,
     /// Shared memory, bytes.
     pub shared_bytes: u64,

@@ -1,12 +1,50 @@
-//! The outcome of a scenario: figures and the verdict.
+//! The outcome of a scenario: figures, the comparison with their limits, and the verdict.
 
-use std::{fmt::Write, time::Duration};
+use std::time::Duration;
 
 use gyre_run::{Judged, Scenario};
 use serde::Serialize;
 
-use super::{Figures, Step};
-use crate::stress::check::Check;
+use super::Figures;
+use crate::stress::search::Step;
+
+/// One figure beside its limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// The key of `[budget]`.
+    pub key: &'static str,
+    /// The measured figure; `None`: there is no figure, which misses the limit.
+    pub measured: Option<f64>,
+    pub limit: f64,
+    pub passed: bool,
+}
+
+impl Check {
+    /// The measured figure must not be above the limit.
+    pub fn at_most(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            key,
+            measured,
+            limit,
+            passed: measured.is_some_and(|measured| measured <= limit),
+        }
+    }
+
+    /// The measured figure must not be below the limit.
+    pub fn at_least(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            passed: measured.is_some_and(|measured| measured >= limit),
+            ..Self::at_most(key, measured, limit)
+        }
+    }
+
+    /// Returns `p99_ms 312.4, limit 250`.
+    pub fn sentence(&self) -> String {
+        let measured = self.measured.map(|measured| format!("{measured:.1}"));
+        let measured = measured.as_deref().unwrap_or("not measured");
+        format!("{} {measured}, limit {}", self.key, self.limit)
+    }
+}
 
 /// The verdict on a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -23,8 +61,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns it in a word or two.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Passed => "passed",
             Self::Failed => "FAILED",
@@ -110,26 +147,18 @@ impl ScenarioOutcome {
     pub fn sentence(&self) -> String {
         let mut sentence = format!("{}: {}", self.scenario, self.verdict.name());
         let failed = self.checks.iter().filter(|check| !check.passed);
-        let reasons = self
-            .problem
-            .iter()
-            .cloned()
-            .chain(failed.map(Check::sentence));
-        for reason in reasons {
-            let _ = write!(sentence, "; {reason}");
+        let problem = self.problem.iter().cloned();
+        for reason in problem.chain(failed.map(Check::sentence)) {
+            sentence += &format!("; {reason}");
         }
         if let Some(figures) = &self.figures {
-            let _ = write!(sentence, " ({})", figures.sentence());
+            sentence += &format!(" ({})", figures.sentence());
         }
-        match (self.best, self.failed) {
-            (Some(best), Some(failed)) => {
-                let _ = write!(sentence, " ({best:.1}; {failed:.1} failed twice)");
-            }
-            (Some(best), None) => {
-                let _ = write!(sentence, " ({best:.1})");
-            }
-            (None, _) => {}
-        }
+        sentence += &match (self.best, self.failed) {
+            (Some(best), Some(failed)) => format!(" ({best:.1}; {failed:.1} failed twice)"),
+            (Some(best), None) => format!(" ({best:.1})"),
+            (None, _) => String::new(),
+        };
         sentence
     }
 }
@@ -144,6 +173,17 @@ mod tests {
 
     fn outcome(scenario: Scenario) -> ScenarioOutcome {
         ScenarioOutcome::new(scenario, Duration::from_secs(1))
+    }
+
+    #[test]
+    fn a_figure_on_its_limit_keeps_it_and_a_missing_one_does_not() {
+        assert!(Check::at_most("p99_ms", Some(100.0), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", Some(100.1), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", None, 100.0).passed);
+        assert!(Check::at_least("radars", Some(2.0), 2.0).passed);
+        assert!(!Check::at_least("radars", Some(1.0), 2.0).passed);
+        let sentence = Check::at_most("p99_ms", Some(312.44), 100.0).sentence();
+        assert_eq!(sentence, "p99_ms 312.4, limit 100");
     }
 
     fn check(passed: bool) -> Check {
