@@ -10,7 +10,6 @@ use crate::conformance::rule::{Rule, Verdict};
 /// The result of the test of a program.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The stage that it replaces.
     pub stage: &'static str,
     /// The program and its arguments.
     pub command: Vec<String>,
@@ -85,33 +84,26 @@ impl Work {
 impl Report {
     /// Returns whether no rule is broken, and none was not reached.
     pub fn conforms(&self) -> bool {
-        let fails =
-            |judged: &Judged| matches!(judged.verdict, Verdict::Broken(_) | Verdict::NotReached);
-        !self.rules.iter().any(fails)
+        let not_reached = |judged: &Judged| judged.verdict == Verdict::NotReached;
+        self.broken() == 0 && !self.rules.iter().any(not_reached)
     }
 
     /// Returns the number of rules that are broken.
     pub fn broken(&self) -> usize {
-        let rules = self.rules.iter();
-        rules
-            .filter(|judged| matches!(judged.verdict, Verdict::Broken(_)))
-            .count()
+        let is_broken = |judged: &&Judged| matches!(judged.verdict, Verdict::Broken(_));
+        self.rules.iter().filter(is_broken).count()
     }
 }
 
 impl fmt::Display for Work {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            items,
-            p50_ms,
-            p99_ms,
-            max_ms,
-        } = self;
-        write!(f, "p50 {p50_ms:.2} ms, ")?;
-        if let Some(p99_ms) = p99_ms {
-            write!(f, "p99 {p99_ms:.2} ms, ")?;
-        }
-        write!(f, "max {max_ms:.2} ms of {items} items")
+        let (p50_ms, max_ms, items) = (self.p50_ms, self.max_ms, self.items);
+        let p99 = self.p99_ms.map(|ms| format!("p99 {ms:.2} ms, "));
+        let p99 = p99.unwrap_or_default();
+        write!(
+            f,
+            "p50 {p50_ms:.2} ms, {p99}max {max_ms:.2} ms of {items} items"
+        )
     }
 }
 
@@ -127,29 +119,24 @@ impl fmt::Display for Judged {
         if let Verdict::DoesNotApply(reason) = self.verdict {
             write!(f, ": {reason}")?;
         }
-        sentences
-            .iter()
-            .try_for_each(|sentence| write!(f, "\n{:<30}{sentence}", ""))
+        let mut sentences = sentences.iter();
+        sentences.try_for_each(|sentence| write!(f, "\n{:<30}{sentence}", ""))
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for judged in &self.rules {
-            writeln!(f, "{judged}")?;
-        }
+        self.rules.iter().try_for_each(|it| writeln!(f, "{it}"))?;
         writeln!(f)?;
-        if let Some(work) = &self.work {
-            writeln!(f, "work on an item  {work}")?;
+        for (name, work) in [
+            ("work on an item ", self.work),
+            ("until the answer", self.answers),
+            ("our own stage   ", self.own_work),
+        ] {
+            work.map_or(Ok(()), |work| writeln!(f, "{name} {work}"))?;
         }
-        if let Some(answers) = &self.answers {
-            writeln!(f, "until the answer {answers}")?;
-        }
-        if let Some(own) = &self.own_work {
-            writeln!(f, "our own stage    {own}")?;
-            if let Some(work) = &self.work {
-                writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
-            }
+        if let (Some(own), Some(work)) = (self.own_work, self.work) {
+            writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
         }
         if let Some(deviation) = &self.deviation {
             writeln!(f, "results          {deviation}")?;

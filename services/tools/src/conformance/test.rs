@@ -5,9 +5,9 @@ use std::{io, ops::Range, path::Path, time::Duration};
 use gyre_datasets::Dataset;
 use gyre_messages::StageId;
 use gyre_stage::wake::Signals;
-use gyre_supervise::rig::Rig;
+use gyre_supervise::{SuperviseError, rig::Rig};
 
-use crate::conformance::{Candidate, ProgramError};
+use crate::conformance::{Candidate, at};
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -20,7 +20,6 @@ pub struct Test {
     pub stages: Vec<StageId>,
     /// Writes the other files of a run's root, as the list of a recording's files.
     pub prepare: Prepare,
-    /// The limits.
     pub demands: Demands,
 }
 
@@ -70,11 +69,11 @@ impl Test {
         name: &str,
         signals: &'a Signals,
         has_services: bool,
-    ) -> Result<Rig<'a>, ProgramError> {
+    ) -> Result<Rig<'a>, SuperviseError> {
         let out = self.candidate.manifest.out.join(name);
         let rig = self.candidate.rig(out, signals, has_services)?;
         let root = &rig.manifest().root;
-        (self.prepare)(root).map_err(ProgramError::file(root))?;
+        (self.prepare)(root).map_err(at(root))?;
         Ok(rig)
     }
 }

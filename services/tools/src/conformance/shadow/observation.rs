@@ -9,7 +9,7 @@ use gyre_stage::{
 };
 use gyre_supervise::rig::Recorded;
 
-use crate::conformance::topics::{Direction, StageTopics};
+use crate::conformance::topics::StageTopics;
 
 /// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
 /// mode most scans never become an item.
@@ -83,11 +83,10 @@ impl<'run> Observation<'run> {
         stage: StageId,
         stage_topics: &StageTopics,
     ) -> Result<Self, StageError> {
-        let inputs = stage_topics.leading(Direction::Forward);
-        let mut topics: Vec<_> = inputs.chain([stage_topics.output]).collect();
-        let forward = topics.len() - 1;
+        let mut topics = stage_topics.forward.clone();
+        topics.push(stage_topics.output);
         if stage == StageId::Masking {
-            topics.extend(stage_topics.leading(Direction::Feedback));
+            topics.extend(&stage_topics.feedback);
         }
         let mut observers = Vec::new();
         for topic in &topics {
@@ -97,7 +96,7 @@ impl<'run> Observation<'run> {
             run,
             observers,
             topics,
-            forward,
+            forward: stage_topics.forward.len(),
             lag: run.manifest().window.lag as u64,
             incomplete: BTreeMap::new(),
             incomplete_bytes: 0,

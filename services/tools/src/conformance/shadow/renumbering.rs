@@ -14,7 +14,7 @@
 use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
 
-use super::observation::Observed;
+use super::observation::{Feedback, Observed};
 use crate::conformance::harness::{Harness, start_of_trajectory};
 
 /// The numbers of the shadow's stream.
@@ -132,23 +132,19 @@ impl Renumbering {
         observed: &Observed,
         number: u64,
     ) -> Result<(), StageError> {
-        let run = observed.seq();
         if self.last.is_none() {
             return send_start(shadow, observed);
         }
-        let mut before = observed.before.iter();
-        let lagged = before.find(|it| self.lag > 0 && it.seq.checked_add(self.lag) == Some(run));
-        let Some(lagged) = lagged else {
+        let run = observed.seq();
+        let is_lagged = |it: &&Feedback| it.seq.checked_add(self.lag) == Some(run);
+        let mut before = observed.before.iter().filter(|_| self.lag > 0);
+        let Some(lagged) = before.find(is_lagged) else {
             return Ok(());
         };
         for (topic, message) in [(Motion::TOPIC, &lagged.motion), (Pose::TOPIC, &lagged.pose)] {
-            let item = Item {
-                seq: number - self.lag,
-                flags: message.item().flags & !flag::SYNC,
-                generation: 0,
-                numbered_from: 0,
-                ..message.item()
-            };
+            let mut item = message.item();
+            (item.seq, item.generation, item.numbered_from) = (number - self.lag, 0, 0);
+            item.flags &= !flag::SYNC;
             shadow.feed(topic, &message.about(&item))?;
         }
         Ok(())
@@ -163,11 +159,8 @@ fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageErro
     let Some(newest) = observed.before.last() else {
         return shadow.feed(Pose::TOPIC, &start_of_trajectory());
     };
-    let item = newest.pose.item();
-    let item = Item {
-        flags: item.flags | flag::SYNC,
-        ..item
-    };
+    let mut item = newest.pose.item();
+    item.flags |= flag::SYNC;
     shadow.feed(Pose::TOPIC, &newest.pose.about(&item))
 }
 
