@@ -16,7 +16,7 @@ use gyre_stage::{
 use gyre_terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
-    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
+    crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers},
 };
 
 use crate::operate::{arguments::TopArguments, choice::chosen};
@@ -80,13 +80,15 @@ fn show(
         };
         terminal.draw(|frame| screen::draw(frame, &snapshot))?;
         let mut resized = false;
-        let quit = || match next_key()? {
-            Key::Quit => Ok(true),
-            Key::Resized => {
-                resized = true;
-                Ok(false)
-            }
-            Key::None => Ok(false),
+        let quit = || {
+            Ok(match event::poll(PERIOD)?.then(event::read).transpose()? {
+                Some(Event::Key(key)) => is_quit(&key),
+                Some(Event::Resize(..)) => {
+                    resized = true;
+                    false
+                }
+                _ => false,
+            })
         };
         if wait(snapshots, every, quit)? {
             return Ok(None);
@@ -95,6 +97,17 @@ fn show(
             terminal.autoresize()?;
         }
     }
+}
+
+/// Returns whether a key ends the display: q, Esc or an interrupt.
+fn is_quit(key: &KeyEvent) -> bool {
+    let has_control = key.modifiers.contains(KeyModifiers::CONTROL);
+    key.kind == KeyEventKind::Press
+        && match key.code {
+            KeyCode::Char('q') | KeyCode::Esc => true,
+            KeyCode::Char('c') => has_control,
+            _ => false,
+        }
 }
 
 /// Takes the poses that come within `time`; true if `quit` returns true.
@@ -111,32 +124,6 @@ fn wait(
         snapshots.take_poses()?;
     }
     Ok(false)
-}
-
-enum Key {
-    Quit,
-    Resized,
-    None,
-}
-
-/// Waits a moment for a key.
-fn next_key() -> Result<Key, Failure> {
-    if !event::poll(PERIOD)? {
-        return Ok(Key::None);
-    }
-    Ok(match event::read()? {
-        Event::Key(key) if key.kind == KeyEventKind::Press => {
-            let is_interrupt =
-                key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-            match key.code {
-                KeyCode::Char('q') | KeyCode::Esc => Key::Quit,
-                _ if is_interrupt => Key::Quit,
-                _ => Key::None,
-            }
-        }
-        Event::Resize(..) => Key::Resized,
-        _ => Key::None,
-    })
 }
 
 /// The poses of a run, for [`Snapshots`].

@@ -155,13 +155,19 @@ impl<'run> Snapshots<'run> {
             usage: usage.clone(),
         });
         let elapsed = earlier.as_ref().map_or(Duration::ZERO, |it| now - it.at);
+        let per_s = |count: u64| count as f64 / elapsed.as_secs_f64().max(1e-9);
         let rate = earlier.as_ref().map_or(0.0, |earlier| {
-            status.poses.saturating_sub(earlier.poses) as f64 / elapsed.as_secs_f64().max(1e-9)
+            per_s(status.poses.saturating_sub(earlier.poses))
         });
         let used = |pid: u32| {
             let now = usage.get(&pid).copied().unwrap_or_default();
             let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
-            Use::between(before.unwrap_or(now), now, elapsed)
+            let before = before.unwrap_or(now);
+            Use {
+                cpu: now.processor_share(&before, elapsed),
+                own_bytes: now.own_bytes,
+                wake_ups: per_s(now.wake_ups.saturating_sub(before.wake_ups)),
+            }
         };
         let snapshot = Snapshot {
             rate,
@@ -184,24 +190,11 @@ impl<'run> Snapshots<'run> {
         let is_owed =
             !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);
         self.owed_since = is_owed.then(|| self.owed_since.unwrap_or(now));
-        let owed_us = self
-            .owed_since
-            .map_or(0, |since| (now - since).as_micros() as u64);
-        self.history
-            .push_back(std::mem::take(&mut self.longest_us).max(owed_us));
+        let owed = self.owed_since.map_or(Duration::ZERO, |since| now - since);
+        let longest_us = std::mem::take(&mut self.longest_us).max(owed.as_micros() as u64);
+        self.history.push_back(longest_us);
         if self.history.len() > HISTORY {
             self.history.pop_front();
-        }
-    }
-}
-
-impl Use {
-    fn between(before: Usage, now: Usage, elapsed: Duration) -> Self {
-        let wake_ups = now.wake_ups.saturating_sub(before.wake_ups) as f64;
-        Self {
-            cpu: now.processor_share(&before, elapsed),
-            own_bytes: now.own_bytes,
-            wake_ups: wake_ups / elapsed.as_secs_f64().max(1e-9),
         }
     }
 }
