@@ -1,8 +1,4 @@
 //! `gyre masks`: draws the mask's effect on scans.
-//!
-//! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
-//! - `inspection`: the power that the mask keeps of one scan, in figures;
-//! - `drawing`: the same as a picture.
 
 mod drawing;
 mod inspection;
@@ -14,8 +10,7 @@ use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 use clap::Args;
 use gyre_configuration::describe_masks_in_process;
 use gyre_results::Content;
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 
 use drawing::Canvas;
 use inspector::MaskInspector;
@@ -82,11 +77,8 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         }
     }
     if overview.is_empty() {
-        return Err(format!(
-            "{}: none of the chosen scans can be read",
-            configuration.data()
-        )
-        .into());
+        let data = configuration.data();
+        return Err(format!("{data}: none of the chosen scans can be read").into());
     }
     Canvas::stack(&overview).write(&out.join(OVERVIEW))?;
     if arguments.json {
@@ -104,11 +96,8 @@ fn choose(
     if played.is_empty() {
         return Err(format!("{data} has no scans to draw").into());
     }
-    if let Some(number) = arguments
-        .scans
-        .iter()
-        .find(|number| !played.contains(number))
-    {
+    let mut numbers = arguments.scans.iter();
+    if let Some(number) = numbers.find(|number| !played.contains(number)) {
         let (first, last) = (played.start, played.end - 1);
         return Err(format!(
             "--scans {number}: the scans of {data} that are played have the numbers {first} to {last}"
@@ -117,9 +106,8 @@ fn choose(
     }
     let mut chosen = arguments.scans.clone();
     if chosen.is_empty() {
-        let every = arguments
-            .every
-            .map_or(played.len().div_ceil(FEW), usize::from);
+        let every = arguments.every.map(usize::from);
+        let every = every.unwrap_or(played.len().div_ceil(FEW));
         chosen = played.step_by(every).collect();
     }
     chosen.sort_unstable();

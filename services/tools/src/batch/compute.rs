@@ -104,19 +104,15 @@ impl Ended {
     /// Writes the row of a drive and counts it. Returns a line about it.
     fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
         let Batch { settings, out, .. } = batch;
-        let row = Row::read(out, drive, settings)?;
-        let (row, earlier, note) = match row.outcome.has_results() && end.unchecked {
-            true => (
-                row,
-                true,
-                format!("; not looked at again: {}", end.sentence),
-            ),
-            false => {
-                let row = Row::of(out, drive, settings, end.outcome, end.sentence);
-                row.write(out)?;
-                (row, end.earlier, String::new())
-            }
-        };
+        let (mut row, mut note) = (Row::read(out, drive, settings)?, String::new());
+        let is_kept = row.outcome.has_results() && end.unchecked;
+        if is_kept {
+            note = format!("; not looked at again: {}", end.sentence);
+        } else {
+            row = Row::of(out, drive, settings, end.outcome, end.sentence);
+            row.write(out)?;
+        }
+        let earlier = is_kept || end.earlier;
         *self.counts.entry(row.outcome).or_default() += 1;
         self.earlier += usize::from(earlier);
         let number: usize = self.counts.values().sum();
@@ -138,17 +134,13 @@ impl<'a> Child<'a> {
     /// Starts it. Its output is added to `output/NAME.txt`.
     fn start(batch: &Batch<'_>, drive: &'a Drive) -> Result<Self, Failure> {
         let path = batch.out.join("output").join(format!("{}.txt", drive.name));
-        let open = || -> io::Result<_> {
-            let mut options = OpenOptions::new();
-            let file = options.create(true).append(true).read(true).open(&path)?;
-            let (begin, outputs) = (
-                file.metadata()?.len(),
-                [file.try_clone()?, file.try_clone()?],
-            );
-            Ok((file, begin, outputs))
-        };
-        let (output, begin, [out, errors]) =
-            open().map_err(|error| format!("cannot write to {}: {error}", path.display()))?;
+        let unwritable = |error: io::Error| format!("cannot write to {}: {error}", path.display());
+        let mut options = OpenOptions::new();
+        let output = options.create(true).append(true).read(true).open(&path);
+        let output = output.map_err(unwritable)?;
+        let begin = output.metadata().map_err(unwritable)?.len();
+        let out = output.try_clone().map_err(unwritable)?;
+        let errors = output.try_clone().map_err(unwritable)?;
         let process = Command::new(&batch.program)
             .args(words(batch, drive))
             .stdin(Stdio::null())
@@ -164,13 +156,9 @@ impl<'a> Child<'a> {
         })
     }
 
-    /// Asks it to end.
     fn ask_to_end(&mut self) {
-        if let (Ok(None), Some(pid)) = (
-            self.process.try_wait(),
-            Pid::from_raw(self.process.id() as i32),
-        ) {
-            let _ = kill_process(pid, Signal::TERM);
+        if matches!(self.process.try_wait(), Ok(None)) {
+            let _ = kill_process(Pid::from_child(&self.process), Signal::TERM);
         }
     }
 
@@ -225,16 +213,17 @@ fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
         file if file.is_file() => file,
         file => gyre_shipped::configuration(Path::new(named)).unwrap_or(file),
     });
-    let configuration = own.or_else(|| batch.settings.configuration.clone());
-    let configuration = configuration.map(PathBuf::into_os_string);
     let mut words = vec![
         COMMAND.into(),
         format!("--parent={}", process::id()).into(),
         option("--out=", &Row::results(&batch.out, drive)),
     ];
-    match is_configuration(&drive.path) {
-        true => words.push(path.into()),
-        false => words.extend(configuration.into_iter().chain([option("--data=", &path)])),
+    if is_configuration(&drive.path) {
+        words.push(path.into());
+    } else {
+        let configuration = own.or_else(|| batch.settings.configuration.clone());
+        words.extend(configuration.map(PathBuf::into_os_string));
+        words.push(option("--data=", &path));
     }
     let set = batch.settings.set.iter().chain(&drive.set);
     words.extend(set.map(|sentence| format!("--set={sentence}").into()));

@@ -164,10 +164,8 @@ fn table(text: &str) -> Lines {
     };
     if let Some(column) = header.iter().find(|it| !COLUMNS.contains(it)) {
         let known = COLUMNS.join(", ");
-        return vec![(
-            1,
-            Err(format!("there is no column `{column}`; there are {known}")),
-        )];
+        let unknown = format!("there is no column `{column}`; there are {known}");
+        return vec![(1, Err(unknown))];
     }
     let drive = |record: csv::Result<csv::StringRecord>| {
         let position = match &record {
@@ -184,7 +182,7 @@ fn table(text: &str) -> Lines {
 
 impl Line {
     fn drive(self) -> Result<Drive, String> {
-        let path = &self.drive;
+        let (path, set) = (&self.drive, &self.set);
         if path.is_empty() {
             return Err("the column `drive` is empty: it is the path of the recording".to_owned());
         }
@@ -193,15 +191,11 @@ impl Line {
                 "`{path}` is a configuration itself: leave its column `configuration` empty"
             ));
         }
-        let set = shlex::split(&self.set).ok_or_else(|| {
-            let set = &self.set;
-            format!("the column `set` is `{set}`, in which a quote is not closed")
-        })?;
-        let drive = Drive::of(path, self.name.as_deref())?;
+        let unclosed = || format!("the column `set` is `{set}`, in which a quote is not closed");
         Ok(Drive {
-            configuration: self.configuration,
-            set,
-            ..drive
+            set: shlex::split(set).ok_or_else(unclosed)?,
+            configuration: self.configuration.clone(),
+            ..Drive::of(path, self.name.as_deref())?
         })
     }
 }
@@ -219,9 +213,10 @@ impl Drive {
             true => of_path.file_stem(),
             false => of_path.file_name(),
         };
+        let none = || format!("`{path}` has no name: give one in the column `name`");
         let name = name
             .or(last.and_then(|last| last.to_str()))
-            .ok_or_else(|| format!("`{path}` has no name: give one in the column `name`"))?;
+            .ok_or_else(none)?;
         let is_plain = |c: char| c != '/' && !c.is_control();
         let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
         match is_valid && name.chars().all(is_plain) {

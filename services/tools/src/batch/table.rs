@@ -25,32 +25,22 @@ pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, F
         )
         .into());
     }
-    let rows = list
-        .drives
-        .iter()
-        .map(|drive| Row::read(out, drive, settings));
+    let drives = list.drives.iter();
+    let rows = drives.map(|drive| Row::read(out, drive, settings));
     let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
     let head = |row: &Row| {
-        let Row {
-            drive, sentence, ..
-        } = row;
-        let outcome = row.outcome.to_string();
+        let (drive, outcome) = (&row.drive, row.outcome.to_string());
         vec![
             drive.name.clone(),
             drive.path.clone(),
             outcome,
-            sentence.clone(),
+            row.sentence.clone(),
         ]
     };
-    let results = csv(
-        &rows,
-        &["name", "drive", "outcome", "sentence"],
-        head,
-        &FIGURES,
-    )?;
-    gyre_storage::write(&out.join(RESULTS), results)?;
-    let times = csv(&rows, &["name"], |row| vec![row.drive.name.clone()], &TIMES)?;
-    gyre_storage::write(&out.join(TIMES_FILE), times)?;
+    let names = ["name", "drive", "outcome", "sentence"];
+    gyre_storage::write(&out.join(RESULTS), csv(&rows, &names, head, &FIGURES)?)?;
+    let head = |row: &Row| vec![row.drive.name.clone()];
+    gyre_storage::write(&out.join(TIMES_FILE), csv(&rows, &["name"], head, &TIMES)?)?;
     Ok(rows)
 }
 

@@ -1,9 +1,4 @@
 //! `gyre localise`: finds a drive in a map.
-//!
-//! - `scans`: registers scan after scan by odometry in this process;
-//! - `known`: opens the map;
-//! - `fixes`: `fixes.csv`;
-//! - `counts`: found, lost and skipped scans.
 
 mod counts;
 pub mod fixes;
@@ -26,8 +21,7 @@ use gyre_radar::Trajectory;
 use gyre_results::{Content, Out};
 use gyre_slam::localisation::{Localisation, Localiser, Observation, Status};
 use gyre_storage::{self as storage, Draft};
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -85,27 +79,23 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let _locked = Out::lock_for(out, Content::FIXES)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
-    let mut path = Fixed {
-        stamps_ns: Vec::new(),
-        pieces: vec![Vec::new()],
-    };
-    let (started, mut counts) = (Instant::now(), Counts::default());
+    let (started, mut found) = (Instant::now(), Found::default());
     let ended = follow(
         &mut scans,
         &mut localiser,
         &mut fixes,
-        &mut counts,
-        &mut path,
+        &mut found,
         &configuration,
     );
+    let counts = &found.counts;
     let searched = counts.scans() + PROBES * usize::from(!scans.is_empty());
     let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / searched.max(1) as f64;
     fixes.commit()?;
-    let drawn = draw(&arguments.map, &path, out);
+    let drawn = draw(&arguments.map, &found, out);
     ended?;
     drawn?;
     let figures = Figures {
-        counts: &counts,
+        counts,
         left_out: scans.left_out(),
         ms_a_scan,
         fixes: out.join(FIXES),
@@ -130,19 +120,22 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// The scans with a fix.
-struct Fixed {
+/// The scans with a fix, and the counts of all.
+#[derive(Default)]
+struct Found {
+    counts: Counts,
     stamps_ns: Vec<i64>,
     /// Their poses, in pieces with a fix for each scan; the last may be empty.
     pieces: Vec<Vec<Pose>>,
 }
 
-impl Fixed {
-    fn add(&mut self, stamp_ns: i64, found: &Localisation) {
+impl Found {
+    fn add(&mut self, scan: &RegisteredScan<'_>, found: &Localisation) {
+        self.counts.add(scan, found.status);
         let is_fix = matches!(found.status, Status::Found | Status::Tracked);
         match (&found.fix, self.pieces.last_mut()) {
             (Some(fix), Some(piece)) if is_fix => {
-                self.stamps_ns.push(stamp_ns);
+                self.stamps_ns.push(scan.observation.stamp_ns);
                 piece.push(fix.pose.motion);
             }
             (_, Some(piece)) if piece.is_empty() => {}
@@ -157,11 +150,11 @@ fn follow(
     scans: &mut Scans,
     localiser: &mut Localiser,
     fixes: &mut Draft,
-    counts: &mut Counts,
-    path: &mut Fixed,
+    all: &mut Found,
     configuration: &Configuration,
 ) -> Result<(), Failure> {
     fixes.append(fixes::HEADER)?;
+    all.pieces.push(Vec::new());
     let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
     while let Some(scan) = scans.register_next()? {
         if scan.starts {
@@ -171,8 +164,8 @@ fn follow(
         row.clear();
         fixes::write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
-        counts.add(&scan, found.status);
-        path.add(scan.observation.stamp_ns, &found);
+        all.add(&scan, &found);
+        let counts = &all.counts;
         progress.show(counts.scans(), found.status);
         if counts.scans() == FIRST && !counts.has_fix() && !scans.is_empty() {
             let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
@@ -181,12 +174,14 @@ fn follow(
             }
         }
     }
-    progress.finish();
+    if let Some(bar) = progress.bar {
+        bar.finish_and_clear();
+    }
     Ok(())
 }
 
 /// Writes the fixes as TUM, and draws them over the map.
-fn draw(map: &Path, path: &Fixed, out: &Path) -> Result<(), Failure> {
+fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
     let trajectory = Trajectory {
         stamp_ns: Some(path.stamps_ns.clone()),
@@ -233,12 +228,6 @@ impl Progress {
         } else if self.last_line.elapsed() >= EVERY {
             print::note(format_args!("{done}/{} scans  {name}", self.scans));
             self.last_line = Instant::now();
-        }
-    }
-
-    fn finish(self) {
-        if let Some(bar) = self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -39,11 +39,10 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         Some(map) => extend::extend(arguments, map)?,
         None => draw_run(arguments)?,
     };
+    let (keyframes, tiles) = (drawing.keyframes(), drawing.evidence().tiles().len());
+    let out = arguments.out.display();
     print::line(format_args!(
-        "{} keyframes in {} tiles, in {}",
-        drawing.keyframes(),
-        drawing.evidence().tiles().len(),
-        arguments.out.display()
+        "{keyframes} keyframes in {tiles} tiles, in {out}"
     ))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -65,10 +64,9 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let lines = draw(&mut keyframes, &poses, &loops, &mut drawing)?;
     let (count, total) = (drawing.keyframes(), keyframes.len());
     if count < total {
+        let (left_out, file) = (total - count, trajectory.display());
         print::note(format_args!(
-            "{} of {total} keyframes have no pose in {} and are left out",
-            total - count,
-            trajectory.display()
+            "{left_out} of {total} keyframes have no pose in {file} and are left out"
         ));
     }
     let (out, origin) = (&arguments.out, origin(arguments)?);

@@ -4,11 +4,12 @@
 
 use std::path::Path;
 
+use gyre_terminal::Failure;
 use ndarray::Array2;
 
 use crate::masks::{
     inspection::{Inspection, MaskedRaster},
-    picture::{PictureError, write_rgb},
+    picture::write_rgb,
 };
 
 type Colour = [u8; 3];
@@ -43,7 +44,10 @@ impl Canvas {
         };
         for (row, panels) in rows.iter().enumerate() {
             for (column, panel) in panels.iter().enumerate() {
-                canvas.place(panel, scale, [MARGIN + row * step, MARGIN + column * step]);
+                let corner = [MARGIN + row * step, MARGIN + column * step];
+                for (cell, colour) in panel.indexed_iter() {
+                    canvas.square(place(corner, cell.into(), scale), scale, *colour);
+                }
             }
         }
         canvas.mark_points(&inspection.points, scale, [MARGIN, MARGIN + 3 * step]);
@@ -52,27 +56,15 @@ impl Canvas {
 
     /// Pictures of one width below each other.
     pub fn stack(pictures: &[Self]) -> Self {
-        let width = pictures.first().map_or(0, |picture| picture.width);
+        let pixels = pictures.iter().flat_map(|picture| &picture.pixels);
         Self {
-            width,
-            pixels: pictures
-                .iter()
-                .flat_map(|picture| &picture.pixels)
-                .copied()
-                .collect(),
+            width: pictures.first().map_or(0, |picture| picture.width),
+            pixels: pixels.copied().collect(),
         }
     }
 
-    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
         write_rgb(path, self.width, &self.pixels)
-    }
-
-    /// Draws cells, each as a square of `scale` pixels a side.
-    fn place(&mut self, cells: &Array2<Colour>, scale: usize, corner: [usize; 2]) {
-        for ((row, column), colour) in cells.indexed_iter() {
-            let place = [corner[0] + row * scale, corner[1] + column * scale];
-            self.square(place, scale, *colour);
-        }
     }
 
     fn square(&mut self, [row, column]: [usize; 2], side: usize, colour: Colour) {
@@ -85,11 +77,15 @@ impl Canvas {
     fn mark_points(&mut self, points: &[([usize; 2], f32)], scale: usize, corner: [usize; 2]) {
         let mut points = points.to_vec();
         points.sort_by(|a, b| a.1.total_cmp(&b.1));
-        for ([row, column], factor) in points {
-            let place = [corner[0] + row * scale, corner[1] + column * scale];
-            self.square(place, scale + 1, colour(factor));
+        for (cell, factor) in points {
+            self.square(place(corner, cell, scale), scale + 1, colour(factor));
         }
     }
+}
+
+/// Returns the pixel where a cell begins that is drawn as a square of `scale` pixels a side.
+fn place(corner: [usize; 2], cell: [usize; 2], scale: usize) -> [usize; 2] {
+    [0, 1].map(|axis| corner[axis] + cell[axis] * scale)
 }
 
 /// The panels of a raster, without the points.

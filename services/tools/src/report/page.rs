@@ -72,7 +72,7 @@ fn figures(subjects: &[Subject], groups: &[&Group]) -> String {
         return String::new();
     }
     let columns = subjects.len() + 1;
-    let mut rows = head(subjects);
+    let mut rows = head(subjects.iter());
     for group in groups {
         let title = group.title;
         rows += &format!("<tr class=\"group\"><th colspan=\"{columns}\">{title}</th></tr>\n");
@@ -82,29 +82,37 @@ fn figures(subjects: &[Subject], groups: &[&Group]) -> String {
 }
 
 /// Returns the names of the subjects as a row, where there are several.
-fn head(subjects: &[Subject]) -> String {
+fn head<'a>(subjects: impl ExactSizeIterator<Item = &'a Subject>) -> String {
     if subjects.len() < 2 {
         return String::new();
     }
-    let names = subjects
+    let names = subjects.map(|it| format!("<th>{}</th>", escaped(&it.name)));
+    let names: String = names.collect();
+    format!("<thead><tr><th></th>{names}</tr></thead>\n")
+}
+
+/// Returns the subjects that are runs.
+fn runs(subjects: &[Subject]) -> impl Iterator<Item = (&Subject, &Run)> {
+    subjects
         .iter()
-        .map(|it| format!("<th>{}</th>", escaped(&it.name)));
-    format!(
-        "<thead><tr><th></th>{}</tr></thead>\n",
-        names.collect::<String>()
-    )
+        .filter_map(|it| Some((it, it.run.as_ref()?)))
+}
+
+/// Returns the name of one of several runs as a title.
+fn title_of(subject: &Subject, subjects: &[Subject]) -> String {
+    match subjects.len() {
+        1 => String::new(),
+        _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
+    }
 }
 
 fn figure(row: &Row) -> String {
     let cell = |(place, value): (usize, &Option<String>)| {
-        let class = match row.best == Some(place) {
-            true => " class=\"best\"",
-            false => "",
-        };
-        format!(
-            "<td{class}>{}</td>",
-            escaped(value.as_deref().unwrap_or(""))
-        )
+        let value = escaped(value.as_deref().unwrap_or(""));
+        match row.best == Some(place) {
+            true => format!("<td class=\"best\">{value}</td>"),
+            false => format!("<td>{value}</td>"),
+        }
     };
     let cells: String = row.values.iter().enumerate().map(cell).collect();
     format!("<tr><th>{}</th>{cells}</tr>\n", escaped(row.name))
@@ -114,39 +122,25 @@ fn figure(row: &Row) -> String {
 fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     let truth = subjects.iter().find_map(|it| it.evaluation.as_ref());
     let truth = truth.map(|evaluation| evaluation.matched.truth());
-    let paths: Vec<(&str, Vec<Pose>)> = subjects
-        .iter()
-        .map(|it| (it.name.as_str(), it.drawn()))
-        .collect();
-    Ok(svg(
-        &paths_svg(&paths, truth)?,
-        "Trajectories seen from above",
-    ))
+    let paths = subjects.iter().map(|it| (it.name.as_str(), it.drawn()));
+    let paths: Vec<(&str, Vec<Pose>)> = paths.collect();
+    let drawn = paths_svg(&paths, truth)?;
+    Ok(svg(&drawn, "Trajectories seen from above"))
 }
 
 /// Returns a section with a picture of each run that has it.
 fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> String {
-    let runs = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)));
-    let pictures = runs.filter_map(|(subject, run)| {
+    let pictures = runs(subjects).filter_map(|(subject, run)| {
         let bytes = run.picture(name)?;
         let picture = match str::from_utf8(&bytes) {
             Ok(text) => svg(text, title),
             Err(_) if bytes.len() > LARGEST_MAP => {
-                let path = run.folder.join(name);
-                format!(
-                    "<p>too large for this page: {}</p>",
-                    escaped(&path.display().to_string())
-                )
+                let path = escaped(&run.folder.join(name).display().to_string());
+                format!("<p>too large for this page: {path}</p>")
             }
             Err(_) => png(&bytes, title),
         };
-        let of = match subjects.len() {
-            1 => String::new(),
-            _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
-        };
-        Some(format!("{of}{picture}\n"))
+        Some(format!("{}{picture}\n", title_of(subject, subjects)))
     });
     match pictures.collect::<String>() {
         none if none.is_empty() => none,
@@ -156,17 +150,8 @@ fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> Str
 
 /// Returns a table of the latencies of each run.
 fn latencies(subjects: &[Subject]) -> String {
-    let runs = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)));
-    let tables = runs.map(|(subject, run)| {
-        let of = match subjects.len() {
-            1 => String::new(),
-            _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
-        };
-        format!("{of}{}", latency(run))
-    });
-    tables.collect()
+    let table = |(subject, run)| title_of(subject, subjects) + &latency(run);
+    runs(subjects).map(table).collect()
 }
 
 fn latency(run: &Run) -> String {
@@ -210,10 +195,7 @@ fn latency(run: &Run) -> String {
 
 /// Returns the configuration of a run, or the keys that differ between several runs.
 fn configurations(subjects: &[Subject]) -> String {
-    let runs: Vec<(&Subject, &Run)> = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)))
-        .collect();
+    let runs: Vec<(&Subject, &Run)> = runs(subjects).collect();
     match &runs[..] {
         [] => String::new(),
         [(_, run)] => format!(
@@ -225,33 +207,25 @@ fn configurations(subjects: &[Subject]) -> String {
 }
 
 fn differences(runs: &[(&Subject, &Run)]) -> String {
-    let keys: Vec<BTreeMap<String, String>> = runs
-        .iter()
-        .map(|(_, run)| keys(&run.configuration))
-        .collect();
+    let keys = runs.iter().map(|(_, run)| keys(&run.configuration));
+    let keys: Vec<BTreeMap<String, String>> = keys.collect();
     let all: BTreeSet<&String> = keys.iter().flat_map(BTreeMap::keys).collect();
     let differ = |key: &&&String| keys.iter().any(|it| it.get(**key) != keys[0].get(**key));
     let rows = all.iter().filter(differ).map(|key| {
-        let cells = keys.iter().map(|it| {
-            let value = it.get(*key).map_or("", String::as_str);
-            format!("<td>{}</td>", escaped(value))
-        });
-        format!(
-            "<tr><th>{}</th>{}</tr>\n",
-            escaped(key),
-            cells.collect::<String>()
-        )
+        let values = keys
+            .iter()
+            .map(|it| it.get(*key).map_or("", String::as_str));
+        let cells = values.map(|value| format!("<td>{}</td>", escaped(value)));
+        let (key, cells) = (escaped(key), cells.collect::<String>());
+        format!("<tr><th>{key}</th>{cells}</tr>\n")
     });
     let rows: String = rows.collect();
     if rows.is_empty() {
         return "<p>All keys are equal.</p>".to_owned();
     }
-    let names = runs
-        .iter()
-        .map(|(it, _)| format!("<th>{}</th>", escaped(&it.name)));
+    let head = head(runs.iter().map(|(it, _)| *it));
     format!(
-        "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n<thead><tr><th></th>{}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>",
-        names.collect::<String>()
+        "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n{head}<tbody>\n{rows}</tbody></table></div>"
     )
 }
 

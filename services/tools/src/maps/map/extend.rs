@@ -72,10 +72,10 @@ fn all(
 /// Checks that the map that is extended is kept.
 fn require_another_folder(map: &Path, out: &Path) -> Result<(), Failure> {
     let same = fs::canonicalize(map).ok() == fs::canonicalize(out).ok() && out.exists();
+    let map = map.display();
     match same {
         true => Err(format!(
-            "--out is the map {} itself: choose another folder, so that it is kept",
-            map.display()
+            "--out is the map {map} itself: choose another folder, so that it is kept"
         )
         .into()),
         false => Ok(()),
