@@ -43,10 +43,8 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     let frames = arguments.frames.frames.clone();
     let mounting = arguments.frames.mounting.parse()?;
     let mut places = source.places()?.peekable();
-    let mut trajectory = match places.peek() {
-        Some(_) => Some(Trajectory::begin(&mut bag, &frames, mounting)?),
-        None => None,
-    };
+    let begin = |_: &_| Trajectory::begin(&mut bag, &frames, mounting);
+    let mut trajectory = places.peek().map(begin).transpose()?;
     let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
     let mut last_ns = 0;
     while let Some(stamp_ns) = scans.write_next(&mut bag)? {
@@ -61,10 +59,10 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
         write_place(&mut bag, trajectory.as_mut(), place)?;
     }
     source.write_map(&mut bag, &frames, last_ns, &mounting)?;
-    let counts: Vec<String> = bag
+    let counts = bag
         .counts()
-        .map(|(topic, count)| format!("{topic} {count}"))
-        .collect();
+        .map(|(topic, count)| format!("{topic} {count}"));
+    let counts: Vec<String> = counts.collect();
     if bag.counts().all(|(_, count)| count == 0) {
         let source = arguments.source.display();
         return Err(format!("{source} has nothing to export: neither poses nor scans").into());

@@ -9,8 +9,7 @@ use std::{net::TcpListener, ops::Range, path::Path, process::ExitCode, time::Dur
 use gyre_colossus::Address;
 use gyre_configuration::{Configuration, Played};
 use gyre_stage::wake::Signals;
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
 use capture::Capture;
@@ -44,9 +43,10 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let playback = playback(arguments, scans);
     let played = server::serve(audience, dataset.as_mut(), &playback, &stop)?;
+    let (scans, azimuths, datagrams) = (played.scans, played.lost_azimuths, played.lost_datagrams);
+    let (resets, stalls) = (played.resets, played.stalls);
     print::line(format_args!(
-        "played {} scans, lost {} azimuths and {} datagrams, reset the connections {} times, stalled {} times",
-        played.scans, played.lost_azimuths, played.lost_datagrams, played.resets, played.stalls
+        "played {scans} scans, lost {azimuths} azimuths and {datagrams} datagrams, reset the connections {resets} times, stalled {stalls} times"
     ))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -72,10 +72,10 @@ impl Losses {
         let rows = rows.filter(|row| scan.row(*row).iter().any(|power| *power > 0));
         self.interpolated += rows.count() as u64;
         let written = scan.stamp_ns.iter().zip(scan.flags);
-        let written = written.filter(|(_, flags)| is_measured(**flags));
-        let mut written = written.map(|(stamp_ns, _)| *stamp_ns);
-        if let Some(first_ns) = written.next() {
-            let read_ns = middle_ns(first_ns, written.next_back().unwrap_or(first_ns));
+        let mut written = written.filter(|(_, flags)| is_measured(**flags));
+        if let Some((first_ns, _)) = written.next() {
+            let last_ns = written.next_back().map_or(first_ns, |(last_ns, _)| last_ns);
+            let read_ns = middle_ns(*first_ns, *last_ns);
             let by_ns = read_ns.abs_diff(scan.geometry.stamp_ns);
             self.retimed += u64::from(by_ns > 0);
             self.retimed_by_ns = self.retimed_by_ns.max(by_ns);
@@ -94,55 +94,24 @@ impl Losses {
 
     /// Returns the losses as whole sentences.
     fn sentences(&self) -> Vec<String> {
-        let mut sentences = Vec::new();
-        if self.unreadable > 0 {
-            let unreadable = self.unreadable;
-            sentences.push(format!(
-                "{unreadable} scans cannot be read, and are not in the bag"
-            ));
-        }
-        if self.without_encoder {
-            sentences.push(
-                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
-                    .to_owned(),
-            );
-        }
-        if self.chirps {
-            sentences.push("Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned());
-        }
-        if self.interpolated > 0 {
-            let rows = self.interpolated;
-            sentences.push(format!(
-                "interpolated rows: {rows}. Navtech's messages cannot carry them; a run on the bag finds them missing"
-            ));
-        }
-        if self.placed > 0 {
-            let scans = self.placed;
-            sentences.push(format!(
-                "{scans} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans"
-            ));
-        }
-        if self.not_placed > 0 {
-            let scans = self.not_placed;
-            sentences.push(format!(
-                "{scans} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
-            ));
-        }
-        if self.retimed > 0 {
-            let (scans, ms) = (self.retimed, self.retimed_by_ns as f64 * 1e-6);
-            sentences.push(format!(
-                "{scans} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
-            ));
-        }
-        if !self.constants.is_empty() {
-            let constants = self.constants.iter();
-            let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
-            sentences.push(format!(
-                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{}",
-                settings.collect::<String>()
-            ));
-        }
-        sentences
+        let (unreadable, interpolated) = (self.unreadable, self.interpolated);
+        let (placed, not_placed, retimed) = (self.placed, self.not_placed, self.retimed);
+        let ms = self.retimed_by_ns as f64 * 1e-6;
+        let constants = self.constants.iter();
+        let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
+        let settings: String = settings.collect();
+        let sentences = [
+            (unreadable > 0, format!("{unreadable} scans cannot be read, and are not in the bag")),
+            (self.without_encoder, "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn".to_owned()),
+            (self.chirps, "Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned()),
+            (interpolated > 0, format!("interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing")),
+            (placed > 0, format!("{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans")),
+            (not_placed > 0, format!("{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right")),
+            (retimed > 0, format!("{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away")),
+            (!settings.is_empty(), format!("Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}")),
+        ];
+        let lost = sentences.into_iter().filter(|(is_lost, _)| *is_lost);
+        lost.map(|(_, sentence)| sentence).collect()
     }
 }
 
@@ -158,8 +127,7 @@ impl ScanWriter {
             open: None,
             losses: Losses::default(),
         };
-        let is_wanted = |form| forms.contains(&form);
-        if is_wanted(ScanForm::None) {
+        if forms.contains(&ScanForm::None) {
             return Ok(writer);
         }
         let Some(mut scans) = source.scans()? else {
@@ -176,14 +144,14 @@ impl ScanWriter {
         writer.open = Some(Open {
             messages: ScanMessages::new(radar, frame),
             configuration: bag.topic(CONFIGURATION, Kept::ForLater)?,
-            azimuths: match is_wanted(ScanForm::Fft) {
-                true => Some(bag.topic(AZIMUTHS, Kept::ForNobody)?),
-                false => None,
-            },
-            b_scans: match is_wanted(ScanForm::BScan) {
-                true => Some(bag.topic(B_SCANS, Kept::ForNobody)?),
-                false => None,
-            },
+            azimuths: forms
+                .contains(&ScanForm::Fft)
+                .then(|| bag.topic(AZIMUTHS, Kept::ForNobody))
+                .transpose()?,
+            b_scans: forms
+                .contains(&ScanForm::BScan)
+                .then(|| bag.topic(B_SCANS, Kept::ForNobody))
+                .transpose()?,
             lost: source.lost()?,
             rows: PlacedRows::default(),
             scan,

@@ -98,13 +98,23 @@ impl Source {
                 let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
                 let records = journal::records(&journal::path(&self.path))?;
                 let poses = records.into_iter().flatten();
-                Ok(Box::new(poses.filter_map(move |pose| match pose {
-                    Ok(pose) => {
-                        let place = corrected_by(Place::of(&pose)?, corrected.as_ref());
-                        Some(with_objects(place, &mut tracked))
+                let mut place = move |pose: &PoseHeader| -> Result<Option<Place>, Failure> {
+                    let Some(mut place) = Place::of(pose) else {
+                        return Ok(None);
+                    };
+                    let near = |it: &Trajectory| it.near(place.stamp_ns, Trajectory::ROUNDING_NS);
+                    let in_map: Option<Pose> = corrected.as_ref().and_then(near);
+                    let inverse = place.pose.motion.inverse();
+                    place.map_from_odometry = in_map.map(|pose| pose * inverse);
+                    let seq = place.seq as usize;
+                    if seq < tracked.len() {
+                        let objects = tracked.read(seq)?.objects;
+                        place.objects = Some(objects.iter().map(listed).collect());
                     }
-                    Err(error) => Some(Err(error.into())),
-                })))
+                    Ok(Some(place))
+                };
+                let places = poses.map(move |pose| place(&pose?));
+                Ok(Box::new(places.filter_map(Result::transpose)))
             }
             Kind::Recording => recorded(gyre_recording::open_recording(&self.path)?),
             Kind::Dataset => Ok(Box::new(iter::empty())),
@@ -152,8 +162,8 @@ impl Source {
                 }))
             }
             Kind::Dataset => {
-                let eccentricity =
-                    gyre_recording::stored_options(&self.path)?.azimuth_eccentricity_rad;
+                let stored = gyre_recording::stored_options(&self.path)?;
+                let eccentricity = stored.azimuth_eccentricity_rad;
                 let options = DatasetOptions {
                     azimuth_eccentricity_rad: Some(0.0),
                     ..DatasetOptions::default()
@@ -189,15 +199,9 @@ impl Source {
             }
         };
         let grid = grid(&mut evidence)?;
-        let size = [grid.columns, grid.rows];
-        let grid = occupancy_grid(
-            stamp_ns,
-            &frames.map,
-            grid.cell_m,
-            size,
-            grid.corner_m,
-            grid.values,
-        );
+        let (size, corner_m) = ([grid.columns, grid.rows], grid.corner_m);
+        let (frame, cell_m) = (&frames.map, grid.cell_m);
+        let grid = occupancy_grid(stamp_ns, frame, cell_m, size, corner_m, grid.values);
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())
@@ -218,29 +222,6 @@ impl Scans {
             is_corrected: false,
         }
     }
-}
-
-/// Adds the pose of the odometry frame in the map frame, if the corrected trajectory has the pose.
-fn corrected_by(place: Place, corrected: Option<&Trajectory>) -> Place {
-    let near = |poses: &Trajectory| poses.near(place.stamp_ns, Trajectory::ROUNDING_NS);
-    let in_map: Option<Pose> = corrected.and_then(near);
-    Place {
-        map_from_odometry: in_map.map(|pose| pose * place.pose.motion.inverse()),
-        ..place
-    }
-}
-
-/// Adds the objects, if the log has them.
-fn with_objects(place: Place, tracked: &mut RecordReader<LoggedObjects>) -> Result<Place, Failure> {
-    let seq = place.seq as usize;
-    if seq >= tracked.len() {
-        return Ok(place);
-    }
-    let objects = tracked.read(seq)?.objects;
-    Ok(Place {
-        objects: Some(objects.iter().map(listed).collect()),
-        ..place
-    })
 }
 
 /// Returns the poses of a recording, each with its objects, and the correction that was known then.

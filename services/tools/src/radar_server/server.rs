@@ -13,9 +13,9 @@ use std::{
 };
 
 use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
-use gyre_datasets::{Dataset, ReadError};
+use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, scan::flag};
-use thiserror::Error;
+use gyre_terminal::Failure;
 
 pub(crate) use clients::Clients;
 pub use faults::Faults;
@@ -45,21 +45,9 @@ pub struct Playback {
     pub clock: ClockFormat,
 }
 
-/// A failure to play a recording as a radar.
-#[derive(Debug, Error)]
-pub enum ServeError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    #[error("cannot serve as a radar: {0}")]
-    Network(#[from] io::Error),
-    #[error(
-        "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
-    )]
-    TooLarge {
-        azimuths: usize,
-        /// Range bins of an azimuth.
-        bins: usize,
-    },
+/// Returns the sentence about a network that cannot be used.
+pub(crate) fn unserved(error: io::Error) -> String {
+    format!("cannot serve as a radar: {error}")
 }
 
 /// The counts of a playback.
@@ -80,12 +68,12 @@ pub fn serve(
     dataset: &mut dyn Dataset,
     playback: &Playback,
     stop: &dyn Fn() -> bool,
-) -> Result<Played, ServeError> {
+) -> Result<Played, Failure> {
     let first = playback.scans.start;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    let output = Output::open(audience, &radar, playback.faults)?;
+    let output = Output::open(audience, &radar, playback.faults).map_err(unserved)?;
     let mut player = Player {
         output,
         radar,
@@ -121,26 +109,32 @@ pub fn serve(
 }
 
 /// Returns the radar's description of itself.
-fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, ServeError> {
+fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, Failure> {
     let geometry = scan.geometry;
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);
-    let small =
-        |number: usize| u16::try_from(number).map_err(|_| ServeError::TooLarge { azimuths, bins });
-    let resolution_m = f64::from(geometry.range_resolution_m);
+    let small = |number: usize| {
+        let too_large = |_| {
+            format!(
+                "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
+            )
+        };
+        u16::try_from(number).map_err(too_large)
+    };
+    let rounded = |value: f64| value.round().min(f64::from(u16::MAX)) as u16;
+    let (resolution_m, period_ns) = (
+        geometry.range_resolution_m,
+        dataset.period_ns().max(1) as f64,
+    );
     Ok(Configuration {
         azimuth_samples: small(azimuths)?,
-        bin_size: (resolution_m * 1e4).round().min(f64::from(u16::MAX)) as u16,
+        bin_size: rounded(f64::from(resolution_m) * 1e4),
         range_in_bins: small(bins)?,
         encoder_size: dataset.encoder_counts().unwrap_or(ENCODER_COUNTS),
-        rotation_mhz: (1e12 / dataset.period_ns().max(1) as f64)
-            .round()
-            .min(f64::from(u16::MAX)) as u16,
-        packet_rate: (azimuths as f64 * 1e9 / dataset.period_ns().max(1) as f64)
-            .round()
-            .min(f64::from(u16::MAX)) as u16,
+        rotation_mhz: rounded(1e12 / period_ns),
+        packet_rate: rounded(azimuths as f64 * 1e9 / period_ns),
         range_gain: 1.0,
         range_offset: 0.0,
-        range_resolution_m: Some(geometry.range_resolution_m),
+        range_resolution_m: Some(resolution_m),
     })
 }
 
