@@ -153,52 +153,41 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn of(times_ms: &[i64]) -> Option<Work> {
-        Work::of(times_ms.iter().map(|ms| ms * 1_000_000))
-    }
+    use crate::conformance::rule::Findings;
 
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 2e-3 * b
     }
 
     #[test]
-    fn the_maximum_of_few_items_is_called_so_and_the_first_items_do_not_count() {
-        let times = [&[900, 80, 70, 60][..], &[2; 19], &[5]].concat();
-        let work = of(&times);
-        assert!(work.is_some_and(|it| it.items == 20 && it.p99_ms.is_none()));
-        let judged = work.map(|it| it.judged());
+    fn a_hundred_items_have_a_percentile_and_the_first_items_do_not_count() {
+        let of = |times_ms: &[i64]| Work::of(times_ms.iter().map(|ms| ms * 1_000_000));
+        let few = of(&[&[900, 80, 70, 60][..], &[2; 19], &[5]].concat());
+        assert!(few.is_some_and(|it| it.items == 20 && it.p99_ms.is_none()));
+        let judged = few.map(|it| it.judged());
         assert!(judged.is_some_and(|(ms, name)| near(ms, 5.0) && name == "maximum"));
-        assert_eq!(of(&times[..4]), None);
-    }
-
-    #[test]
-    fn a_hundred_items_have_a_percentile() {
-        let times = [&[0; 4][..], &[2; 198], &[5, 9]].concat();
-        let work = of(&times);
-        assert!(work.is_some_and(|it| it.p99_ms.is_some_and(|ms| near(ms, 2.0))));
-        assert!(work.is_some_and(|it| near(it.max_ms, 9.0)));
+        assert_eq!(of(&[900, 80, 70, 60]), None);
+        let many = of(&[&[0; 4][..], &[2; 198], &[5, 9]].concat());
+        assert!(many.is_some_and(|it| it.p99_ms.is_some_and(|ms| near(ms, 2.0))));
+        assert!(many.is_some_and(|it| near(it.max_ms, 9.0)));
     }
 
     #[test]
     fn a_rule_that_was_not_reached_is_not_broken() {
-        let report = |verdict| Report {
+        let report = |findings: Findings| Report {
             stage: "masking",
             command: Vec::new(),
             scans: 8,
-            rules: vec![Judged {
-                rule: Rule::Resumes,
-                section: Rule::Resumes.section(),
-                says: Rule::Resumes.says(),
-                verdict,
-            }],
+            rules: findings.judged(),
             work: None,
             answers: None,
             own_work: None,
             deviation: None,
         };
-        let not_reached = report(Verdict::NotReached);
+        let not_reached = report(Findings::default());
         assert!(!not_reached.conforms() && not_reached.broken() == 0);
-        assert_eq!(report(Verdict::Broken(Vec::new())).broken(), 1);
+        let mut findings = Findings::default();
+        findings.broken(Rule::Resumes, "it has a gap");
+        assert_eq!(report(findings).broken(), 1);
     }
 }

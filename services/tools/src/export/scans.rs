@@ -340,15 +340,12 @@ mod tests {
         only(&early, 0.0, "up to 0.500 ms away");
         let mut far = scan();
         (far.geometry.range_offset_m, far.geometry.doppler_s) = (-0.31, 0.04);
-        only(
-            &far,
-            0.0,
-            "with --set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04",
-        );
+        let constants = "--set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04";
+        only(&far, 0.0, constants);
         only(
             &whole,
             0.0025,
-            "with --set dataset.azimuth_eccentricity_rad=0.0025",
+            "--set dataset.azimuth_eccentricity_rad=0.0025",
         );
         let mut rising = scan();
         rising.flags[0] |= flag::CHIRP_KNOWN;

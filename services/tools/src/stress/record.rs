@@ -214,17 +214,10 @@ mod tests {
 
     /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose
     /// 10 ms later.
-    fn pose(seq: u64, published: u64, due_ms: i64, late_ms: i64) -> PoseHeader {
-        let item = Item {
-            seq,
-            published,
-            due_ns: due_ms * MS,
-            ..Item::default()
-        };
-        let mut pose = PoseHeader {
-            item,
-            ..PoseHeader::default()
-        };
+    fn pose([seq, published]: [u64; 2], due_ms: i64, late_ms: i64) -> PoseHeader {
+        let mut pose = PoseHeader::default();
+        (pose.item.seq, pose.item.published) = (seq, published);
+        pose.item.due_ns = due_ms * MS;
         let published_ns = (due_ms + late_ms) * MS;
         pose.item.hop_mut(StageId::RadarReplay).published_ns = published_ns;
         let sink = pose.item.hop_mut(StageId::PoseIntegration);
@@ -240,6 +233,12 @@ mod tests {
         recorder.finish(250 * MS, end_ms * MS)
     }
 
+    /// The counts: due, posed, dropped, never and unseen.
+    fn counts(recorded: &RunLatency) -> [u64; 5] {
+        let it = recorded.counts;
+        [it.due, it.posed, it.dropped, it.never, it.unseen]
+    }
+
     fn near(a: Option<f64>, b: f64) -> bool {
         a.is_some_and(|a| (a - b).abs() <= 2e-3 * b)
     }
@@ -247,37 +246,27 @@ mod tests {
     #[test]
     fn a_source_that_stood_still_shows_although_its_service_time_does_not() {
         // The source stops for a second: scan 2 is published late, scans 3 to 5 are dropped.
-        let poses = [
-            pose(0, 0, 0, 0),
-            pose(1, 1, 250, 0),
-            pose(2, 2, 500, 1000),
-            pose(3, 6, 1500, 10),
-        ];
-        let recorded = recorded(&poses, 1, 1600);
+        let (on_time, late) = ([pose([0, 0], 0, 0), pose([1, 1], 250, 0)], 1000);
+        let after = [pose([2, 2], 500, late), pose([3, 6], 1500, 10)];
+        let recorded = recorded(&[on_time, after].concat(), 1, 1600);
         assert!(near(recorded.sensor_to_pose.max_ms, 1010.0), "{recorded:?}");
         assert!(near(recorded.closed_loop.max_ms, 10.0));
-        assert_eq!((recorded.counts.due, recorded.counts.dropped), (7, 3));
+        assert_eq!(counts(&recorded), [7, 4, 3, 0, 0]);
     }
 
     #[test]
     fn a_dropped_scan_counts_until_the_pose_that_replaces_it() {
-        let poses = [pose(0, 0, 0, 0), pose(1, 4, 1000, 0)];
-        let recorded = recorded(&poses, 1, 1100);
-        let of: Vec<_> = recorded
-            .timeline
-            .iter()
-            .map(|it| (it.due_s, it.latency_ms))
-            .collect();
-        assert_eq!(
-            of,
-            [
-                (0.0, 10.0),
-                (0.25, 760.0),
-                (0.5, 510.0),
-                (0.75, 260.0),
-                (1.0, 10.0)
-            ]
-        );
+        let recorded = recorded(&[pose([0, 0], 0, 0), pose([1, 4], 1000, 0)], 1, 1100);
+        let timeline = recorded.timeline.iter();
+        let latency_ms: Vec<_> = timeline.map(|it| (it.due_s, it.latency_ms)).collect();
+        let expected = [
+            (0.0, 10.0),
+            (0.25, 760.0),
+            (0.5, 510.0),
+            (0.75, 260.0),
+            (1.0, 10.0),
+        ];
+        assert_eq!(latency_ms, expected);
         assert!(near(recorded.sensor_to_pose.max_ms, 760.0));
         assert!(near(recorded.posed.max_ms, 10.0));
         assert_eq!(recorded.posed.samples, 2);
@@ -286,45 +275,22 @@ mod tests {
     #[test]
     fn scans_of_a_burst_are_due_at_once() {
         // Two bursts of three; of the second one the last alone has a pose.
-        let poses = [pose(0, 2, 0, 0), pose(1, 5, 750, 0)];
-        let recorded = recorded(&poses, 3, 800);
+        let recorded = recorded(&[pose([0, 2], 0, 0), pose([1, 5], 750, 0)], 3, 800);
         assert_eq!(recorded.counts.dropped, 2);
-        assert!(
-            recorded.timeline[1..]
-                .iter()
-                .all(|it| it.latency_ms == 10.0)
-        );
+        let mut later = recorded.timeline[1..].iter();
+        assert!(later.all(|it| it.latency_ms == 10.0));
     }
 
     #[test]
-    fn scans_without_any_later_pose_count_until_the_end() {
-        let recorded = recorded(&[pose(0, 0, 0, 0)], 1, 1000);
-        assert_eq!((recorded.counts.due, recorded.counts.never), (4, 3));
-        assert!(near(recorded.sensor_to_pose.max_ms, 750.0));
-    }
-
-    #[test]
-    fn poses_outside_the_time_or_sent_again_do_not_count() {
-        let poses = [
-            pose(0, 0, -250, 0),
-            pose(1, 1, 0, 0),
-            pose(1, 1, 0, 0),
-            pose(2, 2, 250, 0),
-        ];
-        let recorded = recorded(&poses, 1, 200);
-        assert_eq!((recorded.counts.due, recorded.counts.posed), (1, 1));
-    }
-
-    #[test]
-    fn a_pose_that_was_missed_is_no_dropped_scan() {
-        let recorded = recorded(&[pose(0, 0, 0, 0), pose(3, 4, 1000, 0)], 1, 1100);
-        let Counts {
-            due,
-            posed,
-            dropped,
-            unseen,
-            ..
-        } = recorded.counts;
-        assert_eq!((due, posed, dropped, unseen), (3, 2, 1, 2));
+    fn scans_count_once_within_the_time_and_until_its_end_without_a_later_pose() {
+        let alone = recorded(&[pose([0, 0], 0, 0)], 1, 1000);
+        assert_eq!(counts(&alone), [4, 1, 3, 3, 0]);
+        assert!(near(alone.sensor_to_pose.max_ms, 750.0));
+        let again = pose([1, 1], 0, 0);
+        let poses = [pose([0, 0], -250, 0), again, again, pose([2, 2], 250, 0)];
+        assert_eq!(counts(&recorded(&poses, 1, 200))[..2], [1, 1]);
+        // A pose that was missed is no dropped scan.
+        let missed = recorded(&[pose([0, 0], 0, 0), pose([3, 4], 1000, 0)], 1, 1100);
+        assert_eq!(counts(&missed), [3, 2, 1, 0, 2]);
     }
 }

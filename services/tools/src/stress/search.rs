@@ -181,40 +181,22 @@ pub fn step_duration(scenario: Duration, rate_hz: f64) -> Duration {
 mod tests {
     use super::*;
 
-    /// The result for a limit, and the levels that were tried.
-    fn found(limit: u32, most: u32) -> (Found, Vec<u32>) {
-        let mut tried = Vec::new();
-        let passes = |level| {
-            tried.push(level);
-            Ok::<_, ()>(level <= limit)
-        };
-        let found = largest(1, most, |level| level * 2, passes);
-        (found.unwrap_or_default(), tried)
-    }
-
-    fn between(best: Option<u32>, failed: Option<u32>) -> Found {
-        Found { best, failed }
-    }
-
     #[test]
-    fn the_largest_level_that_passes_is_found_and_the_next_one_has_failed() {
-        for limit in 1..40 {
-            let expected = between(Some(limit), Some(limit + 1));
-            assert_eq!(found(limit, 1000).0, expected);
-        }
-        assert_eq!(found(5, 1000).1, [1, 2, 4, 8, 6, 5]);
-    }
-
-    #[test]
-    fn nothing_is_tried_above_the_most_and_a_first_one_that_fails_is_the_last() {
-        assert_eq!(found(100, 6), (between(Some(6), None), vec![1, 2, 4, 6]));
-        assert_eq!(found(0, 6), (between(None, Some(1)), vec![1]));
-    }
-
-    fn step(level: f64, passed: bool) -> Step {
-        Step {
-            passed,
-            ..Step::not_started(level, "p99_ms 300.0, limit 250".to_owned())
+    fn the_largest_level_that_passes_is_found() {
+        for (limit, most, best, failed, levels) in [
+            (5, 1000, Some(5), Some(6), &[1, 2, 4, 8, 6, 5][..]),
+            (100, 6, Some(6), None, &[1, 2, 4, 6]),
+            (0, 6, None, Some(1), &[1]),
+            (7, 1000, Some(7), Some(8), &[1, 2, 4, 8, 6, 7]),
+        ] {
+            let mut tried = Vec::new();
+            let passes = |level| {
+                tried.push(level);
+                Ok::<_, ()>(level <= limit)
+            };
+            let found = largest(1, most, |level| level * 2, passes);
+            assert_eq!(found, Ok(Found { best, failed }));
+            assert_eq!(tried, levels);
         }
     }
 
@@ -233,19 +215,22 @@ mod tests {
 
     #[test]
     fn a_level_that_fails_once_is_tried_again_and_one_that_fails_twice_has_failed() {
-        let mut noted = Vec::new();
-        let mut note = |line: &str| noted.push(line.to_owned());
+        let mut noted = 0;
+        let mut note = |_: &str| noted += 1;
         let mut steps = Steps::new("scans/s", &mut note);
-        let mut hiccups = [false, true].into_iter();
-        let passes = steps.passes(|| Ok(step(4.0, hiccups.next().unwrap_or_default())));
-        assert!(passes.is_ok_and(|passes| passes));
-        let passes = steps.passes(|| Ok(step(8.0, false)));
-        assert!(passes.is_ok_and(|passes| !passes));
-        let tried: Vec<_> = steps.all.iter().map(|it| (it.level, it.passed)).collect();
-        assert_eq!(
-            tried,
-            [(4.0, false), (4.0, true), (8.0, false), (8.0, false)]
-        );
-        assert_eq!(noted.len(), 4);
+        let mut results = [false, true, false, false].into_iter();
+        let mut step = || {
+            let reason = "p99_ms 300.0, limit 250".to_owned();
+            let passed = results.next().unwrap_or_default();
+            Ok(Step {
+                passed,
+                ..Step::not_started(4.0, reason)
+            })
+        };
+        assert!(steps.passes(&mut step).is_ok_and(|passes| passes));
+        assert!(steps.passes(&mut step).is_ok_and(|passes| !passes));
+        let tried: Vec<_> = steps.all.iter().map(|it| it.passed).collect();
+        assert_eq!(tried, [false, true, false, false]);
+        assert_eq!(noted, 4);
     }
 }

@@ -172,13 +172,8 @@ mod tests {
     use super::*;
 
     fn item(seq: u64, can_open: bool) -> Observed {
-        let header = MaskedHeader {
-            item: Item {
-                seq,
-                ..Item::default()
-            },
-            ..MaskedHeader::default()
-        };
+        let mut header = MaskedHeader::default();
+        header.item.seq = seq;
         Observed {
             inputs: Vec::new(),
             output: Recorded::of::<Masked>(&header, &[], 0),
@@ -187,30 +182,29 @@ mod tests {
         }
     }
 
+    /// Masking does not jump within the lag of a break, and refinement does not jump.
     #[test]
     fn a_stream_is_opened_where_the_results_depend_on_nothing_that_was_not_seen() {
-        let stream = Renumbering::new(StageId::Masking, 2);
-        assert_eq!(stream.entry(&item(7, false)), Entry::IsLeftOut);
-        assert_eq!(stream.entry(&item(7, true)), Entry::Opens);
-        let begun = Renumbering {
-            last: Some((7, 5)),
-            ..stream
-        };
-        assert_eq!(begun.entry(&item(8, false)), Entry::Continues);
-        assert_eq!(begun.entry(&item(9, true)), Entry::Opens);
-    }
-
-    #[test]
-    fn masking_does_not_jump_within_the_lag_of_a_break_and_refinement_not_at_all() {
-        let stream = |stage, broken_at| Renumbering {
-            last: Some((7, 5)),
-            broken_at: Some(broken_at),
-            ..Renumbering::new(stage, 2)
-        };
-        let entry = |stage, broken_at| stream(stage, broken_at).entry(&item(20, true));
-        assert_eq!(entry(StageId::Masking, 4), Entry::NeedsNewLife);
-        assert_eq!(entry(StageId::Masking, 3), Entry::Opens);
-        assert_eq!(entry(StageId::RotationSearch, 5), Entry::Opens);
-        assert_eq!(entry(StageId::Refinement, 0), Entry::NeedsNewLife);
+        use Entry::{Continues, IsLeftOut, NeedsNewLife, Opens};
+        use StageId::{Masking, Refinement, RotationSearch};
+        let begun = Some((7, 5));
+        for (stage, last, broken_at, (seq, can_open), entry) in [
+            (Masking, None, None, (7, false), IsLeftOut),
+            (Masking, None, None, (7, true), Opens),
+            (Masking, begun, None, (8, false), Continues),
+            (Masking, begun, None, (9, true), Opens),
+            (Masking, begun, Some(4), (20, true), NeedsNewLife),
+            (Masking, begun, Some(3), (20, true), Opens),
+            (RotationSearch, begun, Some(5), (20, true), Opens),
+            (Refinement, begun, Some(0), (20, true), NeedsNewLife),
+        ] {
+            let stream = Renumbering {
+                last,
+                broken_at,
+                ..Renumbering::new(stage, 2)
+            };
+            let found = stream.entry(&item(seq, can_open));
+            assert_eq!(found, entry, "{stream:?}");
+        }
     }
 }

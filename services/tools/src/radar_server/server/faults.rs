@@ -94,22 +94,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_of_lost_azimuths_is_as_asked_for() {
+    fn faults_come_in_every_nth_scan_and_in_the_share_that_was_asked_for() {
         let faults = Faults {
             lost: 0.01,
+            reset_every: Some(3),
             ..Faults::default()
         };
         let rows = (0..1000).flat_map(|scan| (0..400).map(move |row| (scan, row)));
         let lost = rows.filter(|(scan, row)| faults.loses(*scan, *row)).count();
         assert!((3800..4200).contains(&lost), "{lost}");
-    }
-
-    #[test]
-    fn faults_come_in_every_nth_scan() {
-        let faults = Faults {
-            reset_every: Some(3),
-            ..Faults::default()
-        };
         let resets: Vec<_> = (0..9).filter(|scan| faults.resets(*scan)).collect();
         assert_eq!(resets, [2, 5, 8]);
         assert!(!faults.stalls(2) && !faults.garbles(2, 100));

@@ -171,10 +171,6 @@ mod tests {
         report::Report,
     };
 
-    fn outcome(scenario: Scenario) -> ScenarioOutcome {
-        ScenarioOutcome::new(scenario, Duration::from_secs(1))
-    }
-
     #[test]
     fn a_figure_on_its_limit_keeps_it_and_a_missing_one_does_not() {
         assert!(Check::at_most("p99_ms", Some(100.0), 100.0).passed);
@@ -186,59 +182,52 @@ mod tests {
         assert_eq!(sentence, "p99_ms 312.4, limit 100");
     }
 
-    fn check(passed: bool) -> Check {
-        Check {
-            key: "p99_ms",
-            measured: Some(300.0),
-            limit: 250.0,
-            passed,
+    /// An outcome with faults after which the run has recovered, and these measured figures, of
+    /// which at most 250 is allowed.
+    fn outcome(scenario: Scenario, faults: usize, measured: &[f64]) -> ScenarioOutcome {
+        let fault = Fault {
+            kind: FaultKind::Kill,
+            stage: "masking",
+            at_s: 1.5,
+            recovery_ms: Some(40.0),
+        };
+        let checks = measured
+            .iter()
+            .map(|ms| Check::at_most("p99_ms", Some(*ms), 250.0));
+        ScenarioOutcome {
+            checks: checks.collect(),
+            figures: Some(Figures {
+                faults: vec![fault; faults],
+                ..Figures::default()
+            }),
+            ..ScenarioOutcome::new(scenario, Duration::from_secs(1))
         }
     }
 
     #[test]
-    fn a_scenario_fails_by_one_limit_or_by_a_problem() {
-        let mut steady = outcome(Scenario::Steady);
-        assert_eq!(steady.clone().judged().verdict, Verdict::NotJudged);
-        steady.checks = vec![check(true)];
-        assert_eq!(steady.clone().judged().verdict, Verdict::Passed);
-        steady.checks.push(check(false));
-        let failed = steady.judged();
-        assert_eq!(failed.verdict, Verdict::Failed);
+    fn a_scenario_is_judged_by_its_limits_or_by_its_recovery() {
+        for (scenario, faults, measured, verdict) in [
+            (Scenario::Steady, 0, &[][..], Verdict::NotJudged),
+            (Scenario::Steady, 0, &[200.0], Verdict::Passed),
+            (Scenario::Steady, 0, &[200.0, 300.0], Verdict::Failed),
+            (Scenario::Kills, 1, &[], Verdict::Passed),
+            (Scenario::SlowStage, 0, &[], Verdict::NotJudged),
+        ] {
+            let judged = outcome(scenario, faults, measured).judged();
+            assert_eq!(
+                judged.verdict, verdict,
+                "{scenario}, {faults}, {measured:?}"
+            );
+        }
+        let failed = outcome(Scenario::Steady, 0, &[300.0]).judged();
         assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
         assert!(Report::of(vec![failed]).has(Verdict::Failed));
     }
 
-    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> ScenarioOutcome {
-        let fault = |recovery_ms: &Option<f64>| Fault {
-            kind: FaultKind::Kill,
-            stage: "masking",
-            at_s: 1.5,
-            recovery_ms: *recovery_ms,
-        };
-        ScenarioOutcome {
-            figures: Some(Figures {
-                faults: faults.iter().map(fault).collect(),
-                ..Figures::default()
-            }),
-            ..outcome(scenario)
-        }
-    }
-
     #[test]
-    fn a_fault_without_limits_passes_by_recovery_alone() {
-        let mut kills = with_faults(Scenario::Kills, &[Some(40.0)]);
-        assert_eq!(kills.clone().judged().verdict, Verdict::Passed);
-        kills.problem = Some("no pose has followed the fault of masking".to_owned());
-        assert_eq!(kills.judged().verdict, Verdict::Failed);
-    }
-
-    #[test]
-    fn without_any_fault_there_is_no_recovery_to_pass_by() {
-        let slow = with_faults(Scenario::SlowStage, &[]);
-        assert_eq!(slow.judged().verdict, Verdict::NotJudged);
+    fn a_problem_fails_a_scenario_and_an_omission_is_no_verdict() {
         let omitted = Some("nothing was done".to_owned());
-        let mut kills = with_faults(Scenario::Kills, &[]);
-        kills.checks = vec![check(true)];
+        let mut kills = outcome(Scenario::Kills, 0, &[200.0]);
         let not_done = kills.clone().judged().unless(omitted.clone());
         assert_eq!(not_done.verdict, Verdict::NotCarriedOut);
         assert!(not_done.sentence().contains("nothing was done"));
