@@ -126,9 +126,7 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
     let steady = ["--scenario", "steady", "--duration", "3"];
     let kept = [&steady[..], &["--set", "budget.max_ms=60000"]].concat();
     assert_eq!(stress.run(&kept).status.code(), Some(0));
-    for name in ["steady.csv", "config.toml"] {
-        assert!(stress.out().join(name).exists(), "{name} is missing");
-    }
+    assert!(stress.out().join("config.toml").exists());
     let outcome = stress.outcome();
     assert_eq!(outcome["verdict"], "passed");
     let counts = &outcome["figures"]["counts"];
@@ -168,16 +166,8 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let figures = &stress.outcome()["figures"];
     assert_eq!(figures["restarts"]["radar-replay"], 1);
     assert!(number(&figures["faults"][0]["recovery_ms"]) > 0.0);
-    let csv = fs::read_to_string(stress.out().join("kills.csv")).unwrap();
-    let due_s = csv
-        .lines()
-        .skip(1)
-        .filter_map(|line| line.split(',').next());
-    let due_s: Vec<f64> = due_s.map(|due_s| due_s.parse().unwrap()).collect();
-    for pair in due_s.windows(2) {
-        let gap_s = pair[1] - pair[0];
-        assert!((gap_s - PERIOD_S).abs() < 0.01, "{gap_s} s in {due_s:?}");
-    }
+    // 6 s of 4 scans/s: also those of the time without a source.
+    assert_eq!(figures["counts"]["due"], 24);
     stress.assert_nothing_left("kills");
 }
 

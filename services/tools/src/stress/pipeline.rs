@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, Pose, PoseHeader, StageId, WitnessCounts, flag};
+use gyre_messages::{Footprint, Pose, PoseHeader, StageId};
 use gyre_run::{PlayedFault, Scenario};
 use gyre_stage::{
     StageError, clock,
@@ -110,6 +110,7 @@ pub fn measure(
     let ended_load = loads.iter_mut().find_map(Helper::has_died);
     drop(loads);
     let processes = session.processes.costs();
+    let motions = session.recorder.motions;
     let latency = session.recorder.finish(session.period_ns, clock::now_ns());
     let faults = session.faults.map(Faults::finish);
     let (faults, omitted) = faults.unwrap_or_default();
@@ -140,7 +141,7 @@ pub fn measure(
             latency,
             faults,
             witness_faults,
-            motions: session.motions,
+            motions,
             restarts: serde_json::from_value(summary["restarts"].clone()).unwrap_or_default(),
             wakes_caught_late,
             processes,
@@ -190,13 +191,7 @@ struct Session {
     processes: Sampler,
     faults: Option<Faults>,
     witness: Option<WitnessFaults>,
-    /// The basis of the measured motions in the first turn of the recording: where the recording
-    /// starts again, the vehicle jumps.
-    motions: WitnessCounts,
-    turn_end: u64,
-    newest: u64,
     period_ns: i64,
-    began_ns: i64,
     ends_ns: i64,
     sampled: Instant,
 }
@@ -211,27 +206,23 @@ impl Session {
     ) -> Self {
         let began_ns = clock::now_ns();
         let ends_ns = began_ns + setup.duration.as_nanos() as i64;
-        let faults = setup.faults.clone();
+        let (faults, turn_end) = (setup.faults.clone(), tested.turn.end as u64);
         let clock = tested.first_ns.map(|first_ns| PlayedClock {
             first_ns,
             period_ns: tested.period.as_nanos() as i64,
             rate: tested.relative_rate(setup.rate_hz),
-            end: tested.turn.end as u64,
+            end: turn_end,
         });
         let clock = clock.filter(|_| !setup.played.is_empty());
         let witness =
             |clock| WitnessFaults::new(setup.played.clone(), tested.others, clock, began_ns);
-        let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst);
+        let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst, turn_end);
         recorder.add(newest);
         Self {
             recorder,
             processes: Sampler::new(supervisor, out),
             faults: faults.map(|faults| Faults::new(faults, began_ns, setup.duration)),
             witness: clock.map(witness),
-            motions: WitnessCounts::default(),
-            turn_end: tested.turn.end as u64,
-            newest: newest.item.seq,
-            began_ns,
             period_ns: (1e9 / setup.rate_hz) as i64,
             ends_ns,
             sampled: Instant::now(),
@@ -262,13 +253,6 @@ impl Session {
         }
         if let Some(faults) = &mut self.witness {
             faults.pose(pose);
-        }
-        let item = &pose.item;
-        let is_new = item.seq > self.newest && !item.is(flag::BREAK);
-        self.newest = self.newest.max(item.seq);
-        let is_measured = (self.began_ns..self.ends_ns).contains(&item.due_ns);
-        if is_new && is_measured && item.scan < self.turn_end {
-            self.motions.add(&pose.motion.refinement);
         }
     }
 

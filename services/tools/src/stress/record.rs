@@ -8,7 +8,7 @@ mod distribution;
 
 use std::ops::Range;
 
-use gyre_messages::{Item, PoseHeader, StageId};
+use gyre_messages::{Item, PoseHeader, StageId, WitnessCounts, flag};
 use gyre_run::latency::{Durations, LatencyMeter};
 use serde::Serialize;
 
@@ -41,17 +41,6 @@ impl Counts {
     }
 }
 
-/// A scan on the timeline.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Sample {
-    /// The time when the scan was due, s since the measurement began.
-    pub due_s: f64,
-    /// Time from then to its pose, or to the pose that replaced it, ms.
-    pub latency_ms: f64,
-    /// True without a pose of its own.
-    pub dropped: bool,
-}
-
 /// The hop of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hop {
@@ -76,9 +65,6 @@ pub struct RunLatency {
     /// The figure of a closed loop: from the publication of a scan to its pose.
     pub closed_loop: Distribution,
     pub hops: Vec<Hop>,
-    /// The scans in the order of their due times; written as CSV.
-    #[serde(skip)]
-    pub timeline: Vec<Sample>,
 }
 
 /// Records poses whose scans were due within a time.
@@ -94,16 +80,21 @@ pub struct Recorder {
     all: Durations,
     posed: Durations,
     closed_loop: Durations,
-    timeline: Vec<Sample>,
+    /// The basis of the motions in the first turn of the recording: where the recording starts
+    /// again, the vehicle jumps.
+    pub motions: WitnessCounts,
+    /// The end of that turn: the number of the first scan that is not in it.
+    turn_end: u64,
 }
 
 impl Recorder {
     /// Records the scans that are due within `window`, `CLOCK_MONOTONIC`, ns. `burst` scans become
     /// due at once.
-    pub fn new(window: Range<i64>, burst: u64) -> Self {
+    pub fn new(window: Range<i64>, burst: u64, turn_end: u64) -> Self {
         Self {
             window,
             burst,
+            turn_end,
             ..Self::default()
         }
     }
@@ -123,8 +114,11 @@ impl Recorder {
             return;
         }
         self.counts.posed += 1;
-        self.sample(item.due_ns, posed_ns, false);
+        self.sample(item.due_ns, posed_ns);
         self.meter.add(pose);
+        if !item.is(flag::BREAK) && item.scan < self.turn_end {
+            self.motions.add(&pose.motion.refinement);
+        }
         self.posed.add(posed_ns - item.due_ns);
         let published_ns = item.hops[StageId::RadarReplay as usize].published_ns;
         self.closed_loop.add(posed_ns - published_ns);
@@ -144,7 +138,7 @@ impl Recorder {
             let due_ns = self.due_between(before, item, number);
             if self.window.contains(&due_ns) {
                 self.counts.dropped += 1;
-                self.sample(due_ns, posed_ns, true);
+                self.sample(due_ns, posed_ns);
             }
         }
     }
@@ -157,14 +151,9 @@ impl Recorder {
         before.due_ns + ((item.due_ns - before.due_ns) as f64 * share) as i64
     }
 
-    fn sample(&mut self, due_ns: i64, until_ns: i64, dropped: bool) {
+    fn sample(&mut self, due_ns: i64, until_ns: i64) {
         self.counts.due += 1;
         self.all.add(until_ns - due_ns);
-        self.timeline.push(Sample {
-            due_s: (due_ns - self.window.start) as f64 * 1e-9,
-            latency_ms: (until_ns - due_ns) as f64 * 1e-6,
-            dropped,
-        });
     }
 
     /// Returns whether a scan that was due in the time, one each `period_ns`, may still get its
@@ -185,7 +174,7 @@ impl Recorder {
             if due_ns >= self.window.start {
                 self.counts.dropped += 1;
                 self.counts.never += 1;
-                self.sample(due_ns, now_ns, true);
+                self.sample(due_ns, now_ns);
             }
             due_ns += period_ns;
         }
@@ -201,7 +190,6 @@ impl Recorder {
             posed: Distribution::of(&self.posed),
             closed_loop: Distribution::of(&self.closed_loop),
             hops: self.meter.stages().map(hop).collect(),
-            timeline: self.timeline,
         }
     }
 }
@@ -228,7 +216,7 @@ mod tests {
     }
 
     fn recorded(poses: &[PoseHeader], burst: u64, end_ms: i64) -> RunLatency {
-        let mut recorder = Recorder::new(0..end_ms * MS, burst);
+        let mut recorder = Recorder::new(0..end_ms * MS, burst, u64::MAX);
         poses.iter().for_each(|pose| recorder.add(pose));
         recorder.finish(250 * MS, end_ms * MS)
     }
@@ -257,16 +245,9 @@ mod tests {
     #[test]
     fn a_dropped_scan_counts_until_the_pose_that_replaces_it() {
         let recorded = recorded(&[pose([0, 0], 0, 0), pose([1, 4], 1000, 0)], 1, 1100);
-        let timeline = recorded.timeline.iter();
-        let latency_ms: Vec<_> = timeline.map(|it| (it.due_s, it.latency_ms)).collect();
-        let expected = [
-            (0.0, 10.0),
-            (0.25, 760.0),
-            (0.5, 510.0),
-            (0.75, 260.0),
-            (1.0, 10.0),
-        ];
-        assert_eq!(latency_ms, expected);
+        assert_eq!(counts(&recorded), [5, 2, 3, 0, 0]);
+        // 10, 10, 260, 510 and 760 ms.
+        assert!(near(recorded.sensor_to_pose.p50_ms, 260.0));
         assert!(near(recorded.sensor_to_pose.max_ms, 760.0));
         assert!(near(recorded.posed.max_ms, 10.0));
         assert_eq!(recorded.posed.samples, 2);
@@ -277,8 +258,7 @@ mod tests {
         // Two bursts of three; of the second one the last alone has a pose.
         let recorded = recorded(&[pose([0, 2], 0, 0), pose([1, 5], 750, 0)], 3, 800);
         assert_eq!(recorded.counts.dropped, 2);
-        let mut later = recorded.timeline[1..].iter();
-        assert!(later.all(|it| it.latency_ms == 10.0));
+        assert!(near(recorded.sensor_to_pose.max_ms, 10.0));
     }
 
     #[test]

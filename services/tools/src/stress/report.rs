@@ -1,4 +1,4 @@
-//! The report: `report.json`, and the latency of each scenario scan by scan.
+//! The report: `report.json`.
 
 mod figures;
 mod outcome;
@@ -7,8 +7,6 @@ use std::{fs, path::Path};
 
 use gyre_terminal::Failure;
 use serde::Serialize;
-
-use crate::stress::record::RunLatency;
 
 pub use figures::Figures;
 pub use outcome::{Check, ScenarioOutcome, Verdict};
@@ -60,30 +58,11 @@ impl Report {
         self.outcomes.iter().any(|it| it.verdict == verdict)
     }
 
-    /// Writes all its files.
+    /// Writes `report.json`.
     pub fn write(&self, out: &Path) -> Result<(), Failure> {
-        let write = |name: &str, text: String| {
-            let path = out.join(name);
-            fs::write(&path, text)
-                .map_err(|error| format!("cannot use {}: {error}", path.display()))
-        };
-        write("report.json", serde_json::to_string_pretty(self)?)?;
-        for outcome in &self.outcomes {
-            if let Some(figures) = &outcome.figures
-                && !figures.latency.timeline.is_empty()
-            {
-                write(&format!("{}.csv", outcome.scenario), csv(&figures.latency))?;
-            }
-        }
+        let path = out.join("report.json");
+        fs::write(&path, serde_json::to_string_pretty(self)?)
+            .map_err(|error| format!("cannot use {}: {error}", path.display()))?;
         Ok(())
     }
-}
-
-fn csv(latency: &RunLatency) -> String {
-    let rows = latency.timeline.iter().map(|it| {
-        let (due_s, latency_ms, dropped) = (it.due_s, it.latency_ms, it.dropped);
-        format!("{due_s:.6},{latency_ms:.6},{dropped}\n")
-    });
-    let header = "due_s,latency_ms,dropped\n".to_owned();
-    std::iter::once(header).chain(rows).collect()
 }
