@@ -2,7 +2,6 @@
 //! of a run, in RADIATE's format (`repaired`).
 
 mod arguments;
-mod places;
 mod repaired;
 mod scans;
 mod source;
@@ -23,9 +22,8 @@ use gyre_ros2_messages::{
 use gyre_terminal::{Failure, print};
 
 pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
-use places::Place;
 use scans::ScanWriter;
-use source::Source;
+use source::{Place, Source};
 
 /// Writes the bag or the dataset.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {

@@ -37,10 +37,9 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if scans.is_empty() {
         return Err(format!("{} has no scan to play", configuration.data()).into());
     }
-    let signals = Signals::install()?;
+    let stop = stop()?;
     let scans_of = format!("{} scans of {}", scans.len(), configuration.data());
     let audience = announced(&scans_of, arguments)?;
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let playback = playback(arguments, scans);
     let played = server::serve(audience, dataset.as_mut(), &playback, &stop)?;
     let (scans, azimuths, datagrams) = (played.scans, played.lost_azimuths, played.lost_datagrams);
@@ -62,19 +61,23 @@ fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     Ok(configuration.streaming(given.data.as_deref()))
 }
 
+/// Returns a function that returns whether a signal has asked for the end.
+fn stop() -> Result<impl Fn() -> bool, Failure> {
+    let signals = Signals::install()?;
+    Ok(move || signals.sleep(Duration::ZERO).unwrap_or(true))
+}
+
 /// Records the data of a radar.
 fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let interface = match radar.starts_with("udp://") {
         true => arguments.interface.to_string(),
         false => String::new(),
     };
-    let address = Address::parse(radar, &interface)?;
-    let signals = Signals::install()?;
+    let (address, stop) = (Address::parse(radar, &interface)?, stop()?);
     print::note(format_args!(
         "gyre: capturing the radar at {address} into {}",
         file.display()
     ));
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let captured = capture::record(&address, file, &stop)?;
     print::line(format_args!(
         "captured {} bytes in {} records",
@@ -88,9 +91,8 @@ fn play(
     capture: Capture,
     arguments: &RadarServerArguments,
 ) -> Result<ExitCode, Failure> {
-    let signals = Signals::install()?;
+    let stop = stop()?;
     let audience = announced(&data.display().to_string(), arguments)?;
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let played = capture::play(audience, capture, arguments.rate.factor(), &stop)?;
     print::line(format_args!(
         "played {} bytes in {} records",

@@ -6,30 +6,31 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::maps::map;
 use gyre_configuration::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, UncertainMotion};
 use gyre_journal::{
     self as journal,
     objects::{LoggedObjects, listed},
 };
 use gyre_mapping::grid;
 use gyre_messages::{
-    Correction, CorrectionHeader, Message, Objects, ObjectsHeader, Pose as PoseTopic, PoseHeader,
-    flag,
+    Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
+    PoseHeader, flag, outcome,
 };
 use gyre_radar::{LostAzimuths, Trajectory};
-use gyre_recording::Recording;
-use gyre_recording::bags::{BagWriter, Kept};
+use gyre_recording::{
+    Recording,
+    bags::{BagWriter, Kept},
+};
 use gyre_ros2_messages::{
     Mounting,
-    frames::{Frames, occupancy_grid},
+    frames::{Frames, Interval, occupancy_grid},
 };
 use gyre_slam::RecordReader;
 use gyre_terminal::{Failure, print};
 
-use crate::export::places::Place;
+use crate::maps::map;
 
 /// The source of an export.
 pub struct Source {
@@ -43,6 +44,49 @@ enum Kind {
     /// A recording of a run.
     Recording,
     Dataset,
+}
+
+/// A pose of the radar with what led to it.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The number of the scan in the run.
+    pub seq: u64,
+    /// Time of the scan, ns since 1970.
+    pub stamp_ns: i64,
+    /// The pose in the frame of the first scan.
+    pub pose: UncertainMotion,
+    /// The motion from the previous scan; `None` where the chain of motions begins.
+    pub since: Option<Interval>,
+    /// The pose of the odometry frame in the map frame, with SLAM.
+    pub map_from_odometry: Option<Pose>,
+    /// The objects, of a run that tracks them; `None` where they are not known.
+    pub objects: Option<Vec<ListedObject>>,
+}
+
+impl Place {
+    /// Returns the place of a pose of a run; `None` for the end of the stream.
+    pub fn of(pose: &PoseHeader) -> Option<Self> {
+        if pose.item.is(flag::END) {
+            return None;
+        }
+        let motion = pose.motion.motion();
+        let since = Interval {
+            motion: UncertainMotion {
+                motion: motion.motion,
+                covariance: motion.covariance,
+            },
+            duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
+        };
+        Some(Self {
+            seq: pose.item.seq,
+            stamp_ns: pose.item.stamp_ns,
+            pose: pose.pose(),
+            since: (!pose.item.is(flag::BREAK)).then_some(since),
+            map_from_odometry: None,
+            objects: None,
+        })
+    }
 }
 
 /// The poses of a run, in order.

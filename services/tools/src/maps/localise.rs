@@ -1,11 +1,11 @@
 //! `gyre localise`: finds a drive in a map.
 
 mod counts;
-pub mod fixes;
 mod scans;
 pub mod searched_map;
 
 use std::{
+    fmt::Write,
     io::IsTerminal,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -15,11 +15,11 @@ use std::{
 use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_datasets::write_tum;
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, covariance, xy_yaw};
 use gyre_mapping::{Map, Overlay, map_png};
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out};
-use gyre_slam::localisation::{Localisation, Localiser, Observation, Status};
+use gyre_slam::localisation::{Localisation, Localiser, Map as KeptMap, Observation, Status};
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, inputs::Inputs, print};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -153,7 +153,7 @@ fn follow(
     all: &mut Found,
     configuration: &Configuration,
 ) -> Result<(), Failure> {
-    fixes.append(fixes::HEADER)?;
+    fixes.append(HEADER)?;
     all.pieces.push(Vec::new());
     let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
     while let Some(scan) = scans.register_next()? {
@@ -162,7 +162,7 @@ fn follow(
         }
         let found = localiser.locate(&scan.observation);
         row.clear();
-        fixes::write_row(&scan, &found, localiser.map(), &mut row);
+        write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
         all.add(&scan, &found);
         let counts = &all.counts;
@@ -178,6 +178,42 @@ fn follow(
         bar.finish_and_clear();
     }
     Ok(())
+}
+
+const HEADER: &str = "scan,stamp_ns,status,x_m,y_m,yaw_rad,\
+    cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,correlation,place\n";
+
+/// Writes the row of a scan to `text`, in fixed decimals, so that equal fixes give equal bytes.
+/// Unknown values are empty.
+fn write_row(scan: &RegisteredScan<'_>, found: &Localisation, map: &KeptMap, text: &mut String) {
+    let (number, stamp_ns) = (scan.number, scan.observation.stamp_ns);
+    let status = status_name(found.status);
+    let _ = write!(text, "{number},{stamp_ns},{status},");
+    let Some(fix) = &found.fix else {
+        text.push_str(",,,,,,,,,,\n");
+        return;
+    };
+    for value in xy_yaw(&fix.pose.motion) {
+        let _ = write!(text, "{value:.6},");
+    }
+    for value in covariance::pack(&fix.pose.covariance) {
+        let _ = write!(text, "{value:.12},");
+    }
+    let place = map.keyframes()[fix.keyframe].scan;
+    let _ = match found.status {
+        Status::Predicted | Status::Lost => writeln!(text, ",{place}"),
+        Status::Found | Status::Tracked => writeln!(text, "{:.6},{place}", fix.correlation),
+    };
+}
+
+/// The word for a status.
+fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Lost => "lost",
+        Status::Found => "found",
+        Status::Tracked => "tracked",
+        Status::Predicted => "predicted",
+    }
 }
 
 /// Writes the fixes as TUM, and draws them over the map.
@@ -221,7 +257,7 @@ impl Progress {
     }
 
     fn show(&mut self, done: usize, status: Status) {
-        let name = fixes::status_name(status);
+        let name = status_name(status);
         if let Some(bar) = &self.bar {
             bar.set_position(done as u64);
             bar.set_message(name);

@@ -2,7 +2,6 @@
 
 mod clients;
 mod faults;
-mod group;
 mod output;
 
 use std::{
@@ -19,7 +18,7 @@ use gyre_terminal::Failure;
 
 pub(crate) use clients::Clients;
 pub use faults::Faults;
-pub(crate) use group::Group;
+use faults::{is_nth, uniform};
 pub use gyre_colossus::{ByteOrder, ClockFormat};
 pub use output::Audience;
 pub(crate) use output::{Output, sleep_until};
@@ -28,7 +27,8 @@ pub(crate) use output::{Output, sleep_until};
 const ENCODER_COUNTS: u16 = 5600;
 /// The longest wait within a recording: longer gaps are shortened to it.
 const MAX_WAIT: Duration = Duration::from_secs(2);
-/// The bytes of a garbled message.
+/// The azimuth before which garbage is sent, and its bytes.
+const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
 
 /// The options of a playback.
@@ -159,7 +159,8 @@ impl Player<'_> {
             return false;
         }
         let faults = self.playback.faults;
-        if faults.stalls(self.played.scans) {
+        let number = self.played.scans;
+        if is_nth(number, faults.stall_every) {
             self.played.stalls += 1;
             self.started = None;
             let due = Instant::now() + Duration::from_secs_f64(faults.stall_s);
@@ -174,8 +175,8 @@ impl Player<'_> {
             self.sweep_counter = self.sweep_counter.wrapping_add(1);
             // A row that was not measured was not sent by the radar either.
             let is_measured = scan.flags[row] & flag::MEASURED != 0;
-            let is_lost =
-                matches!(self.output, Output::Clients(_)) && faults.loses(self.played.scans, row);
+            let is_lost = matches!(self.output, Output::Clients(_))
+                && uniform(number, row as u64) < faults.lost;
             if !is_measured || is_lost {
                 self.played.lost_azimuths += 1;
                 continue;
@@ -183,7 +184,7 @@ impl Player<'_> {
             self.send(&scan, row);
             if let Output::Clients(clients) = &self.output
                 && row == scan.geometry.azimuths / 2
-                && faults.resets(self.played.scans)
+                && is_nth(number, faults.reset_every)
             {
                 self.played.resets += 1;
                 clients.reset();
@@ -241,7 +242,7 @@ impl Player<'_> {
             split_seconds,
             powers: Powers::Eight(scan.row(row)),
         };
-        if faults.garbles(self.played.scans, row) {
+        if row == GARBLED && is_nth(self.played.scans, faults.garbage_every) {
             self.output.send(GARBAGE);
         }
         match &mut self.output {
