@@ -76,7 +76,6 @@ fn is_due(place: &Result<Place, Failure>, stamp_ns: i64) -> bool {
     place.as_ref().is_ok_and(|place| place.stamp_ns <= stamp_ns) || place.is_err()
 }
 
-/// The topics of a trajectory.
 struct Trajectory {
     frames: Frames,
     mounting: Mounting,

@@ -67,7 +67,6 @@ fn stop() -> Result<impl Fn() -> bool, Failure> {
     Ok(move || signals.sleep(Duration::ZERO).unwrap_or(true))
 }
 
-/// Records the data of a radar.
 fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let interface = match radar.starts_with("udp://") {
         true => arguments.interface.to_string(),
@@ -101,7 +100,6 @@ fn play(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the audience, and prints it.
 fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, Failure> {
     let (audience, address, is_public) = audience(arguments)?;
     print::note(format_args!("gyre: playing {what} as a radar at {address}"));

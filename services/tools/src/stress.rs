@@ -24,14 +24,11 @@ pub use campaign::{Options, stress};
 pub use gyre_run::Scenario;
 pub use report::{Provenance, Report};
 
-/// The pipeline that is tested.
 #[derive(Clone, Debug)]
 pub struct TestedPipeline {
-    /// The program `gyre`.
     pub program: PathBuf,
     /// The resolved configuration, whose source is a recording.
     pub configuration: PathBuf,
-    /// The folder of the report.
     pub out: PathBuf,
     /// Time between two scans of the recording.
     pub period: Duration,
@@ -42,12 +39,10 @@ pub struct TestedPipeline {
     pub others: Others,
     pub stages: Vec<StageId>,
     pub budget: Budget,
-    /// Shared memory of a run, bytes.
     pub shared_bytes: u64,
 }
 
 impl TestedPipeline {
-    /// Returns the duration of a turn of the recording, s.
     pub fn turn_s(&self) -> f64 {
         self.turn.len() as f64 * self.period.as_secs_f64()
     }
@@ -57,7 +52,6 @@ impl TestedPipeline {
         (rate_hz * self.period.as_secs_f64()).clamp(0.001, 1000.0)
     }
 
-    /// Returns the folder of the results of a run.
     pub fn run_out(&self, name: &str) -> PathBuf {
         self.out.join("runs").join(name)
     }

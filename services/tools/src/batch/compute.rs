@@ -18,33 +18,25 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::batch::{Drive, End, List, Outcome, Row, Settings, list::is_configuration};
 
-/// The command of `gyre` that computes a drive.
 pub const COMMAND: &str = "batch-drive";
 /// The longest time between two polls of the processes; the end of one is noticed at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
 /// Bytes at the end of an output that hold its last line.
 const TAIL: u64 = 1 << 16;
 
-/// A batch that is to be computed.
 #[derive(Clone, Debug)]
 pub struct Batch<'a> {
-    /// The program `gyre`.
     pub program: PathBuf,
     pub list: &'a List,
-    /// The drives of the list that are computed.
     pub drives: Vec<Drive>,
-    /// Their common settings.
     pub settings: Settings,
     /// The folder of the batch, an absolute path without links.
     pub out: PathBuf,
-    /// Runs at once.
     pub jobs: usize,
 }
 
-/// The outcomes of the drives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
-    /// The number of drives by outcome.
     pub counts: BTreeMap<Outcome, usize>,
     /// The number of drives that had been computed before.
     pub earlier: usize,

@@ -18,7 +18,6 @@ const MAX_NAME: usize = 200;
 const DRIVE: &str = "drive";
 const COLUMNS: [&str; 4] = [DRIVE, "name", "configuration", "set"];
 
-/// A drive of a batch.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
@@ -128,7 +127,6 @@ fn is_recorded(path: &Path) -> bool {
     path.extension().is_some_and(|it| it == "mcap")
 }
 
-/// Returns the drives of a text.
 fn lines(text: &str) -> Lines {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = (1..).zip(text.lines().map(str::trim));

@@ -27,9 +27,7 @@ pub enum Outcome {
     Unsure,
     /// The run could not begin, or has failed.
     Failed,
-    /// The process of its supervisor was killed.
     Killed,
-    /// The batch was interrupted.
     Interrupted,
     /// It has not been computed yet, or with other settings.
     NotRun,
@@ -61,7 +59,6 @@ pub struct End {
 }
 
 impl End {
-    /// Returns an end now.
     pub fn of(outcome: Outcome, sentence: impl Into<String>) -> Self {
         Self {
             outcome,
@@ -79,7 +76,6 @@ impl End {
         }
     }
 
-    /// Returns the end of a drive that was interrupted.
     pub fn interrupted() -> Self {
         let sentence = "the batch was interrupted: the same command continues";
         Self {
@@ -107,7 +103,6 @@ pub struct Settings {
 #[serde(deny_unknown_fields)]
 pub struct Row {
     pub drive: Drive,
-    /// The settings that it was computed with.
     pub settings: Settings,
     pub outcome: Outcome,
     /// The reason why it is not complete, in a sentence; else empty.
@@ -141,7 +136,6 @@ impl Row {
         row
     }
 
-    /// Returns the folder of a drive's results in the folder of a batch.
     pub fn results(batch: &Path, drive: &Drive) -> PathBuf {
         batch.join("drives").join(&drive.name)
     }

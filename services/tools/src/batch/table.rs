@@ -13,7 +13,6 @@ use crate::batch::{
 /// The file of the results that follow from the drives and their configurations: the same bytes
 /// whatever was killed.
 pub const RESULTS: &str = "results.csv";
-/// The file of all others.
 pub const TIMES_FILE: &str = "times.csv";
 
 /// Writes both files from the rows of all drives of a list, which are returned.

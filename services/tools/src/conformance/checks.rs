@@ -25,7 +25,6 @@ use crate::conformance::{
 /// Items between two observers.
 const BETWEEN: u64 = 3;
 
-/// The test of one program.
 pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),

@@ -16,24 +16,20 @@ use crate::conformance::{at, topics::StageTopics};
 #[derive(Clone, Debug)]
 pub struct Candidate {
     pub stage: StageId,
-    /// The program and its arguments.
     pub command: Vec<String>,
     pub scheduling: Scheduling,
     /// The program `gyre`: the guardian, and Gyre's own stages.
     pub gyre: String,
     /// The manifest of the run, without prefix and root.
     pub manifest: Manifest,
-    /// The configuration of the run, TOML.
     pub configuration: String,
 }
 
 impl Candidate {
-    /// Returns the topics of the stage.
     pub(crate) fn topics(&self) -> StageTopics {
         StageTopics::of(self.stage, &self.manifest)
     }
 
-    /// Returns the command of Gyre's own stage.
     pub(crate) fn own_command(&self, stage: StageId) -> Vec<String> {
         let words = [&self.gyre, "stage", stage.name()];
         words.map(str::to_owned).into()
@@ -76,7 +72,6 @@ pub(crate) struct Harness<'a> {
     pub topics: StageTopics,
 }
 
-/// A message that a program has sent.
 pub(crate) enum Sent {
     /// A message that keeps the rules of its fields.
     Message(Recorded),
@@ -139,7 +134,6 @@ impl<'a> Harness<'a> {
         self.rig.has_publisher(self.stage)
     }
 
-    /// Publishes a message on a topic, if it is one of the inputs.
     pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
         let feed = self.feeds.get(topic);
         feed.map_or(Ok(()), |feed| feed.send(message))
@@ -168,7 +162,6 @@ impl<'a> Harness<'a> {
         self.process.as_mut().and_then(Process::death)
     }
 
-    /// Sends SIGTERM.
     pub(crate) fn terminate(&self) {
         self.process.iter().for_each(Process::terminate);
     }

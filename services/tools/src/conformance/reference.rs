@@ -37,7 +37,6 @@ impl Reference {
         self.0.get(topic)?.get(seq as usize)
     }
 
-    /// Returns the messages of a topic.
     pub(crate) fn topic(&self, topic: &str) -> &[Recorded] {
         self.0.get(topic).map_or(&[], Vec::as_slice)
     }

@@ -11,7 +11,6 @@ use crate::conformance::rule::{Rule, Verdict};
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,
-    /// The program and its arguments.
     pub command: Vec<String>,
     /// The scans that its inputs were computed from.
     pub scans: usize,
@@ -28,11 +27,9 @@ pub struct Report {
     pub deviation: Option<String>,
 }
 
-/// A rule and the verdict on it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Judged {
     pub rule: Rule,
-    /// The section of the contract.
     pub section: &'static str,
     /// The conduct of a program that keeps it.
     pub says: &'static str,
@@ -49,11 +46,9 @@ const PERCENTILE_ITEMS: u64 = 100;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Work {
     pub items: u64,
-    /// Median, ms.
     pub p50_ms: f64,
     /// 99th percentile, ms; `None` of fewer than a hundred items.
     pub p99_ms: Option<f64>,
-    /// Maximum, ms.
     pub max_ms: f64,
 }
 
@@ -88,7 +83,6 @@ impl Report {
         self.broken() == 0 && !self.rules.iter().any(not_reached)
     }
 
-    /// Returns the number of rules that are broken.
     pub fn broken(&self) -> usize {
         let is_broken = |judged: &&Judged| matches!(judged.verdict, Verdict::Broken(_));
         self.rules.iter().filter(is_broken).count()

@@ -119,7 +119,6 @@ impl Differences {
         Ok(differences)
     }
 
-    /// Returns their percentiles.
     pub(crate) fn spreads(&self) -> Spreads {
         let [mask, translation_m, rotation_deg] = self.all.each_ref().map(|it| Spread::of(it));
         let count = self.all[0].len();
@@ -145,25 +144,18 @@ pub struct Spreads {
     pub mask: Option<Spread>,
     /// Mean of the cells of the first rasters, for comparison.
     pub mask_level: Option<f64>,
-    /// Difference of the translations, m.
     pub translation_m: Option<Spread>,
-    /// Difference of the rotations, degrees.
     pub rotation_deg: Option<Spread>,
 }
 
-/// Percentiles of differences.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Median.
     pub p50: f64,
-    /// 99th percentile.
     pub p99: f64,
-    /// Maximum.
     pub max: f64,
 }
 
 impl Spreads {
-    /// Returns the rows of a table.
     pub(crate) fn rows(&self) -> Vec<String> {
         let rows = [
             ("mask", self.mask, ""),

@@ -21,7 +21,6 @@ macro_rules! rules {
         }
 
         impl Rule {
-            /// All rules, in the order of the contract.
             pub const ALL: [Self; [$($says,)+].len()] = [$(Self::$rule,)+];
 
             /// Returns the conduct of a program that keeps it.
@@ -65,11 +64,9 @@ rules! {
     KeepsBudget: "--budget-ms", "works within the budget";
 }
 
-/// The verdict on a rule.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "verdict", content = "why")]
 pub enum Verdict {
-    /// Nothing against it.
     Kept,
     /// Broken: sentences about the breaches.
     Broken(Vec<String>),
@@ -82,7 +79,6 @@ pub enum Verdict {
 /// The number of sentences that are kept for each rule; more would repeat the same fault.
 const MAX_SENTENCES: usize = 4;
 
-/// The verdicts so far.
 #[derive(Debug, Default)]
 pub(crate) struct Findings {
     verdicts: BTreeMap<Rule, Verdict>,
@@ -96,14 +92,12 @@ impl Findings {
         self.verdicts.entry(rule).or_insert(Verdict::Kept);
     }
 
-    /// Notes that a rule does not apply.
     pub(crate) fn not_for(&mut self, rule: Rule, reason: &'static str) {
         self.verdicts
             .entry(rule)
             .or_insert(Verdict::DoesNotApply(reason));
     }
 
-    /// Notes a breach.
     pub(crate) fn broken(&mut self, rule: Rule, sentence: impl fmt::Display) {
         let sentence = sentence.to_string();
         match self.verdicts.entry(rule).or_insert(Verdict::Kept) {

@@ -44,15 +44,12 @@ pub(crate) struct Session<'a> {
     pub pace: Pace,
     /// The first item that is not sent automatically.
     pub until: u64,
-    /// The next item to be sent.
     next: u64,
-    /// The newest item that it has answered.
     pub newest: Option<u64>,
     /// The last item of this life of the process.
     last: Option<u64>,
     /// The outputs, in order, over all its lives.
     pub outputs: Vec<Recorded>,
-    /// The topics whose publishers it has notified.
     notified: BTreeSet<&'static str>,
     /// The time of the first sending of each item: an item that a sink has journalled in one life
     /// and sends in the next keeps its stamps.
@@ -60,12 +57,9 @@ pub(crate) struct Session<'a> {
     progress: Instant,
 }
 
-/// The end of a wait.
 #[derive(Clone, Debug)]
 pub(crate) enum Waited {
-    /// The condition holds.
     Done,
-    /// The process has ended.
     Died(Death),
     /// Nothing happened for too long.
     TimedOut,
@@ -124,7 +118,6 @@ impl<'a> Session<'a> {
         &self.test.demands
     }
 
-    /// Returns the topic that the process publishes.
     pub(crate) fn output_topic(&self) -> &'static str {
         self.harness.topics.output
     }
@@ -323,7 +316,6 @@ impl<'a> Session<'a> {
         inputs.filter(is_unread).collect()
     }
 
-    /// Returns its messages about an item, in all its lives.
     pub(crate) fn about(&self, seq: u64) -> impl Iterator<Item = &Recorded> {
         let items = self.outputs.iter();
         items.filter(move |it| it.item().seq == seq && !it.item().is(flag::BASE))

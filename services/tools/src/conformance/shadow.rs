@@ -32,14 +32,12 @@ use shadowing::Shadowing;
 #[derive(Clone, Debug)]
 pub struct Options {
     pub stage: StageId,
-    /// The program and its arguments.
     pub command: Vec<String>,
     /// The program of the guardian, which ends the shadow if this process is killed.
     pub gyre: String,
     pub scheduling: Scheduling,
     /// Time for it to open its topics.
     pub start_timeout: Duration,
-    /// Time for an item.
     pub item_timeout: Duration,
     /// Items to compare; `None`: until the run ends.
     pub scans: Option<u64>,

@@ -16,7 +16,6 @@ pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
 pub struct Test {
     /// The program. Each of its runs writes to a folder below its manifest's `out`.
     pub candidate: Candidate,
-    /// The stages of a run with this configuration.
     pub stages: Vec<StageId>,
     /// Writes the other files of a run's root, as the list of a recording's files.
     pub prepare: Prepare,
@@ -26,9 +25,7 @@ pub struct Test {
 /// Time limits of a program, and optional demands on it.
 #[derive(Clone, Debug)]
 pub struct Demands {
-    /// Time for its start.
     pub start_timeout: Duration,
-    /// Time for one item.
     pub item_timeout: Duration,
     /// Time for its exit after SIGTERM, and after an input that it has to refuse.
     pub stop_timeout: Duration,
@@ -54,11 +51,9 @@ impl Default for Demands {
     }
 }
 
-/// The scans that the inputs are computed from.
 pub struct InputScans {
     /// An open recording or simulation.
     pub dataset: Box<dyn Dataset>,
-    /// The scans to play.
     pub played: Range<usize>,
 }
 

@@ -3,7 +3,6 @@
 use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window};
 use gyre_stage::Manifest;
 
-/// The topics of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct StageTopics {
     /// The inputs that lead down the stream: item `seq` is sent for the stage to answer with its
@@ -12,12 +11,10 @@ pub(crate) struct StageTopics {
     /// The inputs that lead back to an earlier stage: item `seq` is sent after the stage has
     /// answered it.
     pub feedback: Vec<&'static str>,
-    /// The topic that it publishes.
     pub output: &'static str,
 }
 
 impl StageTopics {
-    /// The topics of a stage in a run with this manifest.
     pub(crate) fn of(stage: StageId, manifest: &Manifest) -> Self {
         const SCAN: &str = Scan::TOPIC;
         const MASKED: &str = Masked::TOPIC;

@@ -24,7 +24,6 @@ use crate::export::source::{Lost, Source};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
-/// The file with the options of a recording.
 const OPTIONS: &str = "dataset.toml";
 /// The ends of the names of lists that lie beside the images.
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
@@ -64,7 +63,6 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     writer.counts.describe(out)
 }
 
-/// Opens the recording of a run.
 fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure> {
     let data = configuration.data();
     if configuration.streamed().is_some() {

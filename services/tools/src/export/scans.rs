@@ -22,7 +22,6 @@ const CONFIGURATION: &str = "/radar_data/configuration_data";
 const AZIMUTHS: &str = "/radar_data/fft_data";
 const B_SCANS: &str = "/radar_data/b_scan_msg";
 
-/// Writes the scans of a source.
 pub struct ScanWriter {
     open: Option<Open>,
     losses: Losses,
@@ -61,7 +60,6 @@ struct Losses {
 }
 
 impl Losses {
-    /// Takes a scan as it is written.
     fn add(&mut self, scan: &PolarScan<'_>) {
         let is_measured = |flags: u8| flags & flag::MEASURED != 0;
         let chirps = flag::CHIRP_KNOWN | flag::CHIRP_UP;
@@ -82,7 +80,6 @@ impl Losses {
         }
     }
 
-    /// Takes the constants that are not zero.
     fn add_constants(&mut self, scan: &SweepGeometry, eccentricity_rad: f32) {
         self.constants = vec![
             ("range_offset_m", scan.range_offset_m),
@@ -92,7 +89,6 @@ impl Losses {
         self.constants.retain(|(_, value)| *value != 0.0);
     }
 
-    /// Returns the losses as whole sentences.
     fn sentences(&self) -> Vec<String> {
         let (unreadable, interpolated) = (self.unreadable, self.interpolated);
         let (placed, not_placed, retimed) = (self.placed, self.not_placed, self.retimed);
@@ -161,7 +157,6 @@ impl ScanWriter {
         Ok(writer)
     }
 
-    /// Returns the radar's description of itself in these scans.
     fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
         let geometry = &scan.geometry;
         if geometry.sense != Sense::Clockwise {
@@ -268,7 +263,6 @@ impl Scans {
     }
 }
 
-/// Returns the first scan that can be read, if there is one.
 fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
     let mut scan = OwnedScan::with_limits(scans.dataset.limits());
     for index in scans.played.clone() {

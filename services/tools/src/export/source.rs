@@ -32,7 +32,6 @@ use gyre_terminal::{Failure, print};
 
 use crate::maps::map;
 
-/// The source of an export.
 pub struct Source {
     path: PathBuf,
     kind: Kind,
@@ -41,7 +40,6 @@ pub struct Source {
 enum Kind {
     /// The folder of a run's results.
     Run(Box<Configuration>),
-    /// A recording of a run.
     Recording,
     Dataset,
 }
@@ -95,11 +93,9 @@ pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
 /// Where azimuths of scans were lost, by the number of the scan in its recording.
 pub type Lost = BTreeMap<u64, LostAzimuths>;
 
-/// The scans of a source.
 pub struct Scans {
     pub dataset: Box<dyn Dataset>,
     pub played: std::ops::Range<usize>,
-    /// The eccentricity of the encoder, rad.
     pub eccentricity_rad: f32,
     /// True if the angles are corrected by it.
     pub is_corrected: bool,
@@ -108,7 +104,6 @@ pub struct Scans {
 }
 
 impl Source {
-    /// Determines the kind of a path.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         let kind = match path {
             path if gyre_recording::is_recording(path) => Kind::Recording,
@@ -219,7 +214,6 @@ impl Source {
         }
     }
 
-    /// Writes the map of a run that has keyframes.
     pub fn write_map(
         &self,
         bag: &mut BagWriter,

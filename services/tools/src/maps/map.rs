@@ -47,7 +47,6 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Draws a run and writes its map.
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
     let given = arguments.trajectory.clone();
@@ -119,12 +118,10 @@ pub fn exists(path: &Path) -> Result<bool, StorageError> {
     path.try_exists().map_err(StorageError::at("read", path))
 }
 
-/// Reads the configuration of a run.
 pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
     Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
-/// Opens the keyframes of a run.
 pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     require_results(run)?;
     let path = records_path::<Keyframe>(run);

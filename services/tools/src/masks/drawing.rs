@@ -102,7 +102,6 @@ fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
     ]
 }
 
-/// Returns the value that this share of the cells exceeds.
 fn exceeded_by(share: f32, cells: &Array2<f32>) -> f32 {
     let mut cells: Vec<f32> = cells.iter().copied().collect();
     let rank = cells.len() - 1 - (share * cells.len() as f32) as usize;

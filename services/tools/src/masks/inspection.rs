@@ -12,7 +12,6 @@ pub const HEADER: &str = "  scan   power %   above floor %   cells %   points % 
 /// Above this factor a cell or a point counts as kept.
 const KEPT: f32 = 0.5;
 
-/// A scan and its mask.
 pub struct Inspection {
     /// The scan's place in the recording.
     pub number: usize,

@@ -22,7 +22,6 @@ pub struct MaskInspector {
     dataset: Box<dyn Dataset>,
     odometry: Odometry,
     lag: usize,
-    /// The scan that comes next.
     next: usize,
     /// The last two registered scans, newest first.
     last: [OwnedScan; 2],
@@ -31,7 +30,6 @@ pub struct MaskInspector {
     samples: ScanSamples,
     /// The velocities that the last two scans were compensated with.
     twists: [Option<gyre_geometry::Twist>; 2],
-    /// Where their azimuths were lost.
     lost: [LostAzimuths; 2],
     rows: PlacedRows,
     floor: u8,

@@ -12,7 +12,6 @@ use gyre_terminal::{Failure, print};
 use crate::operate::arguments::RunChoice;
 
 impl RunChoice {
-    /// Returns the named folder, or the folder of the only run.
     pub fn folder(&self) -> Result<PathBuf, Failure> {
         match self.named() {
             Some(run) => Ok(run.to_owned()),

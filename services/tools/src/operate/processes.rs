@@ -45,7 +45,6 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Returns a run as a table.
 fn listed(UsedRun { status, usage }: &UsedRun) -> String {
     let (out, summary) = (status.out.display(), summary(status));
     let mut table = format!(

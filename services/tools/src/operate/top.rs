@@ -126,6 +126,5 @@ fn wait(
     Ok(false)
 }
 
-/// The poses of a run, for [`Snapshots`].
 type Poses<'run> = Observer<'run, gyre_messages::Pose>;
 type Scans<'run> = Observer<'run, gyre_messages::Scan>;

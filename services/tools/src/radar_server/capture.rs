@@ -42,7 +42,6 @@ fn damaged(path: &Path, reason: &str) -> Failure {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Captured {
     pub records: u64,
-    /// The bytes of the records.
     pub bytes: u64,
 }
 
@@ -91,7 +90,6 @@ fn write_record(out: &mut impl Write, time: Duration, bytes: &[u8]) -> io::Resul
     out.write_all(bytes)
 }
 
-/// A capture that is read from its start.
 #[derive(Debug)]
 pub struct Capture {
     path: PathBuf,

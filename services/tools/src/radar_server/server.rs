@@ -31,7 +31,6 @@ const MAX_WAIT: Duration = Duration::from_secs(2);
 const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
 
-/// The options of a playback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
     /// Factor of the recorded pace; `None`: as fast as the clients read.
@@ -41,7 +40,6 @@ pub struct Playback {
     /// Play the recording again and again, its times going on.
     pub repeats: bool,
     pub faults: Faults,
-    /// The format of the times.
     pub clock: ClockFormat,
 }
 
@@ -50,7 +48,6 @@ pub(crate) fn unserved(error: io::Error) -> String {
     format!("cannot serve as a radar: {error}")
 }
 
-/// The counts of a playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     pub scans: u64,

@@ -17,11 +17,9 @@ pub struct Row {
 /// Rows under a title.
 pub struct Group {
     pub title: &'static str,
-    /// The rows that have a value.
     pub rows: Vec<Row>,
 }
 
-/// Returns all figures that one of the subjects has.
 pub fn groups(subjects: &[Subject]) -> Vec<Group> {
     let groups = GROUPS.iter().map(|(title, figures)| {
         let rows = figures.iter().map(|figure| row(figure, subjects));

@@ -19,7 +19,6 @@ pub fn section(title: &str, content: &str) -> String {
     }
 }
 
-/// Returns a picture that is a file of PNG.
 pub fn png(bytes: &[u8], what: &str) -> String {
     let what = escaped(what);
     let data = STANDARD.encode(bytes);

@@ -91,7 +91,6 @@ fn head<'a>(subjects: impl ExactSizeIterator<Item = &'a Subject>) -> String {
     format!("<thead><tr><th></th>{names}</tr></thead>\n")
 }
 
-/// Returns the subjects that are runs.
 fn runs(subjects: &[Subject]) -> impl Iterator<Item = (&Subject, &Run)> {
     subjects
         .iter()
@@ -128,7 +127,6 @@ fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     Ok(svg(&drawn, "Trajectories seen from above"))
 }
 
-/// Returns a section with a picture of each run that has it.
 fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> String {
     let pictures = runs(subjects).filter_map(|(subject, run)| {
         let bytes = run.picture(name)?;
@@ -148,7 +146,6 @@ fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> Str
     }
 }
 
-/// Returns a table of the latencies of each run.
 fn latencies(subjects: &[Subject]) -> String {
     let table = |(subject, run)| title_of(subject, subjects) + &latency(run);
     runs(subjects).map(table).collect()

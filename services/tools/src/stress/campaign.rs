@@ -17,9 +17,7 @@ use crate::stress::{
     witness_fault::{self, WitnessFault},
 };
 
-/// Scans of a burst.
 const BURST: u64 = 3;
-/// Share of the available memory that is taken.
 const MEMORY_SHARE: f64 = 0.9;
 /// Programs that read all topics.
 const OBSERVERS: usize = 8;
@@ -40,7 +38,6 @@ const MOST_HZ: f64 = 1000.0;
 #[derive(Clone, Debug)]
 pub struct Options {
     pub scenarios: Vec<Scenario>,
-    /// Time for which each is measured.
     pub duration: Duration,
     /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
     pub stages: Vec<StageId>,
@@ -100,7 +97,6 @@ impl Campaign<'_> {
         ScenarioOutcome::new(self.scenario, self.options.duration)
     }
 
-    /// One run.
     fn single(&self) -> Result<ScenarioOutcome, Failure> {
         if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
             return Err(lacking.into());
@@ -315,7 +311,6 @@ fn problem(measured: &Measured) -> Option<String> {
     }
 }
 
-/// Compares the figures of a run with limits.
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
     let latency = &figures.latency.sensor_to_pose;
     let (drops, degraded) = (figures.drops_percent(), figures.motions.degraded_percent());

@@ -37,7 +37,6 @@ pub enum FaultKind {
     Kill,
 }
 
-/// A fault on the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
     pub kind: FaultKind,

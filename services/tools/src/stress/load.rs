@@ -36,9 +36,7 @@ const CACHE_LINE: usize = 64;
 /// Memory that the helper `memory` has taken when the measurement begins.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Taken {
-    /// Memory that it has taken, MB.
     pub taken_mb: f64,
-    /// Memory that was available before, MB.
     pub available_mb: f64,
 }
 

@@ -39,11 +39,8 @@ const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub scenario: Scenario,
-    /// The name of its folder.
     pub name: String,
-    /// Scans a second.
     pub rate_hz: f64,
-    /// Time that is measured.
     pub duration: Duration,
     /// Overrides of the configuration, `section.key=value`.
     pub set: Vec<String>,
@@ -51,9 +48,7 @@ pub struct Setup {
     pub burst: u64,
     /// Helpers that load the machine while it is measured.
     pub loads: Vec<Work>,
-    /// The fault of these stages, and the seed for their order.
     pub faults: Option<(FaultKind, Vec<StageId>, u64)>,
-    /// The faults of the source in its played scans.
     pub played: Vec<PlayedFault>,
 }
 
@@ -74,7 +69,6 @@ impl Setup {
     }
 }
 
-/// A measured run.
 #[derive(Clone, Debug)]
 pub struct Measured {
     pub figures: Figures,

@@ -94,7 +94,6 @@ impl Sampler {
         }
     }
 
-    /// Returns the process group of a stage as of now.
     pub fn group_of(&mut self, stage: &str) -> Option<u32> {
         let rows = self.rows();
         let mut children = rows.iter().filter(|row| row.parent == self.supervisor);
@@ -124,7 +123,6 @@ impl Sampler {
         rows
     }
 
-    /// Ends the measurement.
     pub fn costs(mut self) -> Vec<Cost> {
         self.sample();
         let elapsed = self.began.elapsed();

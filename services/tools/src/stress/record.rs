@@ -41,7 +41,6 @@ impl Counts {
     }
 }
 
-/// The hop of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hop {
     pub stage: &'static str,
@@ -49,11 +48,9 @@ pub struct Hop {
     pub transport: Option<Distribution>,
     /// From the reception to the start of the work.
     pub wait: Distribution,
-    /// Duration of the work.
     pub work: Distribution,
 }
 
-/// The latency of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLatency {
     pub counts: Counts,

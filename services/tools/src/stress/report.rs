@@ -23,13 +23,11 @@ pub struct Provenance {
     /// The processor and the number of its cores.
     pub machine: String,
     pub kernel: String,
-    /// Gyre's version.
     pub gyre: String,
     /// BLAKE3 digest of the program.
     pub build: String,
     /// The file of the configuration; the resolved one lies beside the report.
     pub configuration: String,
-    /// The recording.
     pub source: String,
     /// Load of the machine before the first scenario, in processes: the mean of a minute.
     pub load_before: Option<f64>,
@@ -44,7 +42,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// A report of these outcomes.
     pub fn of(outcomes: Vec<ScenarioOutcome>) -> Self {
         Self {
             version: VERSION,
@@ -53,12 +50,10 @@ impl Report {
         }
     }
 
-    /// Returns whether a scenario has this verdict.
     pub fn has(&self, verdict: Verdict) -> bool {
         self.outcomes.iter().any(|it| it.verdict == verdict)
     }
 
-    /// Writes `report.json`.
     pub fn write(&self, out: &Path) -> Result<(), Failure> {
         let path = out.join("report.json");
         fs::write(&path, serde_json::to_string_pretty(self)?)

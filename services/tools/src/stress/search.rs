@@ -19,7 +19,6 @@ const STEP_SCANS: f64 = 110.0;
 /// Times that a level of a search may be tried. One hiccup of the machine does not decide.
 const TRIES: usize = 2;
 
-/// The result of a search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// The largest level that passed; `None` if the first one failed.
@@ -58,11 +57,9 @@ pub fn largest<E>(
     })
 }
 
-/// The steps of a search.
 pub struct Steps<'a> {
     unit: &'static str,
     note: &'a mut dyn FnMut(&str),
-    /// All that were tried.
     pub all: Vec<Step>,
 }
 
@@ -111,7 +108,6 @@ pub struct Step {
     pub p99_ms: Option<f64>,
     /// Processor time of all pipelines, % of one processor.
     pub cpu_percent: f64,
-    /// The reason why it has not passed.
     pub reason: Option<String>,
 }
 
@@ -130,7 +126,6 @@ impl Step {
         }
     }
 
-    /// A step with the checks, the problem and the figures of each of its pipelines.
     pub fn of(level: f64, pipelines: &[(Vec<Check>, Option<String>, Figures)]) -> Self {
         let figures = || pipelines.iter().map(|(.., figures)| figures);
         let largest = |of: fn(&Distribution) -> Option<f64>| {

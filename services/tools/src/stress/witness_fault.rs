@@ -10,7 +10,6 @@ use crate::stress::{Others, TestedPipeline};
 const FROM_S: f64 = 4.0;
 /// Duration of a fault of gyro and wheels, s.
 const FOR_S: f64 = 3.0;
-/// Durations for which the radar is blind, s.
 const BLIND_S: [f64; 3] = [2.0, 5.0, 10.0];
 /// The time after a fault for the recovery of the run, s.
 const AFTER_S: f64 = 4.0;
@@ -78,18 +77,14 @@ pub struct WitnessFault {
     pub kind: PlayedFaultKind,
     /// The start of the fault, s since the measurement began.
     pub at_s: f64,
-    /// The duration, s.
     pub for_s: f64,
-    /// Motions while it lasted.
     pub motions: u64,
     /// The number of these motions that report the fault.
     pub noticed: u64,
-    /// The basis of these motions.
     pub counts: WitnessCounts,
     /// Time from its end to the first pose of a motion that is as before it, ms; `None`: there was
     /// no such pose before the next fault.
     pub recovery_ms: Option<f64>,
-    /// Way of the vehicle meanwhile, m.
     way_m: f64,
 }
 
@@ -256,7 +251,6 @@ fn agrees(others: Others, motion: &RefinementRecord) -> [bool; 2] {
     [gyro, !others.wheels || motion.wheels == wheels::USED]
 }
 
-/// Returns whether a motion is as without a fault of this kind.
 fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
     let [gyro, by_wheels] = agrees(others, motion);
     match kind {
@@ -269,7 +263,6 @@ fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -
     }
 }
 
-/// Returns whether a motion reports a fault of this kind.
 fn is_noticed(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
     let [gyro, by_wheels] = agrees(others, motion);
     match kind {

@@ -11,7 +11,6 @@ use crate::conformance::{
     session::Pace,
 };
 
-/// The item that is sent wrong.
 const WRONG: u64 = 2;
 
 impl Examination<'_> {

@@ -113,7 +113,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Requires an item for each, and the end.
     fn reaches_the_end(&mut self) -> Result<bool, Failure> {
         let end = self.reference.end();
         self.findings.checked(Rule::OneForOne);

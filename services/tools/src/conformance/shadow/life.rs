@@ -24,13 +24,11 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time between two polls of a process that is to exit.
 const POLL_PERIOD: Duration = Duration::from_millis(5);
 
-/// The program of the shadow, and the places of its files.
 pub(crate) struct ShadowProgram {
     /// The program; its manifest is the manifest of the observed run, without its live mode.
     pub candidate: Candidate,
     /// The place for the files of all lives.
     pub folder: PathBuf,
-    /// The file for the output of the program.
     pub output: Option<PathBuf>,
 }
 
@@ -75,7 +73,6 @@ impl<'a> Life<'a> {
         Ok(self.is_open)
     }
 
-    /// Takes some of its messages.
     pub(crate) fn take(&self) -> Result<Vec<Sent>, StageError> {
         let received = std::iter::from_fn(|| self.harness.receive().transpose());
         received.take(AT_ONCE).collect()

@@ -20,7 +20,6 @@ const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 pub(crate) struct Observed {
     /// The inputs that lead down the stream, by topic.
     pub inputs: Vec<(&'static str, Recorded)>,
-    /// The output of the stage of the run.
     pub output: Recorded,
     /// For masking: the feedback to the items before, without a gap, as far back as it may need.
     pub before: Vec<Feedback>,
@@ -28,12 +27,10 @@ pub(crate) struct Observed {
     pub can_open: bool,
 }
 
-/// The feedback to an earlier item.
 #[derive(Clone, Debug)]
 pub(crate) struct Feedback {
     pub seq: u64,
     breaks: bool,
-    /// The motion as searched.
     pub motion: Recorded,
     pub pose: Recorded,
 }
@@ -77,7 +74,6 @@ pub(crate) struct Observation<'run> {
 }
 
 impl<'run> Observation<'run> {
-    /// Observes the topics of a stage.
     pub(crate) fn of(
         run: &'run ObservedRun,
         stage: StageId,
@@ -126,7 +122,6 @@ impl<'run> Observation<'run> {
         Ok(complete)
     }
 
-    /// Returns the listeners that the publishers notify.
     pub(crate) fn listeners(&self) -> impl Iterator<Item = &Listener> {
         self.observers.iter().map(|it| it.listener())
     }

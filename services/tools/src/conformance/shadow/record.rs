@@ -40,15 +40,12 @@ pub struct Counts {
     pub left: u64,
     /// Items that were not seen whole.
     pub missed: u64,
-    /// Gaps of missed items.
     pub gaps: u64,
-    /// Starts of the shadow.
     pub starts: u64,
     /// Ends of the shadow that were not asked for.
     pub deaths: u64,
     /// The number of kills because the program did not start or answer in time.
     pub hangs: u64,
-    /// Breaches of the contract of a stage.
     pub breaches: u64,
 }
 
@@ -59,7 +56,6 @@ pub(crate) struct Times {
     pub real: Durations,
 }
 
-/// All that is recorded.
 pub(crate) struct Record {
     stage: StageId,
     topic: &'static str,
@@ -159,7 +155,6 @@ impl Record {
         Some(item.hops[stage].published_ns.saturating_sub(before))
     }
 
-    /// Notes a breach of the contract.
     pub(crate) fn breach(&mut self, sentence: String) {
         self.counts.breaches += 1;
         keep(&mut self.breaches, sentence);
@@ -178,7 +173,6 @@ impl Times {
     }
 }
 
-/// Keeps the first sentences.
 pub(crate) fn keep(sentences: &mut Vec<String>, sentence: String) {
     if sentences.len() < SENTENCES {
         sentences.push(sentence);

@@ -28,12 +28,9 @@ pub(crate) struct Renumbering {
     broken_at: Option<u64>,
 }
 
-/// The entry of an item into the stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
-    /// It follows the last one.
     Continues,
-    /// It opens the stream.
     Opens,
     /// It is left out: its result depends on items before, which were not seen.
     IsLeftOut,
@@ -41,10 +38,8 @@ pub(crate) enum Entry {
     NeedsNewLife,
 }
 
-/// An item as it was sent to the shadow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentItem {
-    /// The item of its last input.
     pub item: Item,
     /// True if the item is one that only opens the stream.
     pub opens: bool,
@@ -62,7 +57,6 @@ impl Renumbering {
         }
     }
 
-    /// Returns the entry of an item into the stream.
     pub(crate) fn entry(&self, observed: &Observed) -> Entry {
         match self.last {
             Some((run, _)) if run.checked_add(1) == Some(observed.seq()) => Entry::Continues,
@@ -82,7 +76,6 @@ impl Renumbering {
         }
     }
 
-    /// Sends the inputs of an item.
     pub(crate) fn send(
         &mut self,
         shadow: &Harness<'_>,

@@ -12,32 +12,25 @@ use crate::conformance::Spreads;
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,
-    /// The program and its arguments.
     pub command: Vec<String>,
-    /// The fates of the items.
     pub counts: Counts,
-    /// The differences of the results that are not identical.
     pub differences: Spreads,
     /// From the start of the work on an item to its end.
     pub work: Option<Beside>,
     /// From the publication of an item's input to the publication of its output.
     pub answer: Option<Beside>,
-    /// The first breaches of the contract.
     pub breaches: Vec<String>,
     /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
     pub verdict: Verdict,
 }
 
-/// The verdict on the results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// All compared items have the same bytes.
     Identical,
-    /// Some do not.
     Differs,
-    /// No item was compared.
     Nothing,
 }
 
@@ -45,7 +38,6 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
     pub shadow: Percentiles,
-    /// Of the stage of the run.
     pub real: Percentiles,
 }
 

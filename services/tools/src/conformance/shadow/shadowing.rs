@@ -40,7 +40,6 @@ const MAX_FAILURES: u64 = 3;
 /// Time between two lines about the progress.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
 
-/// A shadow of a stage of a run.
 pub(crate) struct Shadowing<'a> {
     options: &'a Options,
     program: &'a ShadowProgram,
@@ -62,7 +61,6 @@ pub(crate) struct Shadowing<'a> {
     lines: Vec<String>,
 }
 
-/// The item that the shadow has.
 struct UnderWay {
     observed: Observed,
     sent: SentItem,
@@ -252,7 +250,6 @@ impl<'a> Shadowing<'a> {
             .then(|| format!("it has not answered item {seq} within {item_timeout:.0?}"))
     }
 
-    /// Ends a life that has failed.
     fn fail(&mut self, sentence: String) -> Result<(), StageError> {
         self.failures += 1;
         let again = match self.failures >= MAX_FAILURES {

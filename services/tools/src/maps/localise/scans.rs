@@ -23,18 +23,14 @@ pub struct Scans {
     max_unreadable: usize,
 }
 
-/// A scan with its motion.
 pub struct RegisteredScan<'a> {
-    /// The number in the recording.
     pub number: usize,
-    /// The observation for the localisation.
     pub observation: Observation<'a>,
     /// The chain of motions starts with it: nothing is known of the motion since the scan before.
     pub starts: bool,
 }
 
 impl Scans {
-    /// Opens the scans that a configuration plays.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let played = gyre_configuration::open(configuration)?;
         let dataset = played.dataset;

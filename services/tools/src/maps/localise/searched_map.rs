@@ -21,7 +21,6 @@ pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Fai
     plan(map, configuration)
 }
 
-/// Plans localisation in a map.
 pub fn plan(map: Map, configuration: &Configuration) -> Result<Localiser, Failure> {
     let odometry = &configuration.odometry;
     let (options, capacity) = (LocaliserOptions::default(), odometry.points.capacity);

@@ -13,7 +13,6 @@ const GRAPH: &str = "graph.g2o";
 /// The largest such file, bytes: a drive of 1,000 km.
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
 
-/// Reads the corrected keyframes of a run.
 pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     let path = run.join(GRAPH);
     let text =

@@ -22,7 +22,6 @@ const SPAN: Duration = Duration::from_secs(10);
 /// Number of snapshots whose latency is drawn.
 const HISTORY: usize = 300;
 
-/// A run at a moment.
 #[derive(Clone)]
 pub struct Snapshot {
     pub status: Status,
@@ -43,22 +42,18 @@ pub struct Snapshot {
     pub history: Vec<u64>,
 }
 
-/// The usage of a process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Use {
     /// Share of one processor since the last snapshot.
     pub cpu: f64,
-    /// Memory of its own, bytes.
     pub own_bytes: u64,
     /// Wake-ups since the last snapshot, 1/s.
     pub wake_ups: f64,
 }
 
-/// Takes snapshots of a run.
 pub struct Snapshots<'run> {
     control: Control,
     poses: Poses<'run>,
-    /// The scans of a run with samples.
     scans: Option<Scans<'run>>,
     rates: SampleRates,
     recent: VecDeque<PoseHeader>,
@@ -95,12 +90,10 @@ impl<'run> Snapshots<'run> {
         }
     }
 
-    /// Returns whether the run has ended.
     pub fn has_ended(&self) -> bool {
         !self.control.is_there() || self.control.status().is_err()
     }
 
-    /// Returns the newest snapshot.
     pub fn last(&mut self) -> Option<Snapshot> {
         self.last.take()
     }

@@ -10,7 +10,6 @@ use std::{
 
 use gyre_colossus::{Configuration, Event, Message, Parser, Request, write_configuration};
 
-/// The most clients of a radar.
 const MAX_CLIENTS: usize = 3;
 /// Time without a read after which a client is given up.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -19,7 +18,6 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Time for the clients to read the last bytes.
 const LINGER: Duration = Duration::from_secs(5);
 
-/// The clients that are connected.
 pub struct Clients {
     all: Arc<Mutex<Vec<Client>>>,
 }

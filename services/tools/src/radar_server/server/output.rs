@@ -125,7 +125,6 @@ pub struct Group {
     socket: UdpSocket,
     to: SocketAddrV4,
     faults: Faults,
-    /// Number of the next datagram.
     number: u32,
     /// A datagram that is sent after the next one.
     held: Option<Vec<u8>>,

@@ -42,7 +42,6 @@ const POLL_PERIOD: Duration = Duration::from_millis(20);
 pub(super) struct Running<'a> {
     setup: &'a Setup,
     process: Child,
-    /// The folder of its results.
     pub out: PathBuf,
     log: PathBuf,
     /// The latest time of its first poses.
@@ -71,7 +70,6 @@ impl<'a> Running<'a> {
         })
     }
 
-    /// Returns the process of its supervisor.
     pub fn pid(&self) -> u32 {
         self.process.id()
     }

@@ -13,7 +13,6 @@ use crate::stress::{
     witness_fault::WitnessFault,
 };
 
-/// The figures of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
     #[serde(flatten)]
@@ -28,7 +27,6 @@ pub struct Figures {
     /// Lost wake-ups by stage, each found after up to 200 ms.
     pub wakes_caught_late: BTreeMap<String, u64>,
     pub processes: Vec<Cost>,
-    /// Shared memory, bytes.
     pub shared_bytes: u64,
     /// Memory that a load has taken beside it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -42,7 +40,6 @@ impl Figures {
         (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
     }
 
-    /// Returns whether there was any fault.
     pub fn had_faults(&self) -> bool {
         !self.faults.is_empty() || !self.witness_faults.is_empty()
     }

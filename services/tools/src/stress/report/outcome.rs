@@ -46,7 +46,6 @@ impl Check {
     }
 }
 
-/// The verdict on a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -54,7 +53,6 @@ pub enum Verdict {
     Passed,
     /// A limit is not kept, or the run has ended, or not recovered.
     Failed,
-    /// There is no limit for it.
     NotJudged,
     /// It could not be carried out, which is no verdict on the pipeline.
     NotCarriedOut,
@@ -71,22 +69,16 @@ impl Verdict {
     }
 }
 
-/// The outcome of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenarioOutcome {
     pub scenario: Scenario,
-    /// A line that describes it.
     pub line: &'static str,
     pub verdict: Verdict,
-    /// The figures that have limits.
     pub checks: Vec<Check>,
     /// A failure that does not depend on the latency.
     pub problem: Option<String>,
-    /// Scans a second.
     pub rate_hz: f64,
-    /// Time that was measured, s.
     pub duration_s: f64,
-    /// The figures of its run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
     /// The largest load that passed: scans a second, or radars.
@@ -95,7 +87,6 @@ pub struct ScenarioOutcome {
     /// The smallest load above it that failed, twice; `None`: none was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<f64>,
-    /// The steps of a search.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<Step>,
 }
@@ -118,7 +109,6 @@ impl ScenarioOutcome {
         }
     }
 
-    /// The same with its verdict.
     #[must_use]
     pub fn judged(mut self) -> Self {
         let had_faults = self.figures.as_ref().is_some_and(Figures::had_faults);
@@ -143,7 +133,6 @@ impl ScenarioOutcome {
         self
     }
 
-    /// Returns the verdict with its reasons.
     pub fn sentence(&self) -> String {
         let mut sentence = format!("{}: {}", self.scenario, self.verdict.name());
         let failed = self.checks.iter().filter(|check| !check.passed);
