@@ -191,24 +191,3 @@ impl Row {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_complete_drive_without_its_results_is_a_failure() {
-        let out = tempfile::tempdir().unwrap();
-        let drive = Drive {
-            name: "a".to_owned(),
-            path: "data/a".to_owned(),
-            configuration: None,
-            set: Vec::new(),
-        };
-        let settings = Settings::default();
-        let row = Row::of(out.path(), &drive, &settings, Outcome::Complete, "");
-        assert_eq!(row.outcome, Outcome::Failed);
-        assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
-    }
-}

@@ -80,6 +80,9 @@ mod tests {
         fs::create_dir(out.join("rows")).unwrap();
         let settings = Settings::default();
         let [b, a] = [0, 1].map(|index: usize| &list.drives[index]);
+        let row = Row::of(out, a, &settings, Outcome::Complete, "");
+        assert_eq!(row.outcome, Outcome::Failed);
+        assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
         let mut row = Row::of(out, a, &settings, Outcome::NotRun, "");
         row.outcome = Outcome::Complete;
         row.values.insert("ate_rmse_m".to_owned(), 0.25.into());

@@ -325,10 +325,8 @@ mod tests {
         run(&at("a"), 0.0, "[raster]\nn = 255\ncell_m = 0.8\n");
         run(&at("b"), 2.0, "[raster]\nn = 127\ncell_m = 0.8\n");
         let page = page_of(&[&at("a"), &at("b"), &at("other.tum")], &at("truth.tum"));
-        let row = page
-            .lines()
-            .find(|line| line.contains("ATE, rmse"))
-            .unwrap();
+        let mut lines = page.lines();
+        let row = lines.find(|line| line.contains("ATE, rmse")).unwrap();
         assert!(row.contains("<td class=\"best\">0.000</td>"), "{row}");
         assert_eq!(row.matches("<td").count(), 3, "{row}");
         assert!(page.contains("<tr><th>raster.n</th><td>255</td><td>127</td></tr>"));

@@ -230,10 +230,7 @@ mod tests {
         faults.sought = Some(StageId::Masking);
         let not_found = faults.omitted().unwrap_or_default();
         assert!(not_found.contains("masking was not found"), "{not_found}");
-    }
-
-    #[test]
-    fn the_shortest_measurement_has_time_for_a_fault() {
+        // The shortest measurement has time for a fault.
         let begun = Faults::new((FaultKind::Stop, vec![StageId::Masking], 0), 0, LEAST);
         assert!(begun.next_ns + nanoseconds(STOP + RECOVERY) < begun.ends_ns);
     }
