@@ -16,7 +16,7 @@ use gyre_stage::{
 use gyre_terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
-    crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers},
+    crossterm::event::{self, Event, KeyCode, KeyModifiers},
 };
 
 use crate::operate::{arguments::TopArguments, choice::chosen};
@@ -79,35 +79,20 @@ fn show(
             Err(error) => return Err(error),
         };
         terminal.draw(|frame| screen::draw(frame, &snapshot))?;
-        let mut resized = false;
+        // Each drawing has the size of the terminal as of then.
         let quit = || {
-            Ok(match event::poll(PERIOD)?.then(event::read).transpose()? {
-                Some(Event::Key(key)) => is_quit(&key),
-                Some(Event::Resize(..)) => {
-                    resized = true;
-                    false
-                }
+            let event = event::poll(PERIOD)?.then(event::read).transpose()?;
+            let key = event.as_ref().and_then(Event::as_key_press_event);
+            Ok(key.is_some_and(|key| match key.code {
+                KeyCode::Char('q') | KeyCode::Esc => true,
+                KeyCode::Char('c') => key.modifiers.contains(KeyModifiers::CONTROL),
                 _ => false,
-            })
+            }))
         };
         if wait(snapshots, every, quit)? {
             return Ok(None);
         }
-        if resized {
-            terminal.autoresize()?;
-        }
     }
-}
-
-/// Returns whether a key ends the display: q, Esc or an interrupt.
-fn is_quit(key: &KeyEvent) -> bool {
-    let has_control = key.modifiers.contains(KeyModifiers::CONTROL);
-    key.kind == KeyEventKind::Press
-        && match key.code {
-            KeyCode::Char('q') | KeyCode::Esc => true,
-            KeyCode::Char('c') => has_control,
-            _ => false,
-        }
 }
 
 /// Takes the poses that come within `time`; true if `quit` returns true.

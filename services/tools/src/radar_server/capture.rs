@@ -16,7 +16,7 @@ use gyre_colossus::{Address, Configuration, Event, Message, Request};
 use gyre_stages::live_radar::{RadarParser, RadarSocket};
 use gyre_terminal::Failure;
 
-use crate::radar_server::server::{Audience, Faults, Output, sleep_until, unserved};
+use crate::radar_server::server::{Output, sleep_until};
 
 /// The first bytes of a capture, with its version.
 pub const MAGIC: &[u8; 8] = b"GYRERAD1";
@@ -174,13 +174,13 @@ fn read_whole(file: &mut impl Read, bytes: &mut [u8]) -> io::Result<bool> {
 /// Plays a capture as its radar, until it has ended or `stop` returns true. `rate` is a factor of
 /// its pace; `None`: as fast as it is read.
 pub fn play(
-    audience: Audience,
+    mut output: Output,
     mut capture: Capture,
     rate: Option<f64>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Captured, Failure> {
     let path = &capture.path;
-    if matches!(audience, Audience::Group { .. }) != capture.is_udp {
+    if matches!(output, Output::Group { .. }) != capture.is_udp {
         let (of, advice) = match capture.is_udp {
             true => ("UDP", "give the group as --udp GROUP:PORT"),
             false => ("TCP", "leave out --udp"),
@@ -192,7 +192,7 @@ pub fn play(
     }
     let none = || damaged(path, "it is no capture any more");
     let radar = Capture::open(path)?.ok_or_else(none)?.configuration()?;
-    let mut output = Output::open(audience, &radar, Faults::default()).map_err(unserved)?;
+    output.begin(&radar)?;
     let mut played = Captured::default();
     if !output.describe(&radar, stop) || !output.await_client(stop) {
         return Ok(played);

@@ -11,17 +11,18 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
+use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, scan::flag};
 use gyre_terminal::Failure;
 
-pub(crate) use clients::Clients;
+use crate::radar_server::RadarServerArguments;
+
+pub use clients::Clients;
 pub use faults::Faults;
 use faults::{is_nth, uniform};
-pub use gyre_colossus::{ByteOrder, ClockFormat};
-pub use output::Audience;
-pub(crate) use output::{Output, sleep_until};
+pub(crate) use output::sleep_until;
+pub use output::{Group, Output};
 
 /// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
@@ -30,18 +31,6 @@ const MAX_WAIT: Duration = Duration::from_secs(2);
 /// The azimuth before which garbage is sent, and its bytes.
 const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct Playback {
-    /// Factor of the recorded pace; `None`: as fast as the clients read.
-    pub rate: Option<f64>,
-    /// Scans to play, by their index in the recording.
-    pub scans: Range<usize>,
-    /// Play the recording again and again, its times going on.
-    pub repeats: bool,
-    pub faults: Faults,
-    pub clock: ClockFormat,
-}
 
 /// Returns the sentence about a network that cannot be used.
 pub(crate) fn unserved(error: io::Error) -> String {
@@ -61,20 +50,30 @@ pub struct Played {
 
 /// Plays a recording until it has ended or `stop` returns true.
 pub fn serve(
-    audience: Audience,
+    mut output: Output,
     dataset: &mut dyn Dataset,
-    playback: &Playback,
+    scans: Range<usize>,
+    arguments: &RadarServerArguments,
     stop: &dyn Fn() -> bool,
 ) -> Result<Played, Failure> {
-    let first = playback.scans.start;
+    let first = scans.start;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    let output = Output::open(audience, &radar, playback.faults).map_err(unserved)?;
+    output.begin(&radar)?;
     let mut player = Player {
         output,
         radar,
-        playback,
+        faults: arguments.faults,
+        rate: arguments.rate.factor(),
+        clock: ClockFormat {
+            // Datagrams always have the network's order.
+            order: match arguments.big_endian || arguments.udp.is_some() {
+                true => ByteOrder::Big,
+                false => ByteOrder::Little,
+            },
+            ..ClockFormat::default()
+        },
         stop,
         message: Vec::new(),
         started: None,
@@ -87,14 +86,14 @@ pub fn serve(
     }
     loop {
         let mut last_ns = 0;
-        for index in playback.scans.clone() {
+        for index in scans.clone() {
             scan.geometry = dataset.read(index, scan.slot())?;
             if !player.play(scan.view()) {
                 return Ok(player.ended());
             }
             last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
         }
-        if !playback.repeats {
+        if !arguments.repeat {
             player.output.close();
             return Ok(player.ended());
         }
@@ -138,7 +137,10 @@ fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configura
 struct Player<'a> {
     output: Output,
     radar: Configuration,
-    playback: &'a Playback,
+    faults: Faults,
+    /// Factor of the recorded pace; `None`: as fast as the clients read.
+    rate: Option<f64>,
+    clock: ClockFormat,
     stop: &'a dyn Fn() -> bool,
     message: Vec<u8>,
     /// When the first azimuth was due, and its time in the recording, ns.
@@ -155,12 +157,12 @@ impl Player<'_> {
         if !self.has_client() {
             return false;
         }
-        let faults = self.playback.faults;
+        let faults = self.faults;
         let number = self.played.scans;
         if is_nth(number, faults.stall_every) {
             self.played.stalls += 1;
             self.started = None;
-            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s);
+            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s.clamp(0.0, 3600.0));
             if !sleep_until(due, self.stop) {
                 return false;
             }
@@ -204,13 +206,13 @@ impl Player<'_> {
 
     /// Waits for a first client; at the pace of the clients for one after each loss, too.
     fn has_client(&self) -> bool {
-        let waits = self.started.is_none() || self.playback.rate.is_none();
+        let waits = self.started.is_none() || self.rate.is_none();
         !waits || self.output.await_client(self.stop)
     }
 
     /// Waits until an azimuth is due; false on a request to stop.
     fn wait_until_due(&mut self, stamp_ns: i64) -> bool {
-        let Some(rate) = self.playback.rate else {
+        let Some(rate) = self.rate else {
             self.started.get_or_insert((Instant::now(), stamp_ns));
             return true;
         };
@@ -226,12 +228,12 @@ impl Player<'_> {
     }
 
     fn send(&mut self, scan: &PolarScan<'_>, row: usize) {
-        let faults = self.playback.faults;
+        let faults = self.faults;
         let encoder_size = self.radar.encoder_size;
         let turns = f64::from(scan.azimuth_rad[row]) / TAU;
         let encoder = (turns * f64::from(encoder_size)).round() as u16 % encoder_size;
         let stamp_ns = scan.stamp_ns[row] + self.shift_ns;
-        let (seconds, split_seconds) = self.playback.clock.fields(stamp_ns);
+        let (seconds, split_seconds) = self.clock.fields(stamp_ns);
         let azimuth = Azimuth {
             sweep_counter: self.sweep_counter,
             encoder,

@@ -1,8 +1,7 @@
 //! The receivers of a playback: clients by TCP, or a group by UDP.
 
 use std::{
-    io,
-    net::{Ipv4Addr, SocketAddrV4, TcpListener, UdpSocket},
+    net::{Ipv4Addr, SocketAddrV4, UdpSocket},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -12,7 +11,7 @@ use gyre_colossus::{
     asterix::{write_azimuth, write_description},
 };
 
-use super::{Clients, Faults, faults::uniform};
+use super::{Clients, Faults, faults::uniform, unserved};
 
 /// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
@@ -22,41 +21,21 @@ const POLL: Duration = Duration::from_millis(5);
 const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 
 /// The receivers that a recording is played to.
-#[derive(Debug)]
-pub enum Audience {
+pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
-    Clients(TcpListener),
-    /// The receivers of the datagrams, if there are any.
-    Group {
-        /// The group, or the address of one receiver.
-        to: SocketAddrV4,
-        /// The address of this machine for sending them; if unspecified, the system chooses.
-        interface: Ipv4Addr,
-        /// Time before the first scan, for which only the radar's description is sent.
-        wait: Duration,
-    },
-}
-
-/// The open sockets of a playback.
-pub(crate) enum Output {
     Clients(Clients),
+    /// The receivers of the datagrams, if there are any. `wait`: the time before the first scan, for
+    /// which only the radar's description is sent.
     Group { group: Group, wait: Duration },
 }
 
 impl Output {
-    /// Begins to accept clients, or opens the socket of a group.
-    pub fn open(audience: Audience, radar: &Configuration, faults: Faults) -> io::Result<Self> {
-        Ok(match audience {
-            Audience::Clients(listener) => Self::Clients(Clients::accept(listener, radar)?),
-            Audience::Group {
-                to,
-                interface,
-                wait,
-            } => Self::Group {
-                group: Group::open(to, interface, faults)?,
-                wait,
-            },
-        })
+    /// Begins to accept clients of this radar.
+    pub fn begin(&mut self, radar: &Configuration) -> Result<(), String> {
+        match self {
+            Self::Clients(clients) => clients.accept(radar).map_err(unserved),
+            Self::Group { .. } => Ok(()),
+        }
     }
 
     /// Describes the radar to a group for the time that was asked for; false on a request to stop.
@@ -134,9 +113,9 @@ pub struct Group {
 
 impl Group {
     /// Opens a socket for datagrams that leave by an interface; unspecified: the system chooses it.
-    pub fn open(to: SocketAddrV4, interface: Ipv4Addr, faults: Faults) -> io::Result<Self> {
+    pub fn open(to: SocketAddrV4, interface: Ipv4Addr, faults: Faults) -> Result<Self, String> {
         Ok(Self {
-            socket: UdpSocket::bind((interface, 0))?,
+            socket: UdpSocket::bind((interface, 0)).map_err(unserved)?,
             to,
             faults,
             number: 0,
