@@ -49,14 +49,9 @@ impl<'a> Examination<'a> {
 
     /// Opens a run, and starts the program in it with items sent at a pace and up to one; returns
     /// also whether it has opened its topic.
-    fn begin(
-        &mut self,
-        name: &str,
-        pace: Pace,
-        until: u64,
-    ) -> Result<(Session<'_>, bool), Failure> {
+    fn begin(&mut self, name: &str, pace: Pace, end: u64) -> Result<(Session<'_>, bool), Failure> {
         let mut session = Session::open(self.context, name, &mut self.findings)?;
-        (session.pace, session.until) = (pace, until);
+        (session.pace, session.until) = (pace, end);
         let is_open = session.starts()?;
         session.harness.connect()?;
         Ok((session, is_open))

@@ -177,41 +177,41 @@ impl Source {
 
     /// Returns the scans; `None` of a run of a radar, which leaves none.
     pub fn scans(&self) -> Result<Option<Scans>, Failure> {
-        match &self.kind {
-            Kind::Run(configuration) if configuration.is_radar() => Ok(None),
-            Kind::Run(configuration) => {
-                let mut configuration = configuration.clone();
-                // The angles of an encoder are written as it counts them: who reads them corrects
-                // its eccentricity.
-                let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
-                configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
-                let dataset = gyre_configuration::open(&configuration)?.dataset;
-                let played = configuration.source.played(dataset.scans());
-                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
+        if let Kind::Run(configuration) = &self.kind {
+            if configuration.is_radar() {
+                return Ok(None);
             }
-            Kind::Recording => {
-                let options = gyre_recording::stored_options(&self.path)?;
-                let dataset = gyre_recording::open(&self.path, &DatasetOptions::default())?;
-                Ok(Some(Scans {
-                    played: dataset.first()..dataset.len(),
-                    dataset,
-                    eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
-                    is_corrected: true,
-                    encoder_counts: options.encoder_counts,
-                }))
-            }
-            Kind::Dataset => {
-                let stored = gyre_recording::stored_options(&self.path)?;
-                let eccentricity = stored.azimuth_eccentricity_rad;
-                let options = DatasetOptions {
-                    azimuth_eccentricity_rad: Some(0.0),
-                    ..DatasetOptions::default()
-                };
-                let dataset = gyre_recording::open(&self.path, &options)?;
-                let played = dataset.first()..dataset.len();
-                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
-            }
+            let mut configuration = configuration.clone();
+            // The angles of an encoder are written as it counts them: who reads them corrects its
+            // eccentricity.
+            let eccentricity = &mut configuration.dataset.azimuth_eccentricity_rad;
+            let eccentricity_rad = eccentricity.replace(0.0).unwrap_or_default();
+            let dataset = gyre_configuration::open(&configuration)?.dataset;
+            return Ok(Some(Scans {
+                played: configuration.source.played(dataset.scans()),
+                encoder_counts: dataset.encoder_counts(),
+                dataset,
+                eccentricity_rad,
+                is_corrected: false,
+            }));
         }
+        let is_corrected = matches!(self.kind, Kind::Recording);
+        let stored = gyre_recording::stored_options(&self.path)?;
+        let options = DatasetOptions {
+            azimuth_eccentricity_rad: (!is_corrected).then_some(0.0),
+            ..DatasetOptions::default()
+        };
+        let dataset = gyre_recording::open(&self.path, &options)?;
+        Ok(Some(Scans {
+            played: dataset.first()..dataset.len(),
+            encoder_counts: match is_corrected {
+                true => stored.encoder_counts,
+                false => dataset.encoder_counts(),
+            },
+            dataset,
+            eccentricity_rad: stored.azimuth_eccentricity_rad.unwrap_or_default(),
+            is_corrected,
+        }))
     }
 
     pub fn write_map(
@@ -243,22 +243,6 @@ impl Source {
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())
-    }
-}
-
-impl Scans {
-    fn uncorrected(
-        dataset: Box<dyn Dataset>,
-        played: std::ops::Range<usize>,
-        eccentricity_rad: Option<f32>,
-    ) -> Self {
-        Self {
-            encoder_counts: dataset.encoder_counts(),
-            dataset,
-            played,
-            eccentricity_rad: eccentricity_rad.unwrap_or_default(),
-            is_corrected: false,
-        }
     }
 }
 

@@ -8,8 +8,7 @@ use std::{
 
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
 use gyre_results::{Content, Out, OutError};
-use gyre_slam::localisation::Map;
-use gyre_slam::{Keyframe, Record};
+use gyre_slam::{Keyframe, Record, localisation::Map};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
 

@@ -88,7 +88,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         &configuration,
     );
     let counts = &found.counts;
-    let searched = counts.scans() + PROBES * usize::from(!scans.is_empty());
+    let searched = counts.scans() + PROBES * usize::from(!scans.played.is_empty());
     let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / searched.max(1) as f64;
     fixes.commit()?;
     let drawn = draw(&arguments.map, &found, out);
@@ -96,7 +96,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     drawn?;
     let figures = Figures {
         counts,
-        left_out: scans.left_out(),
+        left_out: scans.left_out,
         ms_a_scan,
         fixes: out.join(FIXES),
     };
@@ -155,7 +155,7 @@ fn follow(
 ) -> Result<(), Failure> {
     fixes.append(HEADER)?;
     all.pieces.push(Vec::new());
-    let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
+    let (mut progress, mut row) = (Progress::new(scans.played.len()), String::new());
     while let Some(scan) = scans.register_next()? {
         if scan.starts {
             localiser.reset();
@@ -167,7 +167,7 @@ fn follow(
         all.add(&scan, &found);
         let counts = &all.counts;
         progress.show(counts.scans(), found.status);
-        if counts.scans() == FIRST && !counts.has_fix() && !scans.is_empty() {
+        if counts.scans() == FIRST && !counts.has_fix() && !scans.played.is_empty() {
             let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
             if !Scans::open(configuration)?.any_of(PROBES, is_found)? {
                 break;

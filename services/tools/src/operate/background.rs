@@ -58,7 +58,7 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
     let mut run = start(&output).map_err(|error| format!("cannot start the run: {error}"))?;
     loop {
         if let Some(status) = run.try_wait()? {
-            return ended(status, &mut output, begin, out);
+            return end(status, &mut output, begin, out);
         }
         if let Some(status) = status_of(out, run.id()) {
             let (name, pid, count) = (out.display(), status.pid, status.processes.len());
@@ -71,7 +71,7 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
         if signals.sleep(PERIOD)? {
             // It may have ended.
             let _ = kill_process(Pid::from_child(&run), Signal::INT);
-            return ended(run.wait()?, &mut output, begin, out);
+            return end(run.wait()?, &mut output, begin, out);
         }
     }
 }
@@ -100,12 +100,7 @@ fn status_of(out: &Path, pid: u32) -> Option<Status> {
 }
 
 /// Repeats the output of an ended run, and its exit code.
-fn ended(
-    status: ExitStatus,
-    output: &mut File,
-    begin: u64,
-    out: &Path,
-) -> Result<ExitCode, Failure> {
+fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<ExitCode, Failure> {
     let mut bytes = Vec::new();
     output.seek(SeekFrom::Start(begin))?;
     output.read_to_end(&mut bytes)?;

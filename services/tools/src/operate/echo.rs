@@ -83,10 +83,7 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-fn observe<M: Message>(
-    out: &Path,
-    describe: impl Fn(&Received<M>) -> String,
-) -> Result<(), Failure> {
+fn observe<M: Message>(out: &Path, words: impl Fn(&Received<M>) -> String) -> Result<(), Failure> {
     let run = ObservedRun::writing_to(out)?;
     let mut observer = run.observe::<M>()?;
     let mut lines = BufWriter::new(io::stdout().lock());
@@ -107,7 +104,7 @@ fn observe<M: Message>(
                 if missed > 0 {
                     writeln!(lines, "{missed} missed")?;
                 }
-                writeln!(lines, "{seq}: scan {scan}, {}", describe(message))?;
+                writeln!(lines, "{seq}: scan {scan}, {}", words(message))?;
             }
             Next::Idle => {}
             Next::Ended => break,

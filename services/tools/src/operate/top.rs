@@ -72,13 +72,14 @@ fn show(
     snapshots: &mut Snapshots<'_>,
     every: Duration,
 ) -> Result<Option<Snapshot>, Failure> {
+    let mut last = None;
     loop {
         let snapshot = match snapshots.take() {
-            Ok(snapshot) => snapshot,
-            Err(_) if snapshots.has_ended() => return Ok(snapshots.last()),
+            Ok(snapshot) => last.insert(snapshot),
+            Err(_) if snapshots.has_ended() => return Ok(last),
             Err(error) => return Err(error),
         };
-        terminal.draw(|frame| screen::draw(frame, &snapshot))?;
+        terminal.draw(|frame| screen::draw(frame, snapshot))?;
         // Each drawing has the size of the terminal as of then.
         let quit = || {
             let event = event::poll(PERIOD)?.then(event::read).transpose()?;

@@ -45,23 +45,19 @@ pub struct Captured {
     pub bytes: u64,
 }
 
-/// Records the bytes of the radar at `address` until it ends, or `stop` returns true.
-pub fn record(
-    address: &Address,
-    path: &Path,
-    stop: &dyn Fn() -> bool,
-) -> Result<Captured, Failure> {
+/// Records the bytes of a radar until it ends, or `stop` returns true.
+pub fn record(radar: &Address, path: &Path, stop: &dyn Fn() -> bool) -> Result<Captured, Failure> {
     let file = &in_file(path);
     // Before the radar is asked for anything: a file that is there is not overwritten.
     let mut out = io::BufWriter::new(File::create_new(path).map_err(file)?);
     let requests = [Request::RequestConfiguration, Request::StartFft];
-    let mut socket = RadarSocket::open(address, &requests).map_err(|error| {
+    let mut socket = RadarSocket::open(radar, &requests).map_err(|error| {
         // The file is empty.
         let _ = fs::remove_file(path);
-        format!("no radar answers at {address} ({error}): check the address")
+        format!("no radar answers at {radar} ({error}): check the address")
     })?;
     out.write_all(MAGIC).map_err(file)?;
-    out.write_all(&[address.is_udp().into()]).map_err(file)?;
+    out.write_all(&[radar.is_udp().into()]).map_err(file)?;
     let (started, mut space) = (Instant::now(), vec![0; MAX_RECORD_BYTES]);
     let mut captured = Captured::default();
     while !stop() {

@@ -62,12 +62,7 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
 }
 
 /// Starts a helper whose output goes to `output` and `errors`.
-pub(crate) fn spawn(
-    program: &Path,
-    work: &Work,
-    output: Stdio,
-    errors: Stdio,
-) -> Result<Child, Failure> {
+pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
     let spawned = Command::new(program)
         .arg(COMMAND)
         .arg(std::process::id().to_string())

@@ -72,7 +72,7 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
 }
 
 /// A fault of gyro, wheels or radar, and how the motions reported it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WitnessFault {
     pub kind: PlayedFaultKind,
     /// The start of the fault, s since the measurement began.
@@ -92,13 +92,8 @@ impl WitnessFault {
     fn new(fault: &PlayedFault) -> Self {
         Self {
             kind: fault.kind,
-            at_s: 0.0,
             for_s: fault.for_s,
-            motions: 0,
-            noticed: 0,
-            counts: WitnessCounts::default(),
-            recovery_ms: None,
-            way_m: 0.0,
+            ..Self::default()
         }
     }
 

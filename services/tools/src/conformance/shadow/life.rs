@@ -42,10 +42,7 @@ pub(crate) struct Life<'a> {
 impl<'a> Life<'a> {
     /// Starts the program in a run of its own, with a copy of the state of the observed run's
     /// refinement.
-    pub(crate) fn begin(
-        program: &ShadowProgram,
-        signals: &'a Signals,
-    ) -> Result<Self, SuperviseError> {
+    pub fn begin(program: &ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
         let (candidate, out) = (&program.candidate, program.folder.join("out"));
         if out.exists() {
             fs::remove_dir_all(&out).map_err(at(&out))?;

@@ -5,8 +5,7 @@ use std::{fs, path::Path};
 use gyre_geometry::Pose;
 use gyre_mapping::Drawing;
 use gyre_results::{Content, Out};
-use gyre_slam::localisation::FoundKeyframe;
-use gyre_slam::{Keyframe, RecordReader};
+use gyre_slam::{Keyframe, RecordReader, localisation::FoundKeyframe};
 use gyre_terminal::Failure;
 
 use super::{Lines, MapArguments, MapFormat, placing};

@@ -22,7 +22,6 @@ const SPAN: Duration = Duration::from_secs(10);
 /// Number of snapshots whose latency is drawn.
 const HISTORY: usize = 300;
 
-#[derive(Clone)]
 pub struct Snapshot {
     pub status: Status,
     /// Scans with a pose, 1/s.
@@ -63,7 +62,6 @@ pub struct Snapshots<'run> {
     has_new: bool,
     history: VecDeque<u64>,
     earlier: Option<Earlier>,
-    last: Option<Snapshot>,
 }
 
 /// The counts at the snapshot before.
@@ -86,16 +84,11 @@ impl<'run> Snapshots<'run> {
             has_new: false,
             history: VecDeque::new(),
             earlier: None,
-            last: None,
         }
     }
 
     pub fn has_ended(&self) -> bool {
         !self.control.is_there() || self.control.status().is_err()
-    }
-
-    pub fn last(&mut self) -> Option<Snapshot> {
-        self.last.take()
     }
 
     /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest
@@ -162,7 +155,7 @@ impl<'run> Snapshots<'run> {
                 wake_ups: per_s(now.wake_ups.saturating_sub(before.wake_ups)),
             }
         };
-        let snapshot = Snapshot {
+        Ok(Snapshot {
             rate,
             in_flight,
             latency: meter.latency(),
@@ -172,9 +165,7 @@ impl<'run> Snapshots<'run> {
             processes: status.processes.iter().map(|it| used(it.pid)).collect(),
             history: self.history.iter().copied().collect(),
             status,
-        };
-        self.last = Some(snapshot.clone());
-        Ok(snapshot)
+        })
     }
 
     /// Adds the longest time since the last snapshot to the drawing: while poses are due and none
