@@ -125,7 +125,7 @@ fn a_stage_without_results_conforms_but_for_the_results() {
 
 /// A stage, its breach, the rule that names it, and words of the sentence.
 #[rustfmt::skip]
-const BREACHES: [(&str, &str, &str, &str); 17] = [
+static BREACHES: [(&str, &str, &str, &str); 17] = [
     (SEARCH, "skips", "one-for-one", "it sent nothing about item 5"),
     (SEARCH, "sends twice", "one-for-one", "it sent item 5 after item 5"),
     (SEARCH, "keeps the end", "passes-end", "has not passed on item 8"),

@@ -1,7 +1,7 @@
 //! A snapshot at a run as a screen, or as text.
 
 use gyre_run::latency::HopLatency;
-use gyre_stage::control::{Activity, ProcessStatus, Status};
+use gyre_stage::control::{Activity, ProcessStatus};
 use gyre_terminal::wrap;
 use ratatui::{
     Frame,
