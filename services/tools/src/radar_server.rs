@@ -12,7 +12,7 @@ use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
-use capture::Capture;
+use capture::{Capture, Captured};
 use server::{Clients, Faults, Group, Output};
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
@@ -72,15 +72,12 @@ fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<
         false => String::new(),
     };
     let (address, stop) = (Address::parse(radar, &interface)?, stop()?);
+    let path = file.display();
     print::note(format_args!(
-        "gyre: capturing the radar at {address} into {}",
-        file.display()
+        "gyre: capturing the radar at {address} into {path}"
     ));
-    let captured = capture::record(&address, file, &stop)?;
-    print::line(format_args!(
-        "captured {} bytes in {} records",
-        captured.bytes, captured.records
-    ))?;
+    let Captured { records, bytes } = capture::record(&address, file, &stop)?;
+    print::line(format_args!("captured {bytes} bytes in {records} records"))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -92,10 +89,8 @@ fn play(
     let stop = stop()?;
     let output = announced(&data.display().to_string(), arguments, Faults::default())?;
     let played = capture::play(output, capture, arguments.rate.factor(), &stop)?;
-    print::line(format_args!(
-        "played {} bytes in {} records",
-        played.bytes, played.records
-    ))?;
+    let Captured { records, bytes } = played;
+    print::line(format_args!("played {bytes} bytes in {records} records"))?;
     Ok(ExitCode::SUCCESS)
 }
 

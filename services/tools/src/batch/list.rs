@@ -66,20 +66,14 @@ impl List {
             let refused = |reason| format!("{shown}, line {line}: {reason}");
             let drive = drive.map_err(refused)?;
             if let Some(first) = seen.insert(drive.name.clone(), line) {
-                return Err(refused(format!(
-                    "the drive of line {first} is named `{}` too: give them different names in the column `name`",
-                    drive.name
-                ))
-                .into());
+                let name = drive.name;
+                return Err(refused(format!("the drive of line {first} is named `{name}` too: give them different names in the column `name`")).into());
             }
             drives.push(drive);
         }
         match drives.is_empty() {
             false => Ok(Self { drives, folder }),
-            true => Err(format!(
-                "{shown} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one"
-            )
-            .into()),
+            true => Err(format!("{shown} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one").into()),
         }
     }
 
@@ -87,9 +81,9 @@ impl List {
     /// long drives that are neighbours are divided.
     pub fn share(&self, task: usize, tasks: usize) -> Result<Vec<Drive>, Failure> {
         if task >= tasks {
+            let last = tasks.saturating_sub(1);
             return Err(format!(
-                "there is no task {task} of {tasks}: tasks count from 0, so the last one is {}",
-                tasks.saturating_sub(1)
+                "there is no task {task} of {tasks}: tasks count from 0, so the last one is {last}"
             )
             .into());
         }

@@ -25,6 +25,9 @@ use crate::conformance::{
 /// Items between two observers.
 const BETWEEN: u64 = 3;
 
+/// A part of the test.
+type Scenario<'a> = fn(&mut Examination<'a>) -> Result<(), Failure>;
+
 pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
@@ -67,20 +70,19 @@ impl<'a> Examination<'a> {
         if !self.stream()? {
             return self.report(None, None);
         }
-        (self.observe)("one item at a time, with observers");
-        self.steps()?;
-        (self.observe)("kill -9");
-        self.restart()?;
-        if self.stage() == StageId::Masking {
-            (self.observe)("feedback");
-            self.feedback()?;
+        let is_masking = self.stage() == StageId::Masking;
+        let is_source = self.stage() == StageId::RadarReplay;
+        let scenarios: [(bool, &str, Scenario<'a>); 5] = [
+            (true, "one item at a time, with observers", Self::steps),
+            (true, "kill -9", Self::restart),
+            (is_masking, "feedback", Self::feedback),
+            (is_source, "a full window", Self::window),
+            (true, "standing by", Self::standing_by),
+        ];
+        for (_, name, scenario) in scenarios.into_iter().filter(|it| it.0) {
+            (self.observe)(name);
+            scenario(&mut self)?;
         }
-        if self.stage() == StageId::RadarReplay {
-            (self.observe)("a full window");
-            self.window()?;
-        }
-        (self.observe)("standing by");
-        self.standing_by()?;
         self.refusals()?;
         let mut answers = None;
         if self.context.test.demands.budget.is_some() {

@@ -109,14 +109,10 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     }
     match counts.has_fix() {
         true => Ok(ExitCode::SUCCESS),
-        false => Err(format!(
-            "no scan of {} was found in {}: it may be of another place, or made with settings for \
-             another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are \
-             searched; source.first and source.scans choose a part",
-            configuration.data(),
-            arguments.map.display()
-        )
-        .into()),
+        false => {
+            let (data, map) = (configuration.data(), arguments.map.display());
+            Err(format!("no scan of {data} was found in {map}: it may be of another place, or made with settings for another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are searched; source.first and source.scans choose a part").into())
+        }
     }
 }
 

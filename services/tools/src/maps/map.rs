@@ -125,14 +125,11 @@ pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
 pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     require_results(run)?;
     let path = records_path::<Keyframe>(run);
-    match exists(&path)? {
-        true => Ok(RecordReader::open(run)?),
-        false => Err(format!(
-            "{} does not exist: a run keeps keyframes with --set slam.kind=graph",
-            path.display()
-        )
-        .into()),
+    if exists(&path)? {
+        return Ok(RecordReader::open(run)?);
     }
+    let path = path.display();
+    Err(format!("{path} does not exist: a run keeps keyframes with --set slam.kind=graph").into())
 }
 
 /// The lines drawn over the keyframes, in the frame of the trajectory.

@@ -12,10 +12,10 @@ pub fn escaped(text: &str) -> String {
 pub fn section(title: &str, content: &str) -> String {
     match content.is_empty() {
         true => String::new(),
-        false => format!(
-            "<section><h2>{}</h2>\n{content}\n</section>\n",
-            escaped(title)
-        ),
+        false => {
+            let title = escaped(title);
+            format!("<section><h2>{title}</h2>\n{content}\n</section>\n")
+        }
     }
 }
 

@@ -117,11 +117,8 @@ impl Scans {
         self.left_out += 1;
         self.unreadable += 1;
         if self.unreadable > self.max_unreadable {
-            return Err(format!(
-                "{} scans in a row cannot be used (source.max_unreadable), the last one: {reason}",
-                self.unreadable
-            )
-            .into());
+            let scans = self.unreadable;
+            return Err(format!("{scans} scans in a row cannot be used (source.max_unreadable), the last one: {reason}").into());
         }
         print::note(format_args!("left out: {reason}"));
         Ok(())

@@ -65,10 +65,8 @@ pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
 
 fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
     let longest = snapshot.history.iter().max().copied().unwrap_or_default();
-    let title = format!(
-        " sensor to pose: the longest of each snapshot, up to {} ",
-        duration(longest as f64 * 1e-6)
-    );
+    let most = duration(longest as f64 * 1e-6);
+    let title = format!(" sensor to pose: the longest of each snapshot, up to {most} ");
     let block = Block::bordered().title(title);
     let width = usize::from(block.inner(area).width);
     let first = snapshot.history.len().saturating_sub(width);
