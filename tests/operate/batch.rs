@@ -225,10 +225,8 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(started.wait(), Some(1));
     assert!(killed.outcomes().iter().any(|it| it.ends_with(" killed")));
     let last = killed.finish().stdout;
-    assert!(
-        last.contains(said) && last.contains("had been computed before"),
-        "{last}"
-    );
+    let before = "had been computed before";
+    assert!(last.contains(said) && last.contains(before), "{last}");
     assert_eq!(killed.table(), calm.table());
 
     // Tasks that share the list and the folder alone.

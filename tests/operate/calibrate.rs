@@ -50,11 +50,8 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     ] {
         assert!(line(name).ends_with(end), "{name}: {said}");
     }
-    let resolution = line("range resolution");
-    assert!(
-        resolution.contains("a drive alone cannot tell it"),
-        "{said}"
-    );
+    let alone = "a drive alone cannot tell it";
+    assert!(line("range resolution").contains(alone), "{said}");
     assert!(!line("Doppler shift").contains("CONTRADICTS"), "{said}");
     let picture = fs::read_to_string(out.path().join("calibration.svg")).unwrap();
     assert!(picture.contains("as configured") && picture.contains("as proposed"));

@@ -19,10 +19,8 @@ fn a_machine_that_runs_these_tests_lacks_nothing_that_a_run_needs() {
     command.arg("doctor").arg("--out").arg(out);
     let ended = Ended::of(command);
     let said = &ended.succeeded().stdout;
-    assert!(
-        said.contains("a run works here") && !said.contains("FAILS"),
-        "{said}"
-    );
+    let works = said.contains("a run works here");
+    assert!(works && !said.contains("FAILS"), "{said}");
     let subjects = "shared memory,memory,open files,clock,results,ONNX Runtime,Python";
     for subject in subjects.split(',') {
         let lines = said.lines().filter(|line| line.len() > 6);
@@ -50,16 +48,12 @@ fn what_a_run_lacks_is_named_with_its_remedy() {
         command.args(["-c", &script]);
         let ended = Ended::of(command);
         assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
-        let mut lines = ended.stdout.lines();
-        let fails = format!("FAILS {subject}");
-        assert!(
-            lines.any(|line| line.starts_with(&fails)),
-            "{}",
-            ended.stdout
-        );
+        let said = &ended.stdout;
+        let (mut lines, fails) = (said.lines(), format!("FAILS {subject}"));
+        assert!(lines.any(|line| line.starts_with(&fails)), "{said}");
         assert!(lines.next().is_some_and(|it| it.contains(remedy)));
         let none = "no run works here while this fails: 1";
-        assert!(ended.stdout.contains(none));
+        assert!(said.contains(none));
     }
 }
 
@@ -96,19 +90,15 @@ fn the_python_of_functions_is_reported_with_its_numpy() {
     install(&python, format!("{begin} \"$@\"\n"));
     let found = of_python(named);
     assert!(found.starts_with("ok    Python         /"), "{found}");
-    assert!(
-        found.contains(", 3.") && found.contains(", with numpy 7.8.9\n"),
-        "{found}"
-    );
+    let numpy = ", with numpy 7.8.9\n";
+    assert!(found.contains(", 3.") && found.contains(numpy), "{found}");
     // -S leaves out the folders of packages.
     fs::remove_file(with.join("numpy.py")).unwrap();
     let found = of_python(named);
     assert!(found.starts_with("note  Python         /"), "{found}");
     let lacking = "without numpy: no stage can be a function of Python";
-    assert!(
-        found.contains(lacking) && found.contains("-m pip install numpy"),
-        "{found}"
-    );
+    let remedy = "-m pip install numpy";
+    assert!(found.contains(lacking) && found.contains(remedy), "{found}");
     for (python, words) in [
         ("/no/such/python", "cannot start /no/such/python: "),
         (

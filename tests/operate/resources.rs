@@ -61,8 +61,5 @@ fn shared_memory_stays_within_what_was_announced() {
     let segments = summary["shared_memory"]["segments"].as_array().unwrap();
     let segments = segments.iter().map(|segment| segment[1].as_u64().unwrap());
     let announced = segments.sum();
-    assert!(
-        used <= announced,
-        "{used} bytes used, {announced} announced"
-    );
+    assert!(used <= announced, "{used} bytes, {announced} announced");
 }

@@ -129,9 +129,8 @@ mod tests {
     }
 
     fn chosen(options: &str, played: Range<usize>) -> Result<Vec<usize>, Failure> {
-        let words = ["masks", "c.toml"]
-            .into_iter()
-            .chain(options.split_whitespace());
+        let words = ["masks", "c.toml"].into_iter();
+        let words = words.chain(options.split_whitespace());
         choose(&Masks::try_parse_from(words)?.arguments, played, "drive")
     }
 
@@ -140,10 +139,8 @@ mod tests {
         assert_eq!(chosen("--scans 7,3,7", 0..10).unwrap(), [3, 7]);
         assert_eq!(chosen("--every 4", 2..12).unwrap(), [2, 6, 10]);
         assert_eq!(chosen("", 0..3).unwrap(), [0, 1, 2]);
-        assert_eq!(
-            chosen("", 10..26).unwrap(),
-            [10, 12, 14, 16, 18, 20, 22, 24]
-        );
+        let eight = [10, 12, 14, 16, 18, 20, 22, 24];
+        assert_eq!(chosen("", 10..26).unwrap(), eight);
         let refused = |options, played| chosen(options, played).unwrap_err().to_string();
         let sentence = "--scans 20: the scans of drive that are played have the numbers 10 to 19";
         assert_eq!(refused("--scans 10,20", 10..20), sentence);

@@ -248,10 +248,8 @@ mod tests {
         let list = read("# two drives\n/data/a, b/\n\nruns/c.mcap\nsim.toml\n").unwrap();
         let named = |drive: &Drive| format!("{}: {}", drive.name, drive.path);
         let named: Vec<_> = list.drives.iter().map(named).collect();
-        assert_eq!(
-            named,
-            ["a, b: /data/a, b/", "c: runs/c.mcap", "sim: sim.toml"]
-        );
+        let expected = ["a, b: /data/a, b/", "c: runs/c.mcap", "sim: sim.toml"];
+        assert_eq!(named, expected);
         assert_eq!(list.resolve("/data/x"), Path::new("/data/x"));
         assert!(list.resolve("runs/c.mcap").is_absolute());
     }

@@ -143,10 +143,8 @@ mod tests {
         let verdicts: BTreeMap<_, _> = judged.map(|it| (it.rule, it.verdict)).collect();
         let twice = Verdict::Broken(vec!["item 0".to_owned(), "item 1".to_owned()]);
         assert_eq!(verdicts[&Rule::OneForOne], twice);
-        assert_eq!(
-            verdicts[&Rule::KeepsWindow],
-            Verdict::DoesNotApply("it is no source")
-        );
+        let no_source = Verdict::DoesNotApply("it is no source");
+        assert_eq!(verdicts[&Rule::KeepsWindow], no_source);
         assert_eq!(verdicts[&Rule::PassesEnd], Verdict::NotReached);
         assert_eq!(verdicts.len(), Rule::ALL.len());
     }

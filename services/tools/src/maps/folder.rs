@@ -182,10 +182,7 @@ mod tests {
         write_all(&map.join(NEXT), "later");
         let writing = Out::lock_for(map, Content::MAP).unwrap();
         let refused = settle(map).unwrap_err().to_string();
-        assert!(
-            refused.contains("is being replaced by another"),
-            "{refused}"
-        );
+        assert!(refused.contains("is being replaced by another"));
         drop(writing);
         settle(map).unwrap();
         assert_eq!(content(map, "map.toml"), "later");

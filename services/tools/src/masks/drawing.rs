@@ -151,28 +151,20 @@ mod tests {
         };
         let [one, two] = [vec![raster(30.0)], vec![raster(30.0), raster(120.0)]]
             .map(|rasters| Canvas::of(&inspection(rasters)));
-        assert_eq!(
-            (one.width, one.pixels.len() / one.width),
-            (4 * 256 + 5 * MARGIN, 256 + 2 * MARGIN)
-        );
-        assert_eq!(
-            (two.width, two.pixels.len() / two.width),
-            (one.width, 2 * 256 + 3 * MARGIN)
-        );
+        let width = 4 * 256 + 5 * MARGIN;
+        assert_eq!((one.width, two.width), (width, width));
+        assert_eq!(one.pixels.len() / width, 256 + 2 * MARGIN);
+        assert_eq!(two.pixels.len() / width, 2 * 256 + 3 * MARGIN);
         let at = |canvas: &Canvas, row: usize, panel: usize| {
             canvas.pixels[row * canvas.width + MARGIN + panel * (256 + MARGIN)]
         };
-        assert_eq!(
-            [0, 1, 2, 3].map(|panel| at(&two, MARGIN, panel)),
-            [colour(0.25), grey(0.5), colour(1.0), grey(0.1)]
-        );
+        let panels = [0, 1, 2, 3].map(|panel| at(&two, MARGIN, panel));
+        assert_eq!(panels, [colour(0.25), grey(0.5), colour(1.0), grey(0.1)]);
         assert_eq!(at(&two, 256 + 2 * MARGIN, 0), colour(1.0));
         assert_eq!(at(&one, MARGIN - 1, 0), AROUND);
         // The last cell's dot.
         let end = (MARGIN + 255) * one.width + MARGIN + 3 * (256 + MARGIN) + 255;
-        assert_eq!(
-            (one.pixels[end], Canvas::stack(&[one]).pixels.len()),
-            (colour(1.0), 268 * 1054)
-        );
+        assert_eq!(one.pixels[end], colour(1.0));
+        assert_eq!(Canvas::stack(&[one]).pixels.len(), 268 * 1054);
     }
 }

@@ -203,10 +203,7 @@ mod tests {
             (Scenario::SlowStage, 0, &[], Verdict::NotJudged),
         ] {
             let judged = outcome(scenario, faults, measured).judged();
-            assert_eq!(
-                judged.verdict, verdict,
-                "{scenario}, {faults}, {measured:?}"
-            );
+            assert_eq!(judged.verdict, verdict, "{scenario}, {measured:?}");
         }
         let failed = outcome(Scenario::Steady, 0, &[300.0]).judged();
         assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
