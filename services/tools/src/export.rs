@@ -45,7 +45,11 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     let mut trajectory = places.peek().map(begin).transpose()?;
     let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
     let mut last_ns = 0;
-    while let Some(stamp_ns) = scans.write_next(&mut bag)? {
+    let mut next = |bag: &mut BagWriter| match &mut scans {
+        Some(scans) => scans.write_next(bag),
+        None => Ok(None),
+    };
+    while let Some(stamp_ns) = next(&mut bag)? {
         while let Some(place) = places.next_if(|place| is_due(place, stamp_ns)) {
             write_place(&mut bag, trajectory.as_mut(), place?)?;
         }
@@ -67,7 +71,7 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     }
     bag.finish()?;
     print::line(format_args!("{}: {}", path.display(), counts.join(", ")))?;
-    scans.describe_losses();
+    scans.iter().for_each(ScanWriter::describe_losses);
     Ok(())
 }
 

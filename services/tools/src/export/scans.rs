@@ -23,11 +23,7 @@ const AZIMUTHS: &str = "/radar_data/fft_data";
 const B_SCANS: &str = "/radar_data/b_scan_msg";
 
 pub struct ScanWriter {
-    open: Option<Open>,
     losses: Losses,
-}
-
-struct Open {
     scans: Scans,
     scan: OwnedScan,
     lost: Lost,
@@ -89,6 +85,34 @@ impl Losses {
         self.constants.retain(|(_, value)| *value != 0.0);
     }
 
+    /// Returns the radar's description of itself in these scans.
+    fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
+        let geometry = &scan.geometry;
+        if geometry.sense != Sense::Clockwise {
+            return Err("Navtech's radars turn clockwise, and this one does not: --scans none leaves its scans out".into());
+        }
+        let (azimuths, bins) = (geometry.azimuths, geometry.bins);
+        let small = |number: usize| {
+            u16::try_from(number).map_err(|_| {
+                format!("scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's messages, which count both in 16 bits")
+            })
+        };
+        let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
+        self.without_encoder = !encoder.is_exact;
+        let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
+        Ok(Radar {
+            azimuth_samples: small(azimuths)?,
+            bin_size: 0,
+            range_in_bins: small(bins)?,
+            encoder_size: encoder.counts,
+            rotation_mhz: turns_per_1000_s.round().min(f64::from(u16::MAX)) as u16,
+            packet_rate: 0,
+            range_gain: 1.0,
+            range_offset: 0.0,
+            range_resolution_m: Some(geometry.range_resolution_m),
+        })
+    }
+
     fn sentences(&self) -> Vec<String> {
         let (unreadable, interpolated) = (self.unreadable, self.interpolated);
         let (placed, not_placed, retimed) = (self.placed, self.not_placed, self.retimed);
@@ -118,80 +142,45 @@ impl ScanWriter {
         source: &mut Source,
         forms: &[ScanForm],
         frame: &str,
-    ) -> Result<Self, Failure> {
-        let mut writer = Self {
-            open: None,
-            losses: Losses::default(),
-        };
+    ) -> Result<Option<Self>, Failure> {
         if forms.contains(&ScanForm::None) {
-            return Ok(writer);
+            return Ok(None);
         }
         let Some(mut scans) = source.scans()? else {
             print::note("the run was of a radar, and has no scans: --record keeps them");
-            return Ok(writer);
+            return Ok(None);
         };
         let Some(scan) = first(&mut scans)? else {
-            return Ok(writer);
+            return Ok(None);
         };
-        let radar = writer.radar(&scans, &scan)?;
-        writer
-            .losses
-            .add_constants(&scan.geometry, scans.eccentricity_rad);
-        writer.open = Some(Open {
+        let mut losses = Losses::default();
+        let radar = losses.radar(&scans, &scan)?;
+        losses.add_constants(&scan.geometry, scans.eccentricity_rad);
+        let configuration = bag.topic(CONFIGURATION, Kept::ForLater)?;
+        let fft = forms.contains(&ScanForm::Fft);
+        let azimuths = fft.then(|| bag.topic(AZIMUTHS, Kept::ForNobody));
+        let azimuths = azimuths.transpose()?;
+        let b_scans = forms.contains(&ScanForm::BScan);
+        let b_scans = b_scans.then(|| bag.topic(B_SCANS, Kept::ForNobody));
+        Ok(Some(Self {
+            losses,
             messages: ScanMessages::new(radar, frame),
-            configuration: bag.topic(CONFIGURATION, Kept::ForLater)?,
-            azimuths: forms
-                .contains(&ScanForm::Fft)
-                .then(|| bag.topic(AZIMUTHS, Kept::ForNobody))
-                .transpose()?,
-            b_scans: forms
-                .contains(&ScanForm::BScan)
-                .then(|| bag.topic(B_SCANS, Kept::ForNobody))
-                .transpose()?,
+            configuration,
+            azimuths,
+            b_scans: b_scans.transpose()?,
             lost: source.lost()?,
             rows: PlacedRows::default(),
             scan,
             scans,
             is_described: false,
-        });
-        Ok(writer)
-    }
-
-    fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
-        let geometry = &scan.geometry;
-        if geometry.sense != Sense::Clockwise {
-            return Err("Navtech's radars turn clockwise, and this one does not: --scans none leaves its scans out".into());
-        }
-        let (azimuths, bins) = (geometry.azimuths, geometry.bins);
-        let small = |number: usize| {
-            u16::try_from(number).map_err(|_| {
-                format!("scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's messages, which count both in 16 bits")
-            })
-        };
-        let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
-        self.losses.without_encoder = !encoder.is_exact;
-        let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
-        Ok(Radar {
-            azimuth_samples: small(azimuths)?,
-            bin_size: 0,
-            range_in_bins: small(bins)?,
-            encoder_size: encoder.counts,
-            rotation_mhz: turns_per_1000_s.round().min(f64::from(u16::MAX)) as u16,
-            packet_rate: 0,
-            range_gain: 1.0,
-            range_offset: 0.0,
-            range_resolution_m: Some(geometry.range_resolution_m),
-        })
+        }))
     }
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
-        let Some(open) = &mut self.open else {
-            return Ok(None);
-        };
-        while let Some(index) = open.scans.played.next() {
-            match open.scans.read(index, &mut open.scan) {
-                Ok(()) => return open.write(index, bag, &mut self.losses).map(Some),
+        while let Some(index) = self.scans.played.next() {
+            match self.scans.read(index, &mut self.scan) {
+                Ok(()) => return self.write(index, bag).map(Some),
                 Err(error @ ReadError::Io { .. }) => return Err(error.into()),
                 Err(error) => {
                     print::note(format_args!("scan {index} is left out: {error}"));
@@ -206,23 +195,16 @@ impl ScanWriter {
     pub fn describe_losses(&self) {
         self.losses.sentences().iter().for_each(print::note);
     }
-}
 
-impl Open {
-    fn write(
-        &mut self,
-        index: usize,
-        bag: &mut BagWriter,
-        losses: &mut Losses,
-    ) -> Result<i64, Failure> {
+    fn write(&mut self, index: usize, bag: &mut BagWriter) -> Result<i64, Failure> {
         let mut scan = self.scan.view();
         if let Some(lost) = self.lost.get(&(index as u64))
             && lost.count() > 0
         {
             scan = self.rows.place(&scan, lost);
-            losses.placed += u64::from(stale_rows(&scan) == 0);
+            self.losses.placed += u64::from(stale_rows(&scan) == 0);
         }
-        losses.add(&scan);
+        self.losses.add(&scan);
         let stamps = &scan.stamp_ns[..scan.geometry.azimuths];
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
             return Ok(scan.geometry.stamp_ns);
