@@ -1,11 +1,6 @@
 //! `gyre report`: one page about a run, or about several runs and the trajectories of other
 //! programs beside each other. The page has all its pictures in it and needs no network.
-//!
-//! - `subject`: a run or a trajectory that the page is about;
-//! - `figures`: its figures, as rows of a table;
-//! - `page`: the document; `html`: its parts.
 
-mod figures;
 mod html;
 mod page;
 mod subject;

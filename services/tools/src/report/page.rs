@@ -5,17 +5,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use gyre_evaluation::plot::paths_svg;
 use gyre_geometry::Pose;
 use gyre_messages::StageId;
+use gyre_results::figures::{Figure, GROUPS};
 use gyre_terminal::Failure;
 use toml::{Table, Value};
 
 use crate::report::{
-    figures::{Group, Row, groups},
     html::{escaped, png, section, svg},
     subject::{Run, Subject},
 };
 
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
+/// The pictures of a run: title, file and caption.
+#[rustfmt::skip]
+const PICTURES: [[&str; 3]; 3] = [
+    ["Map", "map.png", "Lighter places returned power more often"],
+    ["Errors", "errors.svg", "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion"],
+    ["Uncertainty", "bands.svg", "The error of each pose within three standard deviations that its covariance states"],
+];
 /// Larger maps are left out, bytes.
 const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
@@ -25,32 +32,15 @@ const BAR: f64 = 160.0;
 pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     let names: Vec<&str> = subjects.iter().map(|it| it.name.as_str()).collect();
     let title = names.join(" · ");
-    let groups = groups(subjects);
-    let is_first = |group: &&Group| !LAST.contains(&group.title);
-    let (first, last): (Vec<_>, Vec<_>) = groups.iter().partition(is_first);
+    let [map, errors, bands] = PICTURES.map(|picture| pictures(subjects, picture));
     let body = [
-        section("Figures", &figures(subjects, &first)),
+        section("Figures", &figures(subjects, false)),
         section("Trajectory", &trajectories(subjects)?),
-        pictures(
-            subjects,
-            "Map",
-            "map.png",
-            "Lighter places returned power more often",
-        ),
-        pictures(
-            subjects,
-            "Errors",
-            "errors.svg",
-            "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion",
-        ),
-        pictures(
-            subjects,
-            "Uncertainty",
-            "bands.svg",
-            "The error of each pose within three standard deviations that its covariance states",
-        ),
+        map,
+        errors,
+        bands,
         section("Latency by stage", &latencies(subjects)),
-        section("Counts and versions", &figures(subjects, &last)),
+        section("Counts and versions", &figures(subjects, true)),
         section("Configuration", &configurations(subjects)),
     ];
     Ok(format!(
@@ -66,19 +56,50 @@ pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     ))
 }
 
-/// Returns a table of figures; nothing without any.
-fn figures(subjects: &[Subject], groups: &[&Group]) -> String {
-    if groups.is_empty() {
-        return String::new();
+/// Returns a table of the figures that a subject has, of the last groups or of the others; nothing
+/// without any.
+fn figures(subjects: &[Subject], are_last: bool) -> String {
+    let (columns, mut rows) = (subjects.len() + 1, String::new());
+    let groups = GROUPS.iter();
+    for (title, figures) in groups.filter(|(title, _)| LAST.contains(title) == are_last) {
+        let figures: String = figures
+            .iter()
+            .filter_map(|it| figure(it, subjects))
+            .collect();
+        if !figures.is_empty() {
+            rows += &format!("<tr class=\"group\"><th colspan=\"{columns}\">{title}</th></tr>\n");
+            rows += &figures;
+        }
     }
-    let columns = subjects.len() + 1;
-    let mut rows = head(subjects.iter());
-    for group in groups {
-        let title = group.title;
-        rows += &format!("<tr class=\"group\"><th colspan=\"{columns}\">{title}</th></tr>\n");
-        rows.extend(group.rows.iter().map(figure));
+    let head = head(subjects.iter());
+    match rows.is_empty() {
+        true => rows,
+        false => format!("<div class=\"wide\"><table>\n{head}{rows}</table></div>"),
     }
-    format!("<div class=\"wide\"><table>\n{rows}</table></div>")
+}
+
+/// Returns a row with a figure of all subjects; `None` if none has it. Of errors the smallest is
+/// marked, where there are several.
+fn figure(figure: &Figure, subjects: &[Subject]) -> Option<String> {
+    let values = subjects.iter().map(|it| figure.text(&it.figures));
+    let values: Vec<Option<String>> = values.collect();
+    values.iter().flatten().next()?;
+    let errors = subjects.iter().enumerate();
+    let errors = errors.filter_map(|(place, it)| Some((place, figure.error(&it.figures)?)));
+    let best = errors.min_by(|(_, one), (_, other)| one.total_cmp(other));
+    let best = best.map(|(place, _)| place).filter(|_| subjects.len() > 1);
+    let cell = |(place, value): (usize, &Option<String>)| {
+        let value = escaped(value.as_deref().unwrap_or(""));
+        match best == Some(place) {
+            true => format!("<td class=\"best\">{value}</td>"),
+            false => format!("<td>{value}</td>"),
+        }
+    };
+    let cells: String = values.iter().enumerate().map(cell).collect();
+    Some(format!(
+        "<tr><th>{}</th>{cells}</tr>\n",
+        escaped(figure.name)
+    ))
 }
 
 /// Returns the names of the subjects as a row, where there are several.
@@ -105,18 +126,6 @@ fn title_of(subject: &Subject, subjects: &[Subject]) -> String {
     }
 }
 
-fn figure(row: &Row) -> String {
-    let cell = |(place, value): (usize, &Option<String>)| {
-        let value = escaped(value.as_deref().unwrap_or(""));
-        match row.best == Some(place) {
-            true => format!("<td class=\"best\">{value}</td>"),
-            false => format!("<td>{value}</td>"),
-        }
-    };
-    let cells: String = row.values.iter().enumerate().map(cell).collect();
-    format!("<tr><th>{}</th>{cells}</tr>\n", escaped(row.name))
-}
-
 /// Draws all trajectories over the ground truth.
 fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     let truth = subjects.iter().find_map(|it| it.evaluation.as_ref());
@@ -127,7 +136,8 @@ fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     Ok(svg(&drawn, "Trajectories seen from above"))
 }
 
-fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> String {
+/// Returns a section with a picture of each run that has it.
+fn pictures(subjects: &[Subject], [title, name, caption]: [&str; 3]) -> String {
     let pictures = runs(subjects).filter_map(|(subject, run)| {
         let bytes = run.picture(name)?;
         let picture = match str::from_utf8(&bytes) {
