@@ -277,7 +277,9 @@ fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String
         items += 1;
         match result_bytes(topic, own)? == result_bytes(topic, other)? {
             true => equal += 1,
-            false => drop(differences.add(topic, own, other)?),
+            false => {
+                differences.add(topic, own, other)?;
+            }
         }
     }
     let same = format!("{equal} of {items} items are the same bytes");
