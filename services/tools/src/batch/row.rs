@@ -1,4 +1,4 @@
-//! The end of a drive's process, and the row of the drive: `rows/NAME.json`. The rows are the table.
+//! The end of a drive, and its row: `rows/NAME.json`. The rows are the table.
 
 use std::{
     fmt, io,

@@ -24,8 +24,8 @@ const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
     Clients(Clients),
-    /// The receivers of the datagrams, if there are any. `wait`: the time before the first scan, for
-    /// which only the radar's description is sent.
+    /// The receivers of the datagrams, if there are any. `wait`: the time before the first scan,
+    /// for which only the radar's description is sent.
     Group { group: Group, wait: Duration },
 }
 
