@@ -32,7 +32,10 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
     };
     refused(Run::configured(""), &["no dataset", "source.data"]);
     let nowhere = Path::new("/nowhere/at/all");
-    refused(run_of(nowhere), &["/nowhere/at/all", "is no file or folder"]);
+    refused(
+        run_of(nowhere),
+        &["/nowhere/at/all", "is no file or folder"],
+    );
     let data = format!("source.data={}", file.display());
     let text = Run::of_recording().set(&data);
     refused(text, &["scan.txt is a file", "folder"]);

@@ -18,12 +18,8 @@ const WRONG_BY_M: f64 = 0.25;
 
 fn calibrate(recording: &Path, out: &Path, set: &[&str], words: &[&str]) -> Ended {
     let mut command = gyre();
-    command
-        .arg("calibrate")
-        .arg(recording)
-        .arg("--out")
-        .arg(out)
-        .args(words);
+    command.arg("calibrate").arg(recording);
+    command.arg("--out").arg(out).args(words);
     for sentence in set {
         command.args(["--set", sentence]);
     }
@@ -48,45 +44,30 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &[]);
     let said = ended.succeeded().stdout.clone();
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
-    assert!(
-        line("range offset").ends_with("CONTRADICTS the configured value"),
-        "{said}"
-    );
+    for (name, end) in [
+        ("range offset", "CONTRADICTS the configured value"),
+        ("check ", ": better"),
+    ] {
+        assert!(line(name).ends_with(end), "{name}: {said}");
+    }
+    let alone = "a drive alone cannot tell it";
+    assert!(line("range resolution").contains(alone), "{said}");
     assert!(!line("Doppler shift").contains("CONTRADICTS"), "{said}");
-    assert!(
-        line("range resolution").contains("a drive alone cannot tell it"),
-        "{said}"
-    );
-    assert!(line("check ").ends_with(": better"), "{said}");
     let picture = fs::read_to_string(out.path().join("calibration.svg")).unwrap();
     assert!(picture.contains("as configured") && picture.contains("as proposed"));
-    let overlap: Vec<f64> = said
-        .lines()
-        .last()
-        .filter(|line| line.starts_with("overlap of the scans"))
-        .map(|line| {
-            line.split(' ')
-                .filter_map(|word| word.parse().ok())
-                .collect()
-        })
-        .unwrap();
+    let words = line("overlap of the scans").split(' ');
+    let overlap: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
     assert!(overlap.len() == 2 && overlap[1] > overlap[0], "{said}");
 
     let file = out.path().join("calibration.toml");
     let found_m = range_offset_m(&fs::read_to_string(&file).unwrap());
-    assert!(
-        (found_m - right_m).abs() < 0.1,
-        "{found_m} m for {right_m} m"
-    );
+    assert!((found_m - right_m).abs() < 0.1, "{found_m}, {right_m}");
     let run = Run::of_recording_named(recording.to_str().unwrap())
         .set("source.scans=6")
         .argument("--calibration", file.to_str().unwrap());
     run.complete();
     let used_m = range_offset_m(&run.result("config.toml"));
-    assert!(
-        (used_m - found_m).abs() < 1e-6,
-        "{used_m} m for {found_m} m"
-    );
+    assert!((used_m - found_m).abs() < 1e-6, "{used_m}, {found_m}");
 }
 
 /// The offset and its standard deviation in the line of a drive or of all together.
@@ -124,10 +105,8 @@ fn drives_that_are_read_with_different_constants_are_refused() {
     let settings = other.path().join("dataset.toml");
     let offset_m = range_offset_m(&fs::read_to_string(&settings).unwrap());
     let said = fs::read_to_string(&settings).unwrap();
-    let changed = said.replace(
-        &format!("range_offset_m = {offset_m}"),
-        "range_offset_m = -0.4",
-    );
+    let key = format!("range_offset_m = {offset_m}");
+    let changed = said.replace(&key, "range_offset_m = -0.4");
     assert_ne!(said, changed);
     fs::remove_file(&settings).unwrap();
     fs::write(&settings, changed).unwrap();
@@ -201,11 +180,8 @@ fn the_log_of_another_drive_is_refused() {
     fs::write(&other, text).unwrap();
     let words = ["radiate", "--gyro", other.to_str().unwrap()];
     let ended = calibrate(recording, out.path(), &[], &words);
-    assert!(
-        ended.stdout.contains("the log is of another drive"),
-        "{}",
-        ended.stdout
-    );
+    let reason = "the log is of another drive";
+    assert!(ended.stdout.contains(reason), "{}", ended.stdout);
     ended.failed_with(&["are too few"]);
     assert!(!out.path().join("calibration.toml").exists());
 }

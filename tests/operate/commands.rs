@@ -68,17 +68,12 @@ fn a_run_from_elsewhere_is_not_changed_without_its_name() {
         cd \"$here\"
         \"$0\" down; echo down $?";
     let mut shell = Command::new("unshare");
+    let script = format!("exec 2>&1; {script}");
+    shell.args(["--mount", "sh", "-c", &script, PROGRAM]);
     shell
-        .args([
-            "--mount",
-            "sh",
-            "-c",
-            &format!("exec 2>&1; {script}"),
-            PROGRAM,
-        ])
         .arg(run.folder())
-        .args(run.command().get_args().skip(1))
-        .stdin(Stdio::null());
+        .args(run.command().get_args().skip(1));
+    shell.stdin(Stdio::null());
     let ended = Ended::of(shell);
     let lines: Vec<&str> = ended.succeeded().stdout.lines().collect();
     let out = run.out().canonicalize().unwrap().display().to_string();
@@ -153,15 +148,12 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
 fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     let run = Run::of_recording().rate(SLOW);
     let started = Ended::of(up(&run));
-    assert!(
-        started.succeeded().stdout.contains("6 processes"),
-        "{started:?}"
-    );
+    let said = &started.succeeded().stdout;
+    assert!(said.contains("6 processes"), "{said}");
     let status = await_status(&run, "poses", |status| status["poses"].as_u64() >= Some(4));
     assert_eq!(status["phase"], "running");
     let names = status["processes"].as_array().unwrap().iter();
-    let names: Vec<_> = names.map(|it| it["name"].as_str().unwrap()).collect();
-    assert_eq!(names, STAGES);
+    assert!(names.map(|it| it["name"].as_str().unwrap()).eq(STAGES));
     let pid = status["pid"].as_u64().unwrap() as Pid;
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
     let session = stat.rsplit_once(") ").unwrap().1.split(' ').nth(3).unwrap();
@@ -169,15 +161,11 @@ fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     ask(&run, &["down"]).succeeded();
     assert_nothing_left(run.out());
     assert!(!ask(&run, &["down"]).status.success());
+    let nowhere = Run::of_recording_named("/nowhere");
+    Ended::of(up(&nowhere)).refused_with(&["/nowhere"]);
     assert!(run.result("log/gyre.txt").contains("interrupted"));
     assert_eq!(run.complete(), undisturbed());
     assert!(run.summary()["resumed_after"].as_u64() >= Some(4));
-}
-
-#[test]
-fn a_run_that_cannot_start_in_the_background_says_why() {
-    let run = Run::of_recording_named("/nowhere");
-    Ended::of(up(&run)).refused_with(&["/nowhere"]);
 }
 
 #[test]
@@ -253,16 +241,11 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
     ask(&run, &["down"]).refused_with(&["no run", "and was killed"]);
     let other = Run::of_recording().rate(SLOW);
     let going = other.start();
-    await_status(&other, "poses", |status| {
-        status["poses"].as_u64() >= Some(1)
-    });
+    await_status(&other, "poses", |it| it["poses"].as_u64() >= Some(1));
     let mut ps = gyre();
     ps.args(["ps", "--json"]);
-    let ended = Ended::of(ps);
-    assert!(
-        !ended.stdout.contains(run.out().to_str().unwrap()),
-        "{ended:?}"
-    );
+    let listed = Ended::of(ps).stdout;
+    assert!(!listed.contains(run.out().to_str().unwrap()), "{listed}");
     ask(&other, &["down"]).succeeded();
     going.finish();
     ask(&other, &["ps"]).refused_with(&["the run was interrupted"]);
@@ -302,24 +285,16 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
     let run = Run::of_recording_named(copy.path().to_str().unwrap());
     run.finish();
     let lines = ask(&run, &["logs", "radar-replay"]);
-    assert!(
-        lines
-            .succeeded()
-            .stdout
-            .contains("WARN radar-replay: skipped"),
-        "{lines:?}"
-    );
+    let said = &lines.succeeded().stdout;
+    assert!(said.contains("WARN radar-replay: skipped"), "{said}");
     assert_eq!(ask(&run, &["logs", "refinement"]).succeeded().stdout, "");
     ask(&run, &["logs", "steering"]).refused_with(&["steering", "refinement"]);
 }
 
 #[test]
 fn top_shows_the_processes_of_a_run_in_a_terminal() {
-    if !Command::new("tmux")
-        .arg("-V")
-        .output()
-        .is_ok_and(|it| it.status.success())
-    {
+    let version = Command::new("tmux").arg("-V").output();
+    if !version.is_ok_and(|it| it.status.success()) {
         println!("skipped: there is no tmux");
         return;
     }
@@ -376,9 +351,8 @@ fn systemd_is_notified_when_a_run_is_ready_alive_and_stopping() {
     socket.set_read_timeout(limit).unwrap();
     let run = Run::of_recording().rate(MODERATE);
     let mut command = run.command();
-    command
-        .env("NOTIFY_SOCKET", &path)
-        .env("WATCHDOG_USEC", "400000");
+    command.env("NOTIFY_SOCKET", &path);
+    command.env("WATCHDOG_USEC", "400000");
     let running = run.start_as(command);
     let all = notifications(&socket);
     running.finish().succeeded();

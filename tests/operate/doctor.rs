@@ -1,146 +1,104 @@
 //! `gyre doctor` reports the faults of a machine.
 
-use std::process::Command;
+use std::{fs, process::Command};
 
 use crate::common::{Ended, folder, gyre, install};
 
-/// Runs it under a limit of the shell.
-fn with_limit(limit: &str) -> Ended {
-    let mut command = Command::new("sh");
-    let script = format!("ulimit {limit}; exec '{}' doctor", crate::PROGRAM);
-    command.args(["-c", &script]);
-    Ended::of(command)
+/// Runs it with these variables of the environment.
+fn with(variables: &[(&str, &str)]) -> String {
+    let mut command = gyre();
+    command.arg("doctor").env_remove("ORT_DYLIB_PATH");
+    command.envs(variables.iter().copied());
+    Ended::of(command).succeeded().stdout.clone()
 }
 
 #[test]
 fn a_machine_that_runs_these_tests_lacks_nothing_that_a_run_needs() {
-    let folder = folder();
-    let mut command = gyre();
-    command
-        .arg("doctor")
-        .arg("--out")
-        .arg(folder.path().join("a/b"));
+    let (folder, mut command) = (folder(), gyre());
+    let out = folder.path().join("a/b");
+    command.arg("doctor").arg("--out").arg(out);
     let ended = Ended::of(command);
-    assert!(ended.succeeded().stdout.contains("a run works here"));
-    for subject in [
-        "shared memory",
-        "memory",
-        "open files",
-        "clock",
-        "results",
-        "ONNX Runtime",
-        "Python",
-    ] {
-        let says = |line: &&str| line.split_at(6).1.starts_with(subject);
-        let lines = ended.stdout.lines().filter(|line| line.len() > 6);
-        assert_eq!(lines.filter(says).count(), 1, "{subject}: {}", ended.stdout);
+    let said = &ended.succeeded().stdout;
+    let works = said.contains("a run works here");
+    assert!(works && !said.contains("FAILS"), "{said}");
+    let subjects = "shared memory,memory,open files,clock,results,ONNX Runtime,Python";
+    for subject in subjects.split(',') {
+        let lines = said.lines().filter(|line| line.len() > 6);
+        let lines = lines.filter(|line| line.split_at(6).1.starts_with(subject));
+        assert_eq!(lines.count(), 1, "{subject}: {said}");
     }
-    assert!(!ended.stdout.contains("FAILS"), "{}", ended.stdout);
 }
 
 #[test]
-fn what_a_run_lacks_is_told_with_its_remedy() {
-    let ended = with_limit("-n 60");
-    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
-    let mut lines = ended.stdout.lines();
-    assert!(
-        lines.any(|line| line.starts_with("FAILS open files")),
-        "{}",
-        ended.stdout
-    );
-    assert!(
-        lines
-            .next()
-            .is_some_and(|remedy| remedy.contains("ulimit -n 1024"))
-    );
-    assert!(
-        ended
-            .stdout
-            .contains("no run works here while this fails: 1")
-    );
+fn what_a_run_lacks_is_named_with_its_remedy() {
+    let program = crate::PROGRAM;
+    for (script, subject, remedy) in [
+        (
+            format!("ulimit -n 60; '{program}' doctor"),
+            "open files",
+            "ulimit -n 1024",
+        ),
+        (
+            format!("'{program}' doctor --out /proc/results"),
+            "results",
+            "--out",
+        ),
+    ] {
+        let mut command = Command::new("sh");
+        command.args(["-c", &script]);
+        let ended = Ended::of(command);
+        assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
+        let said = &ended.stdout;
+        let (mut lines, fails) = (said.lines(), format!("FAILS {subject}"));
+        assert!(lines.any(|line| line.starts_with(&fails)), "{said}");
+        assert!(lines.next().is_some_and(|it| it.contains(remedy)));
+        let none = "no run works here while this fails: 1";
+        assert!(said.contains(none));
+    }
 }
 
 #[test]
-fn a_folder_for_results_that_cannot_be_written_to_is_told() {
-    let mut command = gyre();
-    command.args(["doctor", "--out", "/proc/results"]);
-    let ended = Ended::of(command);
-    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
-    assert!(ended.stdout.contains("FAILS results"), "{}", ended.stdout);
-}
-
-#[test]
-fn without_onnx_runtime_learned_masks_take_longer() {
-    let mut command = gyre();
+fn an_onnx_runtime_that_is_missing_or_not_where_it_is_named_is_reported() {
     let nowhere = "/no/such/folder";
-    command.arg("doctor").env_remove("ORT_DYLIB_PATH");
-    command.env("XDG_DATA_HOME", nowhere).env("HOME", nowhere);
-    let ended = Ended::of(command);
-    let stdout = &ended.succeeded().stdout;
-    assert!(
-        stdout.contains("note  ONNX Runtime   none: rten computes learned masks"),
-        "{stdout}"
-    );
-}
-
-#[test]
-fn an_onnx_runtime_that_is_named_but_not_there_is_told() {
-    let mut command = gyre();
-    command
-        .arg("doctor")
-        .env("ORT_DYLIB_PATH", "/no/such/folder");
-    let ended = Ended::of(command);
-    let stdout = &ended.succeeded().stdout;
-    assert!(
-        stdout.contains("note  ONNX Runtime   cannot be used: no learned masks"),
-        "{stdout}"
-    );
-    assert!(
-        stdout.contains("ORT_DYLIB_PATH is /no/such/folder"),
-        "{stdout}"
-    );
+    let said = with(&[("XDG_DATA_HOME", nowhere), ("HOME", nowhere)]);
+    let note = "note  ONNX Runtime   none: rten computes learned masks";
+    assert!(said.contains(note), "{said}");
+    let said = with(&[("ORT_DYLIB_PATH", nowhere)]);
+    let note = "note  ONNX Runtime   cannot be used: no learned masks";
+    assert!(said.contains(note), "{said}");
+    assert!(said.contains("ORT_DYLIB_PATH is /no/such/folder"), "{said}");
 }
 
 /// The line of `gyre doctor` about a Python, and its remedy.
 fn of_python(python: &str) -> String {
-    let mut command = gyre();
-    command.arg("doctor").env("GYRE_PYTHON", python);
-    let ended = Ended::of(command);
-    let mut lines = ended.succeeded().stdout.lines();
+    let said = with(&[("GYRE_PYTHON", python)]);
+    let mut lines = said.lines();
     let found = lines.find(|line| line[6..].starts_with("Python")).unwrap();
     let remedy = lines.next().filter(|line| line.contains("->"));
     format!("{found}\n{}", remedy.unwrap_or_default())
 }
 
 #[test]
-fn the_python_of_functions_is_told_with_its_numpy() {
+fn the_python_of_functions_is_reported_with_its_numpy() {
     let folder = folder();
     let (python, with) = (folder.path().join("python"), folder.path().join("with"));
     // A numpy that stands for one that is installed.
-    std::fs::create_dir(&with).unwrap();
-    std::fs::write(with.join("numpy.py"), "__version__ = '7.8.9'\n").unwrap();
+    fs::create_dir(&with).unwrap();
+    fs::write(with.join("numpy.py"), "__version__ = '7.8.9'\n").unwrap();
     let named = python.to_str().unwrap();
     let begin = format!("#!/bin/sh\nPYTHONPATH='{}' exec python3 -S", with.display());
     install(&python, format!("{begin} \"$@\"\n"));
-    let told = of_python(named);
-    assert!(told.starts_with("ok    Python         /"), "{told}");
-    assert!(
-        told.contains(", 3.") && told.contains(", with numpy 7.8.9\n"),
-        "{told}"
-    );
+    let found = of_python(named);
+    assert!(found.starts_with("ok    Python         /"), "{found}");
+    let numpy = ", with numpy 7.8.9\n";
+    assert!(found.contains(", 3.") && found.contains(numpy), "{found}");
     // -S leaves out the folders of packages.
-    std::fs::remove_file(with.join("numpy.py")).unwrap();
-    let told = of_python(named);
-    assert!(told.starts_with("note  Python         /"), "{told}");
-    assert!(
-        told.contains("without numpy: no stage can be a function of Python"),
-        "{told}"
-    );
-    assert!(told.contains("-m pip install numpy"), "{told}");
-}
-
-#[test]
-fn a_python_that_is_none_is_told() {
+    fs::remove_file(with.join("numpy.py")).unwrap();
+    let found = of_python(named);
+    assert!(found.starts_with("note  Python         /"), "{found}");
+    let lacking = "without numpy: no stage can be a function of Python";
+    let remedy = "-m pip install numpy";
+    assert!(found.contains(lacking) && found.contains(remedy), "{found}");
     for (python, words) in [
         ("/no/such/python", "cannot start /no/such/python: "),
         (
@@ -148,9 +106,9 @@ fn a_python_that_is_none_is_told() {
             "/bin/false is no Python of version 3.8 or newer",
         ),
     ] {
-        let told = of_python(python);
+        let found = of_python(python);
         let none = "note  Python         none: no stage can be a function of Python\n";
-        assert!(told.starts_with(none) && told.contains(words), "{told}");
-        assert!(told.contains("GYRE_PYTHON"), "{told}");
+        assert!(found.starts_with(none) && found.contains(words), "{found}");
+        assert!(found.contains("GYRE_PYTHON"), "{found}");
     }
 }

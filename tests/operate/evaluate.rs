@@ -21,14 +21,9 @@ fn run() -> Run {
 /// `gyre evaluate` on its trajectory.
 fn evaluate(run: &Run) -> Command {
     let mut command = gyre();
-    command
-        .arg("evaluate")
-        .arg("--estimate")
-        .arg(run.out().join("trajectory.tum"));
-    command
-        .arg("--ground-truth")
-        .arg(recording::small().join("gt/radar_odometry.csv"));
-    command
+    let truth = recording::small().join("gt/radar_odometry.csv");
+    command.arg("evaluate").arg("--ground-truth").arg(truth);
+    with(command, "--estimate", run.out().join("trajectory.tum"))
 }
 
 fn with(mut command: Command, option: &str, value: impl AsRef<OsStr>) -> Command {
@@ -68,10 +63,9 @@ fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
         return None;
     }
     let printed = Ended::of(command).succeeded().stdout.clone();
-    let line = printed
-        .lines()
-        .find_map(|line| line.trim().strip_prefix("rmse"));
-    Some(line.unwrap().trim().parse().unwrap())
+    let mut lines = printed.lines();
+    let rmse = lines.find_map(|line| line.trim().strip_prefix("rmse"));
+    Some(rmse.unwrap().trim().parse().unwrap())
 }
 
 #[test]
@@ -82,18 +76,13 @@ fn evo_finds_the_same_errors_to_the_digit_it_shows() {
     run.complete();
     let evaluation = &run.summary()["evaluation"];
     let pairs = ["--delta", "1", "--delta_unit", "f", "--pose_relation"];
+    let translation = [&pairs[..], &["trans_part"]].concat();
+    let rotation = [&pairs[..], &["angle_deg"]].concat();
+    let (ate, rpe) = (&evaluation["ate"], &evaluation["rpe"]);
     for (program, options, ours) in [
-        ("evo_ape", vec!["--align"], &evaluation["ate"]["rmse_m"]),
-        (
-            "evo_rpe",
-            [&pairs[..], &["trans_part"]].concat(),
-            &evaluation["rpe"]["translation_rmse_m"],
-        ),
-        (
-            "evo_rpe",
-            [&pairs[..], &["angle_deg"]].concat(),
-            &evaluation["rpe"]["rotation_rmse_deg"],
-        ),
+        ("evo_ape", vec!["--align"], &ate["rmse_m"]),
+        ("evo_rpe", translation, &rpe["translation_rmse_m"]),
+        ("evo_rpe", rotation, &rpe["rotation_rmse_deg"]),
     ] {
         let Some(theirs) = evo(program, &run, &options) else {
             return;
@@ -108,38 +97,24 @@ fn evo_finds_the_same_errors_to_the_digit_it_shows() {
 fn a_table_and_all_plots_come_of_an_odometry() {
     let run = run();
     let plots = run.folder().join("new/plots");
-    let command = with(
-        with(evaluate(&run), "--odometry", run.out().join("odometry.csv")),
-        "--plots",
-        &plots,
-    );
-    let ended = Ended::of(command);
+    let odometry = run.out().join("odometry.csv");
+    let command = with(evaluate(&run), "--odometry", odometry);
+    let ended = Ended::of(with(command, "--plots", &plots));
     let table = &ended.succeeded().stdout;
     let rows_of = |motions: &str| {
         let row = |line: &&str| line.split_whitespace().take(2).eq([motions, "all"]);
         table.lines().filter(row).count()
     };
-    assert_eq!(
-        ["1", "4", "16", "64"].map(rows_of),
-        [1, 1, 1, 0],
-        "23 motions have no segment of 64:\n{table}"
-    );
-    for word in [
-        "ATE",
-        "covariance    23 motions",
-        "first",
-        "second",
-        "times as much as their covariances say",
-    ] {
+    // 23 motions have no segment of 64.
+    let rows = ["1", "4", "16", "64"].map(rows_of);
+    assert_eq!(rows, [1, 1, 1, 0], "{table}");
+    let words = "ATE,covariance    23 motions,first,second,times as much as their covariances say";
+    for word in words.split(',') {
         assert!(table.contains(word), "{word} is not in:\n{table}");
     }
     for plot in ["trajectory.svg", "errors.svg", "bands.svg"] {
-        assert!(
-            fs::read_to_string(plots.join(plot))
-                .unwrap()
-                .contains("<svg"),
-            "{plot}"
-        );
+        let drawn = fs::read_to_string(plots.join(plot)).unwrap();
+        assert!(drawn.contains("<svg"), "{plot}");
     }
 }
 
@@ -147,14 +122,8 @@ fn a_table_and_all_plots_come_of_an_odometry() {
 fn a_run_reports_the_same_as_its_evaluation() {
     let run = Run::of_recording();
     let ended = run.finish();
-    assert!(
-        ended
-            .succeeded()
-            .stdout
-            .contains("covariance    23 motions"),
-        "{}",
-        ended.stdout
-    );
+    let said = &ended.succeeded().stdout;
+    assert!(said.contains("covariance    23 motions"), "{said}");
     let (reported, evaluated) = (&run.summary()["evaluation"], json(evaluate(&run)));
     for place in [
         "/ate/rmse_m",
@@ -163,13 +132,10 @@ fn a_run_reports_the_same_as_its_evaluation() {
         "/nees/by_length/1/second_half/yaw/ratio",
         "/nees/by_length/2/all/translation/ratio",
     ] {
-        let [reported, evaluated] =
-            [reported, &evaluated].map(|json| figure(json.pointer(place).unwrap()));
+        let at = |json: &Value| figure(json.pointer(place).unwrap());
         // files have so many decimals
-        assert!(
-            (reported / evaluated - 1.0).abs() < 1e-3,
-            "{place}: {reported} and {evaluated}"
-        );
+        let ratio = at(reported) / at(&evaluated);
+        assert!((ratio - 1.0).abs() < 1e-3, "{place}: {ratio}");
     }
 }
 
@@ -180,22 +146,16 @@ fn two_halves_of_a_drive_are_judged_apart() {
     let half = |part| json(with(evaluate(&run), "--nees-part", part));
     let halves = [half("0..50"), half("50..100")];
     let motions = halves
-        .each_ref()
-        .map(|half| half["nees"]["motions"].as_u64().unwrap());
-    assert_eq!(motions.iter().sum::<u64>(), recording::SCANS as u64 - 1);
+        .iter()
+        .map(|it| it["nees"]["motions"].as_u64().unwrap());
+    assert_eq!(motions.sum::<u64>(), recording::SCANS as u64 - 1);
     for (half, name) in halves.iter().zip(["first_half", "second_half"]) {
-        assert_eq!(
-            half["ate"], whole["ate"],
-            "the trajectory is judged as a whole"
-        );
-        let [alone, beside] = [
-            &half["nees"]["by_length"][0]["all"],
-            &whole["nees"]["by_length"][0][name],
-        ];
-        assert!(
-            (figure(&alone["pose"]["ratio"]) - figure(&beside["pose"]["ratio"])).abs() < 1e-9,
-            "{name}"
-        );
+        // The trajectory is judged as a whole.
+        assert_eq!(half["ate"], whole["ate"]);
+        let ratio =
+            |it: &Value, part: &str| figure(&it["nees"]["by_length"][0][part]["pose"]["ratio"]);
+        let difference = ratio(half, "all") - ratio(&whole, name);
+        assert!(difference.abs() < 1e-9, "{name}");
     }
 }
 
@@ -208,47 +168,27 @@ fn an_odometry_with_a_column_missing_or_damaged_is_refused_in_a_sentence() {
     let missing = odometry(&run, |text| text.replacen("cov_yyaw", "spread", 1));
     refused(&missing, &["changed.csv", "no column cov_yyaw"]);
     let damaged = odometry(&run, |text| {
-        let x_m = text
-            .lines()
-            .nth(1)
-            .and_then(|row| row.split(',').nth(5))
-            .unwrap();
-        text.replacen(x_m, "far", 1)
+        let row = text.lines().nth(1).unwrap();
+        text.replacen(row.split(',').nth(5).unwrap(), "far", 1)
     });
-    refused(
-        &damaged,
-        &["changed.csv", "line: 2", "invalid float literal"],
-    );
+    refused(&damaged, &["line: 2", "invalid float literal"]);
     let cut = odometry(&run, |text| text[..text.len() - 30].to_owned());
     refused(&cut, &["changed.csv", "line: 24", "31 fields"]);
     refused(&run.out().join("none.csv"), &["cannot read", "none.csv"]);
-    refused(
-        &run.out().join("trajectory.tum"),
-        &["trajectory.tum: not an odometry.csv"],
-    );
+    let other = run.out().join("trajectory.tum");
+    refused(&other, &["trajectory.tum: not an odometry.csv"]);
 }
 
 #[test]
 fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_the_reason() {
     let run = run();
-    fs::write(
-        run.out().join("odometry.csv"),
-        run.odometry().replace(",154713", ",154714"),
-    )
-    .unwrap();
+    let other = run.odometry().replace(",154713", ",154714");
+    fs::write(run.out().join("odometry.csv"), other).unwrap();
     let ended = Ended::of(evaluate(&run));
-    assert!(
-        !ended.succeeded().stdout.contains("covariance"),
-        "{}",
-        ended.stdout
-    );
-    assert!(
-        ended
-            .stderr
-            .contains("odometry.csv is not evaluated: its stamps are not the estimate's"),
-        "{}",
-        ended.stderr
-    );
+    let said = &ended.succeeded().stdout;
+    assert!(!said.contains("covariance"), "{said}");
+    let reason = "odometry.csv is not evaluated: its stamps are not the estimate's";
+    assert!(ended.stderr.contains(reason), "{}", ended.stderr);
 }
 
 #[test]

@@ -16,12 +16,7 @@ fn at(folder: &Path, arguments: &[&str]) -> Ended {
 fn the_demo_works_in_an_empty_folder_and_its_configuration_repeats_it() {
     let folder = tempfile::tempdir().unwrap();
     let text = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    let few = [
-        "--set",
-        "simulation.scans=8",
-        "--set",
-        "masking.backend=rten",
-    ];
+    let few = ["--set=simulation.scans=8", "--set=masking.backend=rten"];
     at(folder.path(), &[&["demo"], &few[..]].concat()).succeeded();
     let configuration = text("out/demo/config.toml");
     let model = "model = \"gyre:models/gyre-255.toml\"";
@@ -34,11 +29,8 @@ fn the_demo_works_in_an_empty_folder_and_its_configuration_repeats_it() {
     assert_eq!(ended.succeeded().stdout, "out/demo/comparison.html\n");
     let page = text("out/demo/comparison.html");
     assert!(page.contains("All keys are equal."), "{page}");
-    assert_eq!(
-        page.matches("data:image/png;base64,").count(),
-        2,
-        "two maps"
-    );
+    let maps = page.matches("data:image/png;base64,");
+    assert_eq!(maps.count(), 2);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Tests of scheduling: the priorities and processors of its stages, and how soon processors wake.
 
-use std::{fs, io::Read, path::Path};
+use std::{fs, io::Read};
 
 use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
 
@@ -12,18 +12,11 @@ const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 /// The niceness of a process and the processors that it may use.
 fn priority(pid: Pid) -> (i32, String) {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let nice = stat
-        .rsplit_once(") ")
-        .unwrap()
-        .1
-        .split(' ')
-        .nth(16)
-        .unwrap();
-    let status = fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("status"));
-    let status = status.unwrap();
-    let cpus = status
-        .lines()
-        .find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+    let (_, fields) = stat.rsplit_once(") ").unwrap();
+    let nice = fields.split(' ').nth(16).unwrap();
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+    let mut lines = status.lines();
+    let cpus = lines.find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
     (nice.parse().unwrap(), cpus.unwrap().trim().to_owned())
 }
 
@@ -46,19 +39,16 @@ fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restar
     assert_eq!(run.odometry(), undisturbed());
     let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
     refused.refused_with(&["run", "nice", "-20 to 19"]);
-    let processor = Run::of_recording()
-        .set("run.scheduling.cpus=[1000]")
-        .finish();
-    processor.failed_with(&["scheduling", "cpus = [1000]"]);
+    let processor = Run::of_recording().set("run.scheduling.cpus=[1000]");
+    processor
+        .finish()
+        .failed_with(&["scheduling", "cpus = [1000]"]);
 }
 
 /// The limit that the system keeps to, us.
 fn wake_limit() -> Option<i32> {
-    let mut limit = [0; 4];
-    fs::File::open(WAKE_LIMIT)
-        .ok()?
-        .read_exact(&mut limit)
-        .ok()?;
+    let (mut file, mut limit) = (fs::File::open(WAKE_LIMIT).ok()?, [0; 4]);
+    file.read_exact(&mut limit).ok()?;
     Some(i32::from_ne_bytes(limit))
 }
 

@@ -14,14 +14,10 @@ struct Slurm {
 impl Slurm {
     /// Starts Slurm; prints why a test is skipped if there is no Slurm.
     fn start() -> Option<Self> {
-        let programs = ["slurmctld", "slurmd", "munged", "sbatch"].iter();
-        let is_there = |program: &&str| {
-            let found = Command::new("sh")
-                .args(["-c", "command -v $0", program])
-                .output();
-            found.is_ok_and(|output| output.status.success())
-        };
-        if !programs.into_iter().all(is_there) || !rustix::process::geteuid().is_root() {
+        let look = "for it in slurmctld slurmd munged sbatch; do command -v $it || exit 1; done";
+        let found = Command::new("sh").args(["-c", look]).output();
+        let is_there = found.is_ok_and(|output| output.status.success());
+        if !is_there || !rustix::process::geteuid().is_root() {
             println!("skipped: Slurm and munge are not installed, or this is not root");
             return None;
         }
@@ -40,11 +36,9 @@ impl Slurm {
     }
 
     fn sbatch(&self) -> Command {
-        let mut command = Command::new("sbatch");
-        command
-            .env("SLURM_CONF", self.folder.path().join("slurm.conf"))
-            .current_dir(self.folder.path())
-            .args(["--parsable", "--wait"]);
+        let (mut command, folder) = (Command::new("sbatch"), self.folder.path());
+        command.env("SLURM_CONF", folder.join("slurm.conf"));
+        command.current_dir(folder).args(["--parsable", "--wait"]);
         command
     }
 }
@@ -61,27 +55,19 @@ fn an_array_of_slurm_gives_the_same_table() {
         return;
     };
     let drives = Drives::new().recordings(&[4, 5, 6]);
-    let drives = {
-        let nowhere = drives.path("nowhere");
-        drives.line("missing", &nowhere, "")
-    };
+    let nowhere = drives.path("nowhere");
+    let drives = drives.line("missing", &nowhere, "");
     let alone = drives.batch("alone");
     assert_eq!(alone.finish().code(), Some(1));
     let array = drives.batch("array");
     let programs = Path::new(crate::PROGRAM).parent().unwrap();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
     let mut sbatch = slurm.sbatch();
-    sbatch
-        .env("PATH", path)
-        .env("TASKS", "2")
-        .arg("--array=0-1")
-        .arg("--cpus-per-task=1")
-        .arg("--mem-per-cpu=0")
-        .arg(format!("{PROJECT}/examples/slurm/gyre.sbatch"))
-        .arg(drives.path("list.csv"))
-        .arg(&array.out)
-        .arg("--config")
-        .arg(drives.path("small.toml"));
+    sbatch.env("PATH", path).env("TASKS", "2");
+    sbatch.args(["--array=0-1", "--cpus-per-task=1", "--mem-per-cpu=0"]);
+    sbatch.arg(format!("{PROJECT}/examples/slurm/gyre.sbatch"));
+    sbatch.arg(drives.path("list.csv")).arg(&array.out);
+    sbatch.arg("--config").arg(drives.path("small.toml"));
     // One of its drives is missing.
     let submitted = Ended::of(sbatch);
     assert_eq!(submitted.code(), Some(1), "{}", submitted.stderr);

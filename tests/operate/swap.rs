@@ -30,10 +30,9 @@ fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
 
 /// Words as one argument, each in quotes.
 fn shell_words(words: &[&str]) -> String {
-    let quoted = words
-        .iter()
-        .map(|word| format!("'{}'", word.replace('\'', r"'\''")));
-    quoted.collect::<Vec<_>>().join(" ")
+    let quoted = words.iter().map(|word| word.replace('\'', r"'\''"));
+    let quoted: Vec<_> = quoted.map(|word| format!("'{word}'")).collect();
+    quoted.join(" ")
 }
 
 #[test]
@@ -81,23 +80,13 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
     running.await_poses(2);
     let fails = script(&run, "fails.sh", FAILS);
     let cold = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
-    for (options, program, words) in [
-        (
-            &[][..],
-            &*fails,
-            &["fails.sh` has failed", "exit code 3", "no such mask"][..],
-        ),
-        (
-            &["--cold"],
-            &cold,
-            &["cold.sh` has failed", "exit code 3", "no such mask"],
-        ),
-        (&["--cold"], "/nowhere/masking", &["cannot start masking"]),
+    for (options, program, reason, words) in [
+        (&[][..], &*fails, "fails.sh` has failed", "no such mask"),
+        (&["--cold"], &cold, "cold.sh` has failed", "exit code 3"),
+        (&["--cold"], "/nowhere/masking", "cannot start masking", ""),
     ] {
         let refused = swap(&run, "masking", options, &[program]);
-        refused
-            .refused_with(words)
-            .refused_with(&["masking goes on as before"]);
+        refused.refused_with(&[reason, words, "masking goes on as before"]);
         let status = status(&run).unwrap();
         let back = process(&status, "masking");
         assert_eq!(back["is_swapped"], false);
@@ -136,10 +125,8 @@ fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fail
     // The file of the earlier program has changed by now, so the swap returns to the program of the
     // run's start.
     swap(&run, "masking", &[], &[&own]).refused_with(&["own.sh` has failed", "no such mask"]);
-    assert_eq!(
-        process(&status(&run).unwrap(), "masking")["is_swapped"],
-        false
-    );
+    let status = status(&run).unwrap();
+    assert_eq!(process(&status, "masking")["is_swapped"], false);
     running.signal(Signal::INT);
     assert_eq!(running.end().code(), Some(130));
     let rest = Run::of_recording().into(run.out());
@@ -165,18 +152,11 @@ fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
     let run = Run::of_recording().rate("0.01");
     let mut running = run.start();
     running.await_poses(1);
-    let ended = swap(
-        &run,
-        "rotation-search",
-        &[],
-        &["nice", PROGRAM, "stage", "rotation-search"],
-    );
+    let own = ["nice", PROGRAM, "stage", "rotation-search"];
+    let ended = swap(&run, "rotation-search", &[], &own);
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("no scan has gone through it"),
-        "{}",
-        ended.stderr
-    );
+    let reason = "no scan has gone through it";
+    assert!(ended.stderr.contains(reason), "{}", ended.stderr);
     ask(&run, &["down"]).succeeded();
     running.end();
 }
@@ -202,11 +182,9 @@ fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
 /// A swap command that has been started.
 fn swapping(run: &Run, options: &[&str]) -> Child {
     let mut words = gyre();
-    words
-        .args(["swap", "masking", "--command", "sleep 60"])
-        .arg(run.out())
-        .args(options);
-    words.stderr(Stdio::piped()).spawn().unwrap()
+    words.args(["swap", "masking", "--command", "sleep 60"]);
+    words.arg(run.out()).args(options).stderr(Stdio::piped());
+    words.spawn().unwrap()
 }
 
 fn said(client: Child) -> String {
@@ -228,11 +206,9 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     ask(&run, &["ps"]).failed_with(&["does not answer"]);
     for client in swapping.into_iter().chain([restarting]) {
         let said = said(client);
-        assert!(said.contains("does not answer"), "{said}");
-        assert!(
-            said.contains("not begun by now it does not begin"),
-            "{said}"
-        );
+        let later = "not begun by now it does not begin";
+        let silent = said.contains("does not answer");
+        assert!(silent && said.contains(later), "{said}");
     }
     assert!(since.elapsed().as_secs() < 40, "{:?}", since.elapsed());
     running.signal(Signal::CONT);
@@ -263,12 +239,7 @@ fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
     let run = Run::of_recording().rate("1").set("run.mode=live");
     let mut running = run.start();
     running.await_poses(4);
-    for stage in [
-        "rotation-search",
-        "translation-search",
-        "refinement",
-        "masking",
-    ] {
+    for &stage in &STAGES[1..5] {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
     }
     running.finish().succeeded();

@@ -156,7 +156,7 @@ impl CorruptArguments {
             scan.bytes = (0..geometry.bins).flat_map(column).collect();
         }
         let file = folder.join(dataset.file(index).file_name().unwrap_or_default());
-        Ok(write_grey(&file, dataset.image_size().width, &scan.bytes)?)
+        write_grey(&file, dataset.image_size().width, &scan.bytes)
     }
 }
 

@@ -10,7 +10,7 @@ use gyre_scan_matching::RefinementKind;
 use gyre_stage::wake::Signals;
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
-use gyre_tools::conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
+use gyre_tools::conformance::{Candidate, Demands, InputScans, Interrupted, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
@@ -75,12 +75,12 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         demands,
     };
     match run_test(&test, scans, arguments.json) {
-        Err(ProgramError::Interrupted) => Ok(None),
-        report => Ok(Some(report?)),
+        Err(error) if error.is::<Interrupted>() => Ok(None),
+        report => report.map(Some),
     }
 }
 
-fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ProgramError> {
+fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, Failure> {
     let signals = Signals::install()?;
     check(test, scans, &signals, &mut |what| {
         if !quietly {

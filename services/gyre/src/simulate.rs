@@ -75,7 +75,9 @@ pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result
             })?;
             write(threads, simulation, out)?;
         }
-        result => drop(result?),
+        result => {
+            result?;
+        }
     }
     Ok(())
 }

@@ -110,7 +110,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     report.write(out.path())?;
     printed?;
     print::line(format_args!(
-        "report in {}: report.json, and NAME.csv of each scenario",
+        "report in {}: report.json",
         out.path().display()
     ))?;
     Ok(report)

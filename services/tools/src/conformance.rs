@@ -5,14 +5,8 @@
 //! replaces the rest of such a run (`harness`): it feeds the program, and judges the program's
 //! messages. For [`check`] the inputs are the results of Gyre's own stages for some scans, for
 //! [`shadow`](mod@shadow) the items of a running run.
-//!
-//! Reading order: `harness` (a program in a run of its own), `topics`, `item` and `result` (the
-//! judgement of one message); [`Rule`] (the rules that are checked), [`check`], `checks` (the
-//! scenarios), `session` (one process under test), `reference` (the inputs), `malformed` (inputs
-//! that must be refused); [`shadow`](mod@shadow).
 
 mod checks;
-mod error;
 mod harness;
 mod item;
 mod malformed;
@@ -25,9 +19,12 @@ pub mod shadow;
 mod test;
 mod topics;
 
-use gyre_stage::wake::Signals;
+use std::{io, path::Path};
 
-pub use error::ProgramError;
+use gyre_stage::{StageError, wake::Signals};
+use gyre_terminal::Failure;
+use thiserror::Error;
+
 pub use harness::Candidate;
 pub use report::{Report, Work};
 pub use result::{Spread, Spreads};
@@ -35,8 +32,12 @@ pub use rule::{Rule, Verdict};
 pub use test::{Demands, InputScans, Prepare, Test};
 
 use checks::Examination;
-use reference::Context;
-use reference::Reference;
+use reference::{Context, Reference};
+
+/// The end of a test by a signal.
+#[derive(Debug, Error)]
+#[error("interrupted")]
+pub struct Interrupted;
 
 /// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
 /// Breaches of the contract are in the report, not in the error.
@@ -45,7 +46,7 @@ pub fn check(
     mut scans: InputScans,
     signals: &Signals,
     observe: &mut dyn FnMut(&str),
-) -> Result<Report, ProgramError> {
+) -> Result<Report, Failure> {
     observe("the inputs, by our own stages");
     let reference = Reference::compute(test, &mut scans, signals)?;
     let context = Context {
@@ -54,4 +55,10 @@ pub fn check(
         signals,
     };
     Examination::new(context, observe).run()
+}
+
+/// Returns a function that names the file of a system error.
+fn at(path: &Path) -> impl FnOnce(io::Error) -> StageError + use<> {
+    let path = path.to_owned();
+    move |source| StageError::File { path, source }
 }

@@ -2,7 +2,6 @@
 //! of a run, in RADIATE's format (`repaired`).
 
 mod arguments;
-mod places;
 mod repaired;
 mod scans;
 mod source;
@@ -23,9 +22,8 @@ use gyre_ros2_messages::{
 use gyre_terminal::{Failure, print};
 
 pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
-use places::Place;
 use scans::ScanWriter;
-use source::Source;
+use source::{Place, Source};
 
 /// Writes the bag or the dataset.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
@@ -43,13 +41,15 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     let frames = arguments.frames.frames.clone();
     let mounting = arguments.frames.mounting.parse()?;
     let mut places = source.places()?.peekable();
-    let mut trajectory = match places.peek() {
-        Some(_) => Some(Trajectory::begin(&mut bag, &frames, mounting)?),
-        None => None,
-    };
+    let begin = |_: &_| Trajectory::begin(&mut bag, &frames, mounting);
+    let mut trajectory = places.peek().map(begin).transpose()?;
     let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
     let mut last_ns = 0;
-    while let Some(stamp_ns) = scans.write_next(&mut bag)? {
+    let mut next = |bag: &mut BagWriter| match &mut scans {
+        Some(scans) => scans.write_next(bag),
+        None => Ok(None),
+    };
+    while let Some(stamp_ns) = next(&mut bag)? {
         while let Some(place) = places.next_if(|place| is_due(place, stamp_ns)) {
             write_place(&mut bag, trajectory.as_mut(), place?)?;
         }
@@ -61,17 +61,17 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
         write_place(&mut bag, trajectory.as_mut(), place)?;
     }
     source.write_map(&mut bag, &frames, last_ns, &mounting)?;
-    let counts: Vec<String> = bag
+    let counts = bag
         .counts()
-        .map(|(topic, count)| format!("{topic} {count}"))
-        .collect();
+        .map(|(topic, count)| format!("{topic} {count}"));
+    let counts: Vec<String> = counts.collect();
     if bag.counts().all(|(_, count)| count == 0) {
         let source = arguments.source.display();
         return Err(format!("{source} has nothing to export: neither poses nor scans").into());
     }
     bag.finish()?;
     print::line(format_args!("{}: {}", path.display(), counts.join(", ")))?;
-    scans.describe_losses();
+    scans.iter().for_each(ScanWriter::describe_losses);
     Ok(())
 }
 
@@ -80,7 +80,6 @@ fn is_due(place: &Result<Place, Failure>, stamp_ns: i64) -> bool {
     place.as_ref().is_ok_and(|place| place.stamp_ns <= stamp_ns) || place.is_err()
 }
 
-/// The topics of a trajectory.
 struct Trajectory {
     frames: Frames,
     mounting: Mounting,

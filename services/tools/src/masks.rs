@@ -1,8 +1,4 @@
 //! `gyre masks`: draws the mask's effect on scans.
-//!
-//! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
-//! - `inspection`: the power that the mask keeps of one scan, in figures;
-//! - `drawing`: the same as a picture.
 
 mod drawing;
 mod inspection;
@@ -14,8 +10,7 @@ use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 use clap::Args;
 use gyre_configuration::describe_masks_in_process;
 use gyre_results::Content;
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 
 use drawing::Canvas;
 use inspector::MaskInspector;
@@ -82,11 +77,8 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         }
     }
     if overview.is_empty() {
-        return Err(format!(
-            "{}: none of the chosen scans can be read",
-            configuration.data()
-        )
-        .into());
+        let data = configuration.data();
+        return Err(format!("{data}: none of the chosen scans can be read").into());
     }
     Canvas::stack(&overview).write(&out.join(OVERVIEW))?;
     if arguments.json {
@@ -104,11 +96,8 @@ fn choose(
     if played.is_empty() {
         return Err(format!("{data} has no scans to draw").into());
     }
-    if let Some(number) = arguments
-        .scans
-        .iter()
-        .find(|number| !played.contains(number))
-    {
+    let mut numbers = arguments.scans.iter();
+    if let Some(number) = numbers.find(|number| !played.contains(number)) {
         let (first, last) = (played.start, played.end - 1);
         return Err(format!(
             "--scans {number}: the scans of {data} that are played have the numbers {first} to {last}"
@@ -117,9 +106,8 @@ fn choose(
     }
     let mut chosen = arguments.scans.clone();
     if chosen.is_empty() {
-        let every = arguments
-            .every
-            .map_or(played.len().div_ceil(FEW), usize::from);
+        let every = arguments.every.map(usize::from);
+        let every = every.unwrap_or(played.len().div_ceil(FEW));
         chosen = played.step_by(every).collect();
     }
     chosen.sort_unstable();
@@ -141,25 +129,18 @@ mod tests {
     }
 
     fn chosen(options: &str, played: Range<usize>) -> Result<Vec<usize>, Failure> {
-        let words = ["masks", "c.toml"]
-            .into_iter()
-            .chain(options.split_whitespace());
+        let words = ["masks", "c.toml"].into_iter();
+        let words = words.chain(options.split_whitespace());
         choose(&Masks::try_parse_from(words)?.arguments, played, "drive")
     }
 
     #[test]
-    fn scans_are_chosen_by_number_by_step_or_evenly() {
+    fn scans_are_chosen_among_those_that_are_played() {
         assert_eq!(chosen("--scans 7,3,7", 0..10).unwrap(), [3, 7]);
         assert_eq!(chosen("--every 4", 2..12).unwrap(), [2, 6, 10]);
         assert_eq!(chosen("", 0..3).unwrap(), [0, 1, 2]);
-        assert_eq!(
-            chosen("", 10..26).unwrap(),
-            [10, 12, 14, 16, 18, 20, 22, 24]
-        );
-    }
-
-    #[test]
-    fn scans_that_are_not_played_are_refused() {
+        let eight = [10, 12, 14, 16, 18, 20, 22, 24];
+        assert_eq!(chosen("", 10..26).unwrap(), eight);
         let refused = |options, played| chosen(options, played).unwrap_err().to_string();
         let sentence = "--scans 20: the scans of drive that are played have the numbers 10 to 19";
         assert_eq!(refused("--scans 10,20", 10..20), sentence);

@@ -44,9 +44,6 @@ pub struct StageArguments {
     pub gyre: Option<PathBuf>,
 }
 
-/// A file of a project: its name and its text.
-type File = (&'static str, &'static str);
-
 pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
     let New::Stage(arguments) = &arguments.what;
     let stage = arguments.stage.as_str();
@@ -60,11 +57,7 @@ pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
         None => PathBuf::new(),
     };
     let function = StageConfig::function(stage)?;
-    let files = match arguments.rust {
-        true => rust(stage),
-        false => python(stage),
-    };
-    for (name, text) in files {
+    for (name, text) in files(stage, arguments.rust) {
         let fill_in = |text: &str| {
             text.replace("@stage@", stage)
                 .replace("@function@", function)
@@ -79,39 +72,36 @@ pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn python(stage: &str) -> Vec<File> {
+macro_rules! template {
+    ($name:literal) => {
+        include_str!(concat!("../templates/", $name))
+    };
+}
+
+/// Returns the files of a project: their names and texts.
+fn files(stage: &str, is_rust: bool) -> Vec<(&'static str, &'static str)> {
+    if is_rust {
+        let text = match stage {
+            "rotation-search" => template!("rust/rotation-search.rs"),
+            "translation-search" => template!("rust/translation-search.rs"),
+            _ => template!("rust/masking.rs"),
+        };
+        return vec![
+            ("Cargo.toml", template!("rust/Cargo.toml.txt")),
+            ("src/main.rs", text),
+            ("tests/conformance.rs", template!("rust/test.rs")),
+            ("README.md", template!("rust/README.md")),
+        ];
+    }
     let text = match stage {
-        "rotation-search" => include_str!("../templates/python/rotation.py"),
-        "translation-search" => include_str!("../templates/python/translation.py"),
-        _ => include_str!("../templates/python/mask.py"),
+        "rotation-search" => template!("python/rotation.py"),
+        "translation-search" => template!("python/translation.py"),
+        _ => template!("python/mask.py"),
     };
     vec![
         ("@function@.py", text),
-        (
-            "test_@function@.py",
-            include_str!("../templates/python/test.py"),
-        ),
-        ("README.md", include_str!("../templates/python/README.md")),
-    ]
-}
-
-fn rust(stage: &str) -> Vec<File> {
-    let text = match stage {
-        "rotation-search" => include_str!("../templates/rust/rotation-search.rs"),
-        "translation-search" => include_str!("../templates/rust/translation-search.rs"),
-        _ => include_str!("../templates/rust/masking.rs"),
-    };
-    vec![
-        (
-            "Cargo.toml",
-            include_str!("../templates/rust/Cargo.toml.txt"),
-        ),
-        ("src/main.rs", text),
-        (
-            "tests/conformance.rs",
-            include_str!("../templates/rust/test.rs"),
-        ),
-        ("README.md", include_str!("../templates/rust/README.md")),
+        ("test_@function@.py", template!("python/test.py")),
+        ("README.md", template!("python/README.md")),
     ]
 }
 

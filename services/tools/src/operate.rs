@@ -8,7 +8,6 @@ mod arguments;
 mod background;
 mod choice;
 mod echo;
-mod events;
 mod logs;
 mod processes;
 mod programs;

@@ -4,17 +4,16 @@ mod arguments;
 pub mod capture;
 pub mod server;
 
-use std::{net::TcpListener, ops::Range, path::Path, process::ExitCode, time::Duration};
+use std::{net::TcpListener, path::Path, process::ExitCode, time::Duration};
 
 use gyre_colossus::Address;
 use gyre_configuration::{Configuration, Played};
 use gyre_stage::wake::Signals;
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
-use capture::Capture;
-use server::{Audience, ByteOrder, ClockFormat, Faults, Playback};
+use capture::{Capture, Captured};
+use server::{Clients, Faults, Group, Output};
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
@@ -38,15 +37,14 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if scans.is_empty() {
         return Err(format!("{} has no scan to play", configuration.data()).into());
     }
-    let signals = Signals::install()?;
+    let stop = stop()?;
     let scans_of = format!("{} scans of {}", scans.len(), configuration.data());
-    let audience = announced(&scans_of, arguments)?;
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
-    let playback = playback(arguments, scans);
-    let played = server::serve(audience, dataset.as_mut(), &playback, &stop)?;
+    let output = announced(&scans_of, arguments, arguments.faults)?;
+    let played = server::serve(output, dataset.as_mut(), scans, arguments, &stop)?;
+    let (scans, azimuths, datagrams) = (played.scans, played.lost_azimuths, played.lost_datagrams);
+    let (resets, stalls) = (played.resets, played.stalls);
     print::line(format_args!(
-        "played {} scans, lost {} azimuths and {} datagrams, reset the connections {} times, stalled {} times",
-        played.scans, played.lost_azimuths, played.lost_datagrams, played.resets, played.stalls
+        "played {scans} scans, lost {azimuths} azimuths and {datagrams} datagrams, reset the connections {resets} times, stalled {stalls} times"
     ))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -62,24 +60,24 @@ fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     Ok(configuration.streaming(given.data.as_deref()))
 }
 
-/// Records the data of a radar.
+/// Returns a function that returns whether a signal has asked for the end.
+fn stop() -> Result<impl Fn() -> bool, Failure> {
+    let signals = Signals::install()?;
+    Ok(move || signals.sleep(Duration::ZERO).unwrap_or(true))
+}
+
 fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let interface = match radar.starts_with("udp://") {
         true => arguments.interface.to_string(),
         false => String::new(),
     };
-    let address = Address::parse(radar, &interface)?;
-    let signals = Signals::install()?;
+    let (address, stop) = (Address::parse(radar, &interface)?, stop()?);
+    let path = file.display();
     print::note(format_args!(
-        "gyre: capturing the radar at {address} into {}",
-        file.display()
+        "gyre: capturing the radar at {address} into {path}"
     ));
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
-    let captured = capture::record(&address, file, &stop)?;
-    print::line(format_args!(
-        "captured {} bytes in {} records",
-        captured.bytes, captured.records
-    ))?;
+    let Captured { records, bytes } = capture::record(&address, file, &stop)?;
+    print::line(format_args!("captured {bytes} bytes in {records} records"))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -88,70 +86,49 @@ fn play(
     capture: Capture,
     arguments: &RadarServerArguments,
 ) -> Result<ExitCode, Failure> {
-    let signals = Signals::install()?;
-    let audience = announced(&data.display().to_string(), arguments)?;
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
-    let played = capture::play(audience, capture, arguments.rate.factor(), &stop)?;
-    print::line(format_args!(
-        "played {} bytes in {} records",
-        played.bytes, played.records
-    ))?;
+    let stop = stop()?;
+    let output = announced(&data.display().to_string(), arguments, Faults::default())?;
+    let played = capture::play(output, capture, arguments.rate.factor(), &stop)?;
+    let Captured { records, bytes } = played;
+    print::line(format_args!("played {bytes} bytes in {records} records"))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the audience, and prints it.
-fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, Failure> {
-    let (audience, address, is_public) = audience(arguments)?;
+/// Returns the receivers, with faults on their way, and prints where the radar is received.
+fn announced(
+    what: &str,
+    arguments: &RadarServerArguments,
+    faults: Faults,
+) -> Result<Output, Failure> {
+    let (output, address, is_public) = output(arguments, faults)?;
     print::note(format_args!("gyre: playing {what} as a radar at {address}"));
     if is_public {
         print::note(
             "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
         );
     }
-    Ok(audience)
+    Ok(output)
 }
 
-/// Returns the audience, the address for receiving the radar, and whether other machines reach it.
-fn audience(arguments: &RadarServerArguments) -> Result<(Audience, String, bool), Failure> {
+/// Returns the receivers, the address for receiving the radar, and whether other machines reach it.
+fn output(
+    arguments: &RadarServerArguments,
+    faults: Faults,
+) -> Result<(Output, String, bool), Failure> {
     if let Some(to) = arguments.udp {
         if arguments.rate.factor().is_none() {
             return Err("--rate max has no meaning with --udp: nobody says how fast datagrams are read; give a factor".into());
         }
         let wait = Duration::try_from_secs_f64(arguments.wait_s)
             .map_err(|error| format!("--wait-s is {}: {error}", arguments.wait_s))?;
-        let interface = arguments.interface;
-        let is_public = !interface.is_loopback();
-        let audience = Audience::Group {
-            to,
-            interface,
-            wait,
-        };
-        return Ok((audience, format!("udp://{to}"), is_public));
+        let group = Group::open(to, arguments.interface, faults)?;
+        let (output, address) = (Output::Group { group, wait }, format!("udp://{to}"));
+        return Ok((output, address, !arguments.interface.is_loopback()));
     }
     let listen = &arguments.listen;
     let listener = TcpListener::bind(listen)
         .map_err(|error| format!("cannot serve at {listen}: {error}; choose another --listen"))?;
     let address = listener.local_addr()?;
-    let is_public = !address.ip().is_loopback();
-    Ok((Audience::Clients(listener), address.to_string(), is_public))
-}
-
-fn playback(arguments: &RadarServerArguments, scans: Range<usize>) -> Playback {
-    Playback {
-        rate: arguments.rate.factor(),
-        scans,
-        repeats: arguments.repeat,
-        faults: Faults {
-            stall_s: arguments.faults.stall_s.clamp(0.0, 3600.0),
-            ..arguments.faults
-        },
-        clock: ClockFormat {
-            // Datagrams always have the network's order.
-            order: match arguments.big_endian || arguments.udp.is_some() {
-                true => ByteOrder::Big,
-                false => ByteOrder::Little,
-            },
-            ..ClockFormat::default()
-        },
-    }
+    let (clients, is_public) = (Clients::of(listener), !address.ip().is_loopback());
+    Ok((Output::Clients(clients), address.to_string(), is_public))
 }

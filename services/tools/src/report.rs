@@ -1,11 +1,6 @@
 //! `gyre report`: one page about a run, or about several runs and the trajectories of other
 //! programs beside each other. The page has all its pictures in it and needs no network.
-//!
-//! - `subject`: a run or a trajectory that the page is about;
-//! - `figures`: its figures, as rows of a table;
-//! - `page`: the document; `html`: its parts.
 
-mod figures;
 mod html;
 mod page;
 mod subject;
@@ -52,10 +47,8 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let read = |path: &PathBuf| Subject::read(path, truth.as_ref());
     let subjects = with_corrected(&arguments.subjects);
     let subjects: Result<Vec<Subject>, Failure> = subjects.iter().map(read).collect();
-    let to = arguments
-        .to
-        .clone()
-        .unwrap_or_else(|| default_page(&arguments.subjects));
+    let default = || default_page(&arguments.subjects);
+    let to = arguments.to.clone().unwrap_or_else(default);
     write_page(&to, &page(&subjects?)?, "<p>by gyre report, ")?;
     print::line(to.display())?;
     if arguments.open {
@@ -96,15 +89,11 @@ fn open(page: &Path) -> Result<(), Failure> {
         .arg(page)
         .stdout(Stdio::null())
         .stderr(Stdio::null());
-    let failed = |reason: String| {
-        format!(
-            "cannot open a browser by xdg-open ({reason}): open {} yourself",
-            page.display()
-        )
+    let reason = match command.status() {
+        Ok(status) if status.success() => return Ok(()),
+        Ok(status) => status.to_string(),
+        Err(error) => error.to_string(),
     };
-    match command.status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(failed(status.to_string()).into()),
-        Err(error) => Err(failed(error.to_string()).into()),
-    }
+    let page = page.display();
+    Err(format!("cannot open a browser by xdg-open ({reason}): open {page} yourself").into())
 }

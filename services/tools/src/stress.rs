@@ -3,22 +3,8 @@
 //! Each [`Scenario`] starts real runs, loads or damages them, and watches as an observer of `pose`,
 //! whose messages carry the time stamps of every hop. Arrivals do not wait for the pipeline: a scan
 //! is due by the source's clock, and latency counts from there.
-//!
-//! Reading order:
-//!
-//! 1. [`Scenario`] and `Budget` of `gyre-run`: the scenarios and their limits; [`check`]: the
-//!    verdict.
-//! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its
-//!    start to its end.
-//! 3. [`record`]: poses in, distributions out; drops are samples too.
-//! 4. [`fault`]: stops and kills of stages; [`witness_fault`]: faults of gyro, wheels and radar;
-//!    [`helper`], `load`: the child processes that load the machine.
-//! 5. [`processes`]: the resources of each process.
-//! 6. [`report`]: a sentence for each scenario, `report.json`, and the latency scan by scan.
 
 mod campaign;
-pub mod check;
-mod error;
 pub mod fault;
 pub mod helper;
 pub mod load;
@@ -27,11 +13,55 @@ pub mod processes;
 pub mod record;
 pub mod report;
 mod search;
-mod tested;
 pub mod witness_fault;
 
+use std::{ops::Range, path::PathBuf, time::Duration};
+
+use gyre_messages::StageId;
+use gyre_run::Budget;
+
 pub use campaign::{Options, stress};
-pub use error::StressError;
 pub use gyre_run::Scenario;
 pub use report::{Provenance, Report};
-pub use tested::{Others, TestedPipeline};
+
+#[derive(Clone, Debug)]
+pub struct TestedPipeline {
+    pub program: PathBuf,
+    /// The resolved configuration, whose source is a recording.
+    pub configuration: PathBuf,
+    pub out: PathBuf,
+    /// Time between two scans of the recording.
+    pub period: Duration,
+    /// The scans of a turn of the recording, by their index in it.
+    pub turn: Range<usize>,
+    /// The stamp of the first of them, ns since 1970, if it is known before they are read.
+    pub first_ns: Option<i64>,
+    pub others: Others,
+    pub stages: Vec<StageId>,
+    pub budget: Budget,
+    pub shared_bytes: u64,
+}
+
+impl TestedPipeline {
+    pub fn turn_s(&self) -> f64 {
+        self.turn.len() as f64 * self.period.as_secs_f64()
+    }
+
+    /// Returns the seconds of the recording that are played in a second at this rate.
+    pub fn relative_rate(&self, rate_hz: f64) -> f64 {
+        (rate_hz * self.period.as_secs_f64()).clamp(0.001, 1000.0)
+    }
+
+    pub fn run_out(&self, name: &str) -> PathBuf {
+        self.out.join("runs").join(name)
+    }
+}
+
+/// The sensors beside the radar that the run uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Others {
+    pub gyro: bool,
+    pub wheels: bool,
+    /// True if they are weighed against the radar: there is a refinement.
+    pub are_weighed: bool,
+}

@@ -40,16 +40,14 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
         true => (Scan::TOPIC, Masked::TOPIC),
         false => (Masked::TOPIC, Rotation::TOPIC),
     };
-    let motions = is_masking
-        .then(|| ports.tap(Motion::TOPIC, joining))
-        .transpose()?;
+    let motions = is_masking.then(|| ports.tap(Motion::TOPIC, joining));
+    let motions = motions.transpose()?;
     let mut stage = Broken {
         launch,
         breach,
-        stage: if is_masking {
-            StageId::Masking
-        } else {
-            StageId::RotationSearch
+        stage: match is_masking {
+            true => StageId::Masking,
+            false => StageId::RotationSearch,
         },
         input: ports.tap(input, joining)?,
         motions,
@@ -160,13 +158,8 @@ impl Broken<'_> {
     /// Masking that is too patient waits for the motion of the item before, and one that is not
     /// waits for none.
     fn has_motion(&self, seq: u64) -> bool {
-        let Some(before) = seq
-            .checked_sub(1)
-            .filter(|_| self.does("masking too patient"))
-        else {
-            return true;
-        };
-        self.newest_motion >= Some(before)
+        let before = seq.checked_sub(1);
+        !self.does("masking too patient") || before.is_none() || self.newest_motion >= before
     }
 
     fn process(&self, item: &Item, received_ns: i64) -> Result<(), StageError> {
@@ -183,7 +176,7 @@ impl Broken<'_> {
             (received_ns, now_ns) = (clock::now_ns(), clock::now_ns());
         }
         let mut item = *item;
-        if !self.does("stamps nothing and forgets the item") {
+        if !self.does("stamps nothing") {
             *item.hop_mut(self.stage) = Hop {
                 received_ns,
                 started_ns: now_ns,
@@ -191,7 +184,7 @@ impl Broken<'_> {
                 published_ns: clock::now_ns(),
             };
         }
-        if self.does("stamps nothing and forgets the item") {
+        if self.does("forgets the item") {
             item.stamp_ns = 0;
         }
         let output = self.output_about(item)?;

@@ -18,33 +18,25 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::batch::{Drive, End, List, Outcome, Row, Settings, list::is_configuration};
 
-/// The command of `gyre` that computes a drive.
 pub const COMMAND: &str = "batch-drive";
 /// The longest time between two polls of the processes; the end of one is noticed at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
 /// Bytes at the end of an output that hold its last line.
 const TAIL: u64 = 1 << 16;
 
-/// A batch that is to be computed.
 #[derive(Clone, Debug)]
 pub struct Batch<'a> {
-    /// The program `gyre`.
     pub program: PathBuf,
     pub list: &'a List,
-    /// The drives of the list that are computed.
     pub drives: Vec<Drive>,
-    /// Their common settings.
     pub settings: Settings,
     /// The folder of the batch, an absolute path without links.
     pub out: PathBuf,
-    /// Runs at once.
     pub jobs: usize,
 }
 
-/// The outcomes of the drives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
-    /// The number of drives by outcome.
     pub counts: BTreeMap<Outcome, usize>,
     /// The number of drives that had been computed before.
     pub earlier: usize,
@@ -104,19 +96,15 @@ impl Ended {
     /// Writes the row of a drive and counts it. Returns a line about it.
     fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
         let Batch { settings, out, .. } = batch;
-        let row = Row::read(out, drive, settings)?;
-        let (row, earlier, note) = match row.outcome.has_results() && end.unchecked {
-            true => (
-                row,
-                true,
-                format!("; not looked at again: {}", end.sentence),
-            ),
-            false => {
-                let row = Row::of(out, drive, settings, end.outcome, end.sentence);
-                row.write(out)?;
-                (row, end.earlier, String::new())
-            }
-        };
+        let (mut row, mut note) = (Row::read(out, drive, settings)?, String::new());
+        let is_kept = row.outcome.has_results() && end.unchecked;
+        if is_kept {
+            note = format!("; not looked at again: {}", end.sentence);
+        } else {
+            row = Row::of(out, drive, settings, end.outcome, end.sentence);
+            row.write(out)?;
+        }
+        let earlier = is_kept || end.earlier;
         *self.counts.entry(row.outcome).or_default() += 1;
         self.earlier += usize::from(earlier);
         let number: usize = self.counts.values().sum();
@@ -138,17 +126,13 @@ impl<'a> Child<'a> {
     /// Starts it. Its output is added to `output/NAME.txt`.
     fn start(batch: &Batch<'_>, drive: &'a Drive) -> Result<Self, Failure> {
         let path = batch.out.join("output").join(format!("{}.txt", drive.name));
-        let open = || -> io::Result<_> {
-            let mut options = OpenOptions::new();
-            let file = options.create(true).append(true).read(true).open(&path)?;
-            let (begin, outputs) = (
-                file.metadata()?.len(),
-                [file.try_clone()?, file.try_clone()?],
-            );
-            Ok((file, begin, outputs))
-        };
-        let (output, begin, [out, errors]) =
-            open().map_err(|error| format!("cannot write to {}: {error}", path.display()))?;
+        let unwritable = |error: io::Error| format!("cannot write to {}: {error}", path.display());
+        let mut options = OpenOptions::new();
+        let output = options.create(true).append(true).read(true).open(&path);
+        let output = output.map_err(unwritable)?;
+        let begin = output.metadata().map_err(unwritable)?.len();
+        let out = output.try_clone().map_err(unwritable)?;
+        let errors = output.try_clone().map_err(unwritable)?;
         let process = Command::new(&batch.program)
             .args(words(batch, drive))
             .stdin(Stdio::null())
@@ -164,13 +148,9 @@ impl<'a> Child<'a> {
         })
     }
 
-    /// Asks it to end.
     fn ask_to_end(&mut self) {
-        if let (Ok(None), Some(pid)) = (
-            self.process.try_wait(),
-            Pid::from_raw(self.process.id() as i32),
-        ) {
-            let _ = kill_process(pid, Signal::TERM);
+        if matches!(self.process.try_wait(), Ok(None)) {
+            let _ = kill_process(Pid::from_child(&self.process), Signal::TERM);
         }
     }
 
@@ -222,15 +202,14 @@ fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
         file if file.is_file() => file,
         file => gyre_shipped::configuration(Path::new(named)).unwrap_or(file),
     });
-    let configuration = own.or_else(|| batch.settings.configuration.clone());
-    let configuration = configuration.map(PathBuf::into_os_string);
     let mut words = vec![
         COMMAND.into(),
         format!("--parent={}", process::id()).into(),
         out,
     ];
     if !is_configuration(&drive.path) {
-        words.extend(configuration);
+        let configuration = own.or_else(|| batch.settings.configuration.clone());
+        words.extend(configuration.map(PathBuf::into_os_string));
     }
     words.push(path.into());
     let set = batch.settings.set.iter().chain(&drive.set);
@@ -299,14 +278,14 @@ mod tests {
     fn an_end_is_the_last_line_or_the_cause_of_the_death() {
         let reported = End::of(Outcome::Corrupt, "no /batch/drives/a");
         let json = serde_json::to_string(&reported).unwrap();
-        let end = end_of(&format!("echo words; echo '{json}'"));
-        assert_eq!(end, End::of(Outcome::Corrupt, "no drives/a"));
-        let end = end_of("echo some words; exit 101");
-        assert_eq!(end, End::of(Outcome::Failed, "some words"));
-        assert_eq!(
-            end_of("exit 1"),
-            End::of(Outcome::Failed, "it printed nothing")
-        );
+        let corrupt = format!("echo words; echo '{json}'");
+        for (script, outcome, sentence) in [
+            (&*corrupt, Outcome::Corrupt, "no drives/a"),
+            ("echo some words; exit 101", Outcome::Failed, "some words"),
+            ("exit 1", Outcome::Failed, "it printed nothing"),
+        ] {
+            assert_eq!(end_of(script), End::of(outcome, sentence));
+        }
         let end = end_of(&format!("echo '{json}'; kill -9 $$"));
         assert_eq!(end.outcome, Outcome::Killed);
         assert!(end.sentence.contains("signal 9"), "{}", end.sentence);

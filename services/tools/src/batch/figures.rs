@@ -68,16 +68,12 @@ pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let summary = serde_json::from_str::<Map<String, Value>>(&text);
     let mut summary = Value::Object(summary.map_err(|error| unknown(&path, error))?);
-    let ms = |percentile| {
-        let us = summary.pointer(percentile).and_then(Value::as_f64);
-        us.map(|us| us * 1e-3)
-    };
+    let ms = |percentile| Some(summary.pointer(percentile)?.as_f64()? * 1e-3);
     let restarts = summary["restarts"].as_object().into_iter().flatten();
     let restarts: u64 = restarts.filter_map(|(_, count)| count.as_u64()).sum();
-    let driven = match summary["processed"].as_u64() > Some(1) {
-        true => Some(driven(&out.join("trajectory.tum"))?),
-        false => None,
-    };
+    let has_motion = summary["processed"].as_u64() > Some(1);
+    let driven = has_motion.then(|| driven(&out.join("trajectory.tum")));
+    let (duration_s, path_m) = driven.transpose()?.unzip();
     let begun = read_text(&out.join(gyre_run::BEGUN_WITH), SETTINGS).ok();
     let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
     let build = begun
@@ -88,16 +84,17 @@ pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
         "restarts": restarts,
         "p50_ms": ms("/latency/sensor_to_pose/p50_us"),
         "p99_ms": ms("/latency/sensor_to_pose/p99_us"),
-        "duration_s": driven.map(|(duration_s, _)| duration_s),
-        "path_m": driven.map(|(_, path_m)| path_m),
+        "duration_s": duration_s,
+        "path_m": path_m,
     });
     summary["derived"] = derived;
     let mut values = Values::new();
     for (name, pointer) in FIGURES.iter().chain(&TIMES) {
         let value = match summary.pointer(pointer) {
             None | Some(Value::Null) => continue,
+            // Rounded to a hundred-thousandth, which is finer than any figure is exact.
             Some(Value::Number(number)) if number.is_f64() => {
-                rounded(number.as_f64().unwrap_or_default()).into()
+                ((number.as_f64().unwrap_or_default() * 1e5).round() / 1e5).into()
             }
             Some(value @ (Value::String(_) | Value::Number(_))) => value.clone(),
             Some(_) => return Err(unknown(&path, format!("`{pointer}` is no figure")).into()),
@@ -122,11 +119,6 @@ pub(crate) fn unknown(path: &Path, reason: impl Display) -> String {
     format!(
         "{path} is not what this version of gyre writes ({reason}); remove it, and the same command makes it again"
     )
-}
-
-/// Rounds to a hundred-thousandth, which is finer than any figure is exact.
-fn rounded(value: f64) -> f64 {
-    (value * 1e5).round() / 1e5
 }
 
 #[cfg(test)]
@@ -166,16 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_one_pose_has_no_path() {
+    fn a_run_of_one_pose_has_no_path_and_an_invalid_summary_is_refused() {
         let out = run(&SUMMARY.replace("\"processed\": 3", "\"processed\": 1"));
         fs::remove_file(out.path().join("trajectory.tum")).unwrap();
         let values = read(out.path()).unwrap();
-        assert_eq!(values["poses"], 1);
-        assert_eq!(values.get("path_m"), None);
-    }
-
-    #[test]
-    fn an_invalid_summary_is_refused() {
+        assert_eq!((&values["poses"], values.get("path_m")), (&json!(1), None));
         for summary in ["{\"processed\": []}", "[]", "3"] {
             let error = read(run(summary).path()).unwrap_err().to_string();
             assert!(error.contains("summary.json is not what"), "{error}");

@@ -18,7 +18,6 @@ const MAX_NAME: usize = 200;
 const DRIVE: &str = "drive";
 const COLUMNS: [&str; 4] = [DRIVE, "name", "configuration", "set"];
 
-/// A drive of a batch.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
@@ -67,20 +66,14 @@ impl List {
             let refused = |reason| format!("{shown}, line {line}: {reason}");
             let drive = drive.map_err(refused)?;
             if let Some(first) = seen.insert(drive.name.clone(), line) {
-                return Err(refused(format!(
-                    "the drive of line {first} is named `{}` too: give them different names in the column `name`",
-                    drive.name
-                ))
-                .into());
+                let name = drive.name;
+                return Err(refused(format!("the drive of line {first} is named `{name}` too: give them different names in the column `name`")).into());
             }
             drives.push(drive);
         }
         match drives.is_empty() {
             false => Ok(Self { drives, folder }),
-            true => Err(format!(
-                "{shown} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one"
-            )
-            .into()),
+            true => Err(format!("{shown} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one").into()),
         }
     }
 
@@ -88,9 +81,9 @@ impl List {
     /// long drives that are neighbours are divided.
     pub fn share(&self, task: usize, tasks: usize) -> Result<Vec<Drive>, Failure> {
         if task >= tasks {
+            let last = tasks.saturating_sub(1);
             return Err(format!(
-                "there is no task {task} of {tasks}: tasks count from 0, so the last one is {}",
-                tasks.saturating_sub(1)
+                "there is no task {task} of {tasks}: tasks count from 0, so the last one is {last}"
             )
             .into());
         }
@@ -128,7 +121,6 @@ fn is_recorded(path: &Path) -> bool {
     path.extension().is_some_and(|it| it == "mcap")
 }
 
-/// Returns the drives of a text.
 fn lines(text: &str) -> Lines {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = (1..).zip(text.lines().map(str::trim));
@@ -164,10 +156,8 @@ fn table(text: &str) -> Lines {
     };
     if let Some(column) = header.iter().find(|it| !COLUMNS.contains(it)) {
         let known = COLUMNS.join(", ");
-        return vec![(
-            1,
-            Err(format!("there is no column `{column}`; there are {known}")),
-        )];
+        let unknown = format!("there is no column `{column}`; there are {known}");
+        return vec![(1, Err(unknown))];
     }
     let drive = |record: csv::Result<csv::StringRecord>| {
         let position = match &record {
@@ -184,7 +174,7 @@ fn table(text: &str) -> Lines {
 
 impl Line {
     fn drive(self) -> Result<Drive, String> {
-        let path = &self.drive;
+        let (path, set) = (&self.drive, &self.set);
         if path.is_empty() {
             return Err("the column `drive` is empty: it is the path of the recording".to_owned());
         }
@@ -193,15 +183,11 @@ impl Line {
                 "`{path}` is a configuration itself: leave its column `configuration` empty"
             ));
         }
-        let set = shlex::split(&self.set).ok_or_else(|| {
-            let set = &self.set;
-            format!("the column `set` is `{set}`, in which a quote is not closed")
-        })?;
-        let drive = Drive::of(path, self.name.as_deref())?;
+        let unclosed = || format!("the column `set` is `{set}`, in which a quote is not closed");
         Ok(Drive {
-            configuration: self.configuration,
-            set,
-            ..drive
+            set: shlex::split(set).ok_or_else(unclosed)?,
+            configuration: self.configuration.clone(),
+            ..Drive::of(path, self.name.as_deref())?
         })
     }
 }
@@ -219,9 +205,10 @@ impl Drive {
             true => of_path.file_stem(),
             false => of_path.file_name(),
         };
+        let none = || format!("`{path}` has no name: give one in the column `name`");
         let name = name
             .or(last.and_then(|last| last.to_str()))
-            .ok_or_else(|| format!("`{path}` has no name: give one in the column `name`"))?;
+            .ok_or_else(none)?;
         let is_plain = |c: char| c != '/' && !c.is_control();
         let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
         match is_valid && name.chars().all(is_plain) {
@@ -259,14 +246,10 @@ mod tests {
     #[test]
     fn a_line_is_a_path_and_names_the_drive() {
         let list = read("# two drives\n/data/a, b/\n\nruns/c.mcap\nsim.toml\n").unwrap();
-        let named = |drive: &Drive| (drive.name.clone(), drive.path.clone());
+        let named = |drive: &Drive| format!("{}: {}", drive.name, drive.path);
         let named: Vec<_> = list.drives.iter().map(named).collect();
-        let expected = [
-            ("a, b", "/data/a, b/"),
-            ("c", "runs/c.mcap"),
-            ("sim", "sim.toml"),
-        ];
-        assert_eq!(named, expected.map(|(n, p)| (n.to_owned(), p.to_owned())));
+        let expected = ["a, b: /data/a, b/", "c: runs/c.mcap", "sim: sim.toml"];
+        assert_eq!(named, expected);
         assert_eq!(list.resolve("/data/x"), Path::new("/data/x"));
         assert!(list.resolve("runs/c.mcap").is_absolute());
     }
@@ -285,14 +268,9 @@ mod tests {
 
     #[test]
     fn a_list_that_is_wrong_names_the_line() {
-        let twice = refusal("a/radar\n\nb/radar\n");
-        assert!(
-            twice.starts_with(", line 3: the drive of line 1 is named `radar` too"),
-            "{twice}"
-        );
-        let column = refusal("drive,sett\na,b\n");
-        assert!(column.contains("no column `sett`"), "{column}");
         for (text, words) in [
+            ("a/radar\n\nb/radar\n", ", line 3: the drive of line 1 is"),
+            ("drive,sett\na,b\n", ", line 1: there is no column `sett`"),
             ("drive,set\na,b='\n", ", line 2: the column `set` is `b='`"),
             ("drive,name\n,b\n", ", line 2: the column `drive` is empty"),
             ("drive,name\na,b/c\n", ", line 2: `b/c` cannot be"),
@@ -328,10 +306,8 @@ mod tests {
     #[test]
     fn tasks_share_the_drives_out() {
         let list = read("a\nb\nc\nd\ne\n").unwrap();
-        let mut all: Vec<_> = (0..3)
-            .flat_map(|task| list.share(task, 3).unwrap())
-            .map(|drive| drive.name)
-            .collect();
+        let all = (0..3).flat_map(|task| list.share(task, 3).unwrap());
+        let mut all: Vec<_> = all.map(|drive| drive.name).collect();
         all.sort();
         assert_eq!(all, ["a", "b", "c", "d", "e"]);
         assert_eq!(list.share(7, 8).unwrap(), []);

@@ -1,7 +1,7 @@
-//! The row of a drive: `rows/NAME.json`. The rows are the table.
+//! The end of a drive, and its row: `rows/NAME.json`. The rows are the table.
 
 use std::{
-    io,
+    fmt, io,
     path::{Path, PathBuf},
 };
 
@@ -11,9 +11,79 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::batch::{
-    Drive, Outcome,
+    Drive,
     figures::{self, Values},
 };
+
+/// The outcome of a drive: the column `outcome` of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// All scans have been played, and all results are there.
+    Complete,
+    /// All scans have been played, but too many of them cannot be read.
+    Corrupt,
+    /// All scans have been played, but too many of the motions are weak or predicted.
+    Unsure,
+    /// The run could not begin, or has failed.
+    Failed,
+    Killed,
+    Interrupted,
+    /// It has not been computed yet, or with other settings.
+    NotRun,
+}
+
+impl Outcome {
+    /// Returns whether all scans were played, so that there are results of the whole drive.
+    pub fn has_results(self) -> bool {
+        matches!(self, Self::Complete | Self::Corrupt | Self::Unsure)
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
+/// The end of a drive's process: the last line that it prints, as JSON.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct End {
+    pub outcome: Outcome,
+    /// True if the drive had ended so before.
+    pub earlier: bool,
+    /// True if the drive was not looked at: its earlier results still count.
+    pub unchecked: bool,
+    /// The reason why it is not complete; else empty.
+    pub sentence: String,
+}
+
+impl End {
+    pub fn of(outcome: Outcome, sentence: impl Into<String>) -> Self {
+        Self {
+            outcome,
+            earlier: false,
+            unchecked: false,
+            sentence: sentence.into(),
+        }
+    }
+
+    /// Returns the end of a drive whose recording or folder could not be looked at.
+    pub fn unchecked(sentence: impl Into<String>) -> Self {
+        Self {
+            unchecked: true,
+            ..Self::of(Outcome::Failed, sentence)
+        }
+    }
+
+    pub fn interrupted() -> Self {
+        let sentence = "the batch was interrupted: the same command continues";
+        Self {
+            outcome: Outcome::Interrupted,
+            ..Self::unchecked(sentence)
+        }
+    }
+}
 
 /// The settings that the drives of a batch have in common.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,7 +103,6 @@ pub struct Settings {
 #[serde(deny_unknown_fields)]
 pub struct Row {
     pub drive: Drive,
-    /// The settings that it was computed with.
     pub settings: Settings,
     pub outcome: Outcome,
     /// The reason why it is not complete, in a sentence; else empty.
@@ -67,7 +136,6 @@ impl Row {
         row
     }
 
-    /// Returns the folder of a drive's results in the folder of a batch.
     pub fn results(batch: &Path, drive: &Drive) -> PathBuf {
         batch.join("drives").join(&drive.name)
     }
@@ -96,14 +164,14 @@ impl Row {
         };
         let row: Self = match serde_json::from_str(&text) {
             Ok(row) => row,
-            Err(error) => return Ok(not_run(&figures::unknown(&path, error).to_string())),
+            Err(error) => return Ok(not_run(&figures::unknown(&path, error))),
         };
+        if (&row.drive, &row.settings) != (drive, settings) {
+            return Ok(not_run("it was computed with other settings"));
+        }
         // A run that begins removes the results before it.
         let has_results = || Self::results(batch, drive).join(COMPLETE).exists();
         Ok(match row.outcome.has_results() && !has_results() {
-            _ if (&row.drive, &row.settings) != (drive, settings) => {
-                not_run("it was computed with other settings")
-            }
             true => not_run("its results are being computed again, or were removed"),
             false => row,
         })
@@ -121,26 +189,5 @@ impl Row {
             }
             _ => format!("{name}: {outcome}{earlier}: {}", self.sentence),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_complete_drive_without_its_results_is_a_failure() {
-        let out = tempfile::tempdir().unwrap();
-        let drive = Drive {
-            name: "a".to_owned(),
-            path: "data/a".to_owned(),
-            configuration: None,
-            set: Vec::new(),
-        };
-        let settings = Settings::default();
-        let row = Row::of(out.path(), &drive, &settings, Outcome::Complete, "");
-        assert_eq!(row.outcome, Outcome::Failed);
-        assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
     }
 }

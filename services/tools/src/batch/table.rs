@@ -13,7 +13,6 @@ use crate::batch::{
 /// The file of the results that follow from the drives and their configurations: the same bytes
 /// whatever was killed.
 pub const RESULTS: &str = "results.csv";
-/// The file of all others.
 pub const TIMES_FILE: &str = "times.csv";
 
 /// Writes both files from the rows of all drives of a list, which are returned.
@@ -25,32 +24,22 @@ pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, F
         )
         .into());
     }
-    let rows = list
-        .drives
-        .iter()
-        .map(|drive| Row::read(out, drive, settings));
+    let drives = list.drives.iter();
+    let rows = drives.map(|drive| Row::read(out, drive, settings));
     let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
     let head = |row: &Row| {
-        let Row {
-            drive, sentence, ..
-        } = row;
-        let outcome = row.outcome.to_string();
+        let (drive, outcome) = (&row.drive, row.outcome.to_string());
         vec![
             drive.name.clone(),
             drive.path.clone(),
             outcome,
-            sentence.clone(),
+            row.sentence.clone(),
         ]
     };
-    let results = csv(
-        &rows,
-        &["name", "drive", "outcome", "sentence"],
-        head,
-        &FIGURES,
-    )?;
-    gyre_storage::write(&out.join(RESULTS), results)?;
-    let times = csv(&rows, &["name"], |row| vec![row.drive.name.clone()], &TIMES)?;
-    gyre_storage::write(&out.join(TIMES_FILE), times)?;
+    let names = ["name", "drive", "outcome", "sentence"];
+    gyre_storage::write(&out.join(RESULTS), csv(&rows, &names, head, &FIGURES)?)?;
+    let head = |row: &Row| vec![row.drive.name.clone()];
+    gyre_storage::write(&out.join(TIMES_FILE), csv(&rows, &["name"], head, &TIMES)?)?;
     Ok(rows)
 }
 
@@ -84,50 +73,48 @@ mod tests {
 
     #[test]
     fn the_table_has_a_line_for_each_drive_in_the_order_of_the_list() {
-        let out = tempfile::tempdir().unwrap();
-        let path = out.path().join("list.txt");
+        let folder = tempfile::tempdir().unwrap();
+        let (out, path) = (folder.path(), folder.path().join("list.txt"));
         fs::write(&path, "b\na\nc\n").unwrap();
         let list = List::read(&path).unwrap();
-        fs::create_dir(out.path().join("rows")).unwrap();
+        fs::create_dir(out.join("rows")).unwrap();
         let settings = Settings::default();
-        let [b, a, c] = &list.drives[..] else {
-            panic!("{list:?}")
-        };
-        let mut row = Row::of(out.path(), a, &settings, Outcome::NotRun, "");
+        let [b, a] = [0, 1].map(|index: usize| &list.drives[index]);
+        let row = Row::of(out, a, &settings, Outcome::Complete, "");
+        assert_eq!(row.outcome, Outcome::Failed);
+        assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
+        let mut row = Row::of(out, a, &settings, Outcome::NotRun, "");
         row.outcome = Outcome::Complete;
         row.values.insert("ate_rmse_m".to_owned(), 0.25.into());
-        row.write(out.path()).unwrap();
-        let without = write(&list, &settings, out.path()).unwrap();
+        row.write(out).unwrap();
+        let without = write(&list, &settings, out).unwrap();
         assert!(without[1].line(false).contains("a: not-run: its results"));
-        let results = out.path().join("drives/a/journal");
-        fs::create_dir_all(&results).unwrap();
-        fs::write(results.join("complete"), "").unwrap();
-        assert_eq!(Row::read(out.path(), a, &settings).unwrap(), row);
+        fs::create_dir_all(out.join("drives/a/journal")).unwrap();
+        fs::write(out.join("drives/a/journal/complete"), "").unwrap();
+        assert_eq!(Row::read(out, a, &settings).unwrap(), row);
+        let set = vec!["raster.n=127".to_owned()];
         let other = Settings {
-            set: vec!["raster.n=127".to_owned()],
+            set,
             ..settings.clone()
         };
-        let row = Row::of(out.path(), b, &other, Outcome::Failed, "");
-        row.write(out.path()).unwrap();
-        fs::write(out.path().join(format!("rows/{}.json", c.name)), "{").unwrap();
+        let row = Row::of(out, b, &other, Outcome::Failed, "");
+        row.write(out).unwrap();
+        fs::write(out.join("rows/c.json"), "{").unwrap();
 
-        write(&list, &settings, out.path()).unwrap();
-        let mut results = csv::Reader::from_path(out.path().join(RESULTS)).unwrap();
+        write(&list, &settings, out).unwrap();
+        let mut results = csv::Reader::from_path(out.join(RESULTS)).unwrap();
         let header = results.headers().unwrap().clone();
-        let column = |name| header.iter().position(|column| column == name).unwrap();
         let records: Vec<_> = results.records().map(Result::unwrap).collect();
-        let cells = |name| -> Vec<String> {
-            records
-                .iter()
-                .map(|it| it[column(name)].to_owned())
-                .collect()
+        let cells = |name| {
+            let column = header.iter().position(|column| column == name).unwrap();
+            [0, 1, 2].map(|row: usize| &records[row][column])
         };
         assert_eq!(cells("name"), ["b", "a", "c"]);
         assert_eq!(cells("outcome"), ["not-run", "complete", "not-run"]);
         assert_eq!(cells("ate_rmse_m"), ["", "0.25", ""]);
         assert!(cells("sentence")[0].contains("other settings"));
         assert!(cells("sentence")[2].contains("c.json is not what"));
-        let times = fs::read_to_string(out.path().join(TIMES_FILE)).unwrap();
+        let times = fs::read_to_string(out.join(TIMES_FILE)).unwrap();
         assert_eq!(times.lines().count(), 4);
     }
 }

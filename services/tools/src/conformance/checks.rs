@@ -1,38 +1,39 @@
 //! The scenarios of a test, each in a run of its own.
 
-mod absence;
 mod feedback;
+mod lives;
 mod refusal;
-mod restart;
-mod standing_by;
-mod steps;
 mod stream;
-mod timing;
 
-use std::{collections::BTreeMap, time::Duration};
+use std::time::{Duration, Instant};
 
-use gyre_messages::{Item, StageId, flag};
-use gyre_supervise::rig::Recorded;
+use gyre_messages::{StageId, flag};
+use gyre_stage::StageError;
+use gyre_supervise::{Scheduling, rig::Recorded};
+use gyre_terminal::Failure;
 
 use crate::conformance::{
-    ProgramError,
+    Interrupted,
     item::work_ns,
-    reference::Context,
-    report::{Judged, Report, Work},
+    reference::{Context, POLL_PERIOD, own_ended},
+    report::{Report, Work},
     result::{Differences, result_bytes},
     rule::{Findings, Rule},
-    session::Session,
+    session::{Pace, Session},
 };
 
-/// The test of one program.
+/// Items between two observers.
+const BETWEEN: u64 = 3;
+
+/// A part of the test.
+type Scenario<'a> = fn(&mut Examination<'a>) -> Result<(), Failure>;
+
 pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
     findings: Findings,
     /// The messages of the first scenario.
     outputs: Vec<Recorded>,
-    /// Their result bytes, by item.
-    first_results: BTreeMap<u64, Vec<u8>>,
 }
 
 impl<'a> Examination<'a> {
@@ -42,7 +43,6 @@ impl<'a> Examination<'a> {
             observe,
             findings: Findings::default(),
             outputs: Vec::new(),
-            first_results: BTreeMap::new(),
         }
     }
 
@@ -50,9 +50,19 @@ impl<'a> Examination<'a> {
         self.context.test.candidate.stage
     }
 
+    /// Opens a run, and starts the program in it with items sent at a pace and up to one; returns
+    /// also whether it has opened its topic.
+    fn begin(&mut self, name: &str, pace: Pace, end: u64) -> Result<(Session<'_>, bool), Failure> {
+        let mut session = Session::open(self.context, name, &mut self.findings)?;
+        (session.pace, session.until) = (pace, end);
+        let is_open = session.starts()?;
+        session.harness.connect()?;
+        Ok((session, is_open))
+    }
+
     /// Runs all scenarios. If the program does not complete the first, the others would show
     /// nothing.
-    pub(crate) fn run(mut self) -> Result<Report, ProgramError> {
+    pub(crate) fn run(mut self) -> Result<Report, Failure> {
         self.note_inapplicable_rules();
         (self.observe)("a start without topics");
         self.start_without_topics()?;
@@ -60,20 +70,19 @@ impl<'a> Examination<'a> {
         if !self.stream()? {
             return self.report(None, None);
         }
-        (self.observe)("one item at a time, with observers");
-        self.steps()?;
-        (self.observe)("kill -9");
-        self.restart()?;
-        if self.stage() == StageId::Masking {
-            (self.observe)("feedback");
-            self.feedback()?;
+        let is_masking = self.stage() == StageId::Masking;
+        let is_source = self.stage() == StageId::RadarReplay;
+        let scenarios: [(bool, &str, Scenario<'a>); 5] = [
+            (true, "one item at a time, with observers", Self::steps),
+            (true, "kill -9", Self::restart),
+            (is_masking, "feedback", Self::feedback),
+            (is_source, "a full window", Self::window),
+            (true, "standing by", Self::standing_by),
+        ];
+        for (_, name, scenario) in scenarios.into_iter().filter(|it| it.0) {
+            (self.observe)(name);
+            scenario(&mut self)?;
         }
-        if self.stage() == StageId::RadarReplay {
-            (self.observe)("a full window");
-            self.window()?;
-        }
-        (self.observe)("standing by");
-        self.standing_by()?;
         self.refusals()?;
         let mut answers = None;
         if self.context.test.demands.budget.is_some() {
@@ -89,26 +98,102 @@ impl<'a> Examination<'a> {
         let lag = self.context.test.candidate.manifest.window.lag;
         let is_source = stage == StageId::RadarReplay;
         let is_masking = stage == StageId::Masking;
-        let inapplicable = [
-            (is_source, Rule::CopiesItem, "a source makes the items"),
-            (!is_source, Rule::KeepsWindow, "it is no source"),
-            (!is_masking, Rule::WaitsForMotion, "it is not masking"),
-            (lag == 0, Rule::WaitsForMotion, "masking.lag is 0"),
-            (
-                stage != StageId::PoseIntegration,
-                Rule::BeginsWithNewest,
-                "it is not the sink",
-            ),
-            (!demands.same_as_own, Rule::SameAsOwn, "not asked for"),
-            (demands.budget.is_none(), Rule::KeepsBudget, "not asked for"),
-        ];
-        for (_, rule, reason) in inapplicable.into_iter().filter(|it| it.0) {
-            self.findings.not_for(rule, reason);
+        let is_sink = stage == StageId::PoseIntegration;
+        let has_budget = demands.budget.is_some();
+        for (applies, rule, reason) in [
+            (!is_source, Rule::CopiesItem, "a source makes the items"),
+            (is_source, Rule::KeepsWindow, "it is no source"),
+            (is_masking, Rule::WaitsForMotion, "it is not masking"),
+            (lag > 0, Rule::WaitsForMotion, "masking.lag is 0"),
+            (is_sink, Rule::BeginsWithNewest, "it is not the sink"),
+            (demands.same_as_own, Rule::SameAsOwn, "not asked for"),
+            (has_budget, Rule::KeepsBudget, "not asked for"),
+        ] {
+            if !applies {
+                self.findings.not_for(rule, reason);
+            }
         }
     }
 
+    /// A start where the supervisor has created nothing: all that exists afterwards is the
+    /// program's.
+    fn start_without_topics(&mut self) -> Result<(), Failure> {
+        let test = self.context.test;
+        let rig = test.rig("absence", self.context.signals, false)?;
+        let command = &test.candidate.command;
+        let mut process = rig.start(self.stage().name(), command, &Scheduling::default())?;
+        let since = Instant::now();
+        let has_created = || !rig.services().is_empty();
+        // It may wait for its topics as long as it likes.
+        while process.death().is_none()
+            && !has_created()
+            && since.elapsed() <= test.demands.item_timeout
+        {
+            if rig.sleep(&[], POLL_PERIOD)? {
+                return Err(Interrupted.into());
+            }
+        }
+        self.findings.require(Rule::CreatesNothing, !has_created(), || {
+            "it creates its topics where there are none: open them, so that the supervisor's sizes hold".to_owned()
+        });
+        Ok(process.kill()?)
+    }
+
+    /// One item at a time, while observers come and go and one never reads; then SIGTERM in the
+    /// middle. The results must equal the results of the whole stream.
+    fn steps(&mut self) -> Result<(), Failure> {
+        let items = self.context.reference.end() * 2 / 3;
+        let (mut session, true) = self.begin("steps", Pace::Single, u64::MAX)? else {
+            return Ok(());
+        };
+        let output = session.output_topic();
+        let never_read = session.harness.rig.tap(output)?;
+        session.findings.checked(Rule::IgnoresObservers);
+        for seq in 0..items {
+            let waited = session.reach(seq)?;
+            if !waited.is_done() {
+                let sentence = format!(
+                    "while observers came and went it sent nothing about item {seq}: {waited}"
+                );
+                session.findings.broken(Rule::IgnoresObservers, sentence);
+                break;
+            }
+            if seq % BETWEEN == 0 {
+                // The observer takes a message, if there is one, and leaves.
+                drop(session.harness.rig.tap(output)?.receive());
+            }
+        }
+        // Items are on their way when the request comes.
+        session.pace = Pace::Window;
+        session.admit()?;
+        session.stops("in the middle of the stream")?;
+        drop(never_read);
+        let when = "when the items come one at a time";
+        Ok(session.compare(0.., Rule::Deterministic, when)?)
+    }
+
+    /// The time of its answers by the clock of this process: one item at a time, from when it is
+    /// sent to when its answer is read. The stamps in the answers are the program's own. A source
+    /// answers no item: it is asked for the next by a pose.
+    fn timing(&mut self) -> Result<Option<Work>, Failure> {
+        if self.stage() == StageId::RadarReplay {
+            return Ok(None);
+        }
+        let end = self.context.reference.end();
+        let (mut session, true) = self.begin("timing", Pace::Single, u64::MAX)? else {
+            return Ok(None);
+        };
+        let waited = session.reach(end)?;
+        session
+            .findings
+            .require(Rule::KeepsBudget, waited.is_done(), || {
+                format!("it has not come to the end when the items come one at a time: {waited}")
+            });
+        Ok(Work::of((0..end).filter_map(|seq| session.answer_ns(seq))))
+    }
+
     /// Measures Gyre's own stage on the same inputs, unless it is the program.
-    fn own_work(&mut self) -> Result<Option<Work>, ProgramError> {
+    fn own_work(&mut self) -> Result<Option<Work>, Failure> {
         let (stage, candidate) = (self.stage(), &self.context.test.candidate);
         let own = candidate.own_command(stage);
         if candidate.command == own {
@@ -121,50 +206,42 @@ impl<'a> Examination<'a> {
         let waited = session.reach(self.context.reference.end())?;
         match waited.is_done() {
             true => Ok(Work::of(work_on(stage, &session.outputs))),
-            false => Err(ProgramError::Own {
-                stage: stage.name(),
-                reason: waited.to_string(),
-            }),
+            false => Err(own_ended(stage.name(), &waited.to_string())),
         }
     }
 
-    fn report(
-        mut self,
-        answers: Option<Work>,
-        own_work: Option<Work>,
-    ) -> Result<Report, ProgramError> {
+    fn report(mut self, answers: Option<Work>, own_work: Option<Work>) -> Result<Report, Failure> {
         let Context {
             test, reference, ..
         } = self.context;
         let (stage, topic) = (self.stage(), test.candidate.topics().output);
         let work = Work::of(work_on(stage, &self.outputs));
         let own = reference.topic(topic);
-        if test.demands.same_as_own && !self.outputs.is_empty() {
-            self.compare_with_own(topic, own)?;
+        let has_outputs = !self.outputs.is_empty();
+        if test.demands.same_as_own && has_outputs {
+            for own in own {
+                let seq = own.item().seq;
+                let bytes = result_bytes(topic, own)?;
+                let same = self.findings.first_results.get(&seq) == Some(&bytes);
+                self.findings.require(Rule::SameAsOwn, same, || {
+                    format!("item {seq} has other bytes than that of our own stage")
+                });
+            }
         }
         if let Some(budget) = test.demands.budget {
             self.judge_times("by its own stamps", work, budget);
             self.judge_times("by our clock, until its answer,", answers, budget);
         }
-        let deviation = match self.outputs.is_empty() {
-            true => None,
-            false => Some(deviation(topic, own, &self.outputs)?),
-        };
-        let judged = |(rule, verdict): (Rule, _)| Judged {
-            rule,
-            section: rule.section(),
-            says: rule.says(),
-            verdict,
-        };
+        let deviation = has_outputs.then(|| deviation(topic, own, &self.outputs));
         Ok(Report {
             stage: stage.name(),
             command: test.candidate.command.clone(),
             scans: reference.end() as usize,
-            rules: self.findings.verdicts().into_iter().map(judged).collect(),
+            rules: self.findings.judged(),
             work,
             answers,
             own_work,
-            deviation,
+            deviation: deviation.transpose()?,
         })
     }
 
@@ -178,29 +255,18 @@ impl<'a> Examination<'a> {
             format!("{clock} the {figure} of {items} items is {ms:.2} ms, and {budget_ms} ms are allowed")
         });
     }
-
-    fn compare_with_own(&mut self, topic: &str, own: &[Recorded]) -> Result<(), ProgramError> {
-        for own in own {
-            let seq = own.item().seq;
-            let same = self.first_results.get(&seq) == Some(&result_bytes(topic, own)?);
-            self.findings.require(Rule::SameAsOwn, same, || {
-                format!("item {seq} has other bytes than that of our own stage")
-            });
-        }
-        Ok(())
-    }
 }
 
 /// Returns the times of a stage's work on items by its own stamps, ns.
 fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
     let items = outputs.iter().map(Recorded::item);
-    let worked_on = items.filter(|it: &Item| !it.is(flag::END) && !it.is(flag::BASE));
+    let worked_on = items.filter(|it| !it.is(flag::END) && !it.is(flag::BASE));
     worked_on.map(move |it| work_ns(stage, &it))
 }
 
 /// Returns a sentence with the difference between results and the results of Gyre's own stage.
 /// Items that one of them lacks are left out.
-fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String, ProgramError> {
+fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String, StageError> {
     let (mut items, mut equal, mut differences) = (0, 0, Differences::default());
     for own in own.iter().filter(|own| !own.item().is(flag::END)) {
         let seq = own.item().seq;
@@ -211,7 +277,9 @@ fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String
         items += 1;
         match result_bytes(topic, own)? == result_bytes(topic, other)? {
             true => equal += 1,
-            false => drop(differences.add(topic, own, other)?),
+            false => {
+                differences.add(topic, own, other)?;
+            }
         }
     }
     let same = format!("{equal} of {items} items are the same bytes");

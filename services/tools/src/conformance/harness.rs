@@ -6,40 +6,33 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 use gyre_messages::{Item, Pose, PoseHeader, StageId, flag};
 use gyre_stage::{Manifest, StageError, wake::Signals};
 use gyre_supervise::{
-    Death, Scheduling,
+    Death, Scheduling, SuperviseError,
     rig::{Feed, Process, Recorded, Rig, Tap},
 };
 
-use crate::conformance::{ProgramError, topics::StageTopics};
+use crate::conformance::{at, topics::StageTopics};
 
 /// A program that stands in for a stage, and the run that it sees.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The stage that it replaces.
     pub stage: StageId,
-    /// The program and its arguments.
     pub command: Vec<String>,
-    /// The priority of its process.
     pub scheduling: Scheduling,
     /// The program `gyre`: the guardian, and Gyre's own stages.
     pub gyre: String,
     /// The manifest of the run, without prefix and root.
     pub manifest: Manifest,
-    /// The configuration of the run, TOML.
     pub configuration: String,
 }
 
 impl Candidate {
-    /// Returns the topics of the stage.
     pub(crate) fn topics(&self) -> StageTopics {
         StageTopics::of(self.stage, &self.manifest)
     }
 
-    /// Returns the command of Gyre's own stage.
     pub(crate) fn own_command(&self, stage: StageId) -> Vec<String> {
-        [&self.gyre, "stage", stage.name()]
-            .map(str::to_owned)
-            .into()
+        let words = [&self.gyre, "stage", stage.name()];
+        words.map(str::to_owned).into()
     }
 
     /// Creates a run that writes to `out`, with or without its services.
@@ -48,11 +41,11 @@ impl Candidate {
         out: PathBuf,
         signals: &'a Signals,
         has_services: bool,
-    ) -> Result<Rig<'a>, ProgramError> {
+    ) -> Result<Rig<'a>, SuperviseError> {
         for folder in ["log", "journal"] {
             let path = out.join(folder);
             let created = gyre_storage::create_folder(&path);
-            created.map_err(|error| ProgramError::file(&path)(error.source))?;
+            created.map_err(|error| at(&path)(error.source))?;
         }
         let manifest = Manifest {
             out,
@@ -63,7 +56,7 @@ impl Candidate {
             true => Rig::new,
             false => Rig::without_services,
         };
-        Ok(create(manifest, &self.configuration, &guardian, signals)?)
+        create(manifest, &self.configuration, &guardian, signals)
     }
 }
 
@@ -73,16 +66,12 @@ pub(crate) struct Harness<'a> {
     process: Option<Process>,
     /// The publishers of the inputs by topic.
     pub feeds: BTreeMap<&'static str, Box<dyn Feed>>,
-    /// The reader of the output.
     pub output: Box<dyn Tap>,
-    /// The run.
     pub rig: Rig<'a>,
     stage: StageId,
-    /// The topics of the stage.
     pub topics: StageTopics,
 }
 
-/// A message that a program has sent.
 pub(crate) enum Sent {
     /// A message that keeps the rules of its fields.
     Message(Recorded),
@@ -109,18 +98,17 @@ impl<'a> Harness<'a> {
     /// Opens the publishers of the inputs, with empty histories.
     pub(crate) fn open_feeds(&mut self) -> Result<(), StageError> {
         self.feeds.clear();
-        for (topic, _) in &self.topics.inputs {
+        for topic in self.topics.inputs() {
             self.feeds.insert(topic, self.rig.feed(topic)?);
         }
         Ok(())
     }
 
-    /// Starts the process.
     pub(crate) fn start(
         &mut self,
         command: &[String],
         scheduling: &Scheduling,
-    ) -> Result<(), ProgramError> {
+    ) -> Result<(), SuperviseError> {
         self.process = Some(self.rig.start(self.stage.name(), command, scheduling)?);
         Ok(())
     }
@@ -146,7 +134,6 @@ impl<'a> Harness<'a> {
         self.rig.has_publisher(self.stage)
     }
 
-    /// Publishes a message on a topic, if it is one of the inputs.
     pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
         let feed = self.feeds.get(topic);
         feed.map_or(Ok(()), |feed| feed.send(message))
@@ -175,14 +162,13 @@ impl<'a> Harness<'a> {
         self.process.as_mut().and_then(Process::death)
     }
 
-    /// Sends SIGTERM.
     pub(crate) fn terminate(&self) {
         self.process.iter().for_each(Process::terminate);
     }
 
     /// Kills the process with its group, and waits for its end.
-    pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
-        self.process.take().map_or(Ok(()), |it| Ok(it.kill()?))
+    pub(crate) fn kill(&mut self) -> Result<(), SuperviseError> {
+        self.process.take().map_or(Ok(()), Process::kill)
     }
 }
 

@@ -58,7 +58,6 @@ pub(crate) fn wrong_stamps(
     })
 }
 
-/// Returns the time of a stage's work on an item, ns.
 pub(crate) fn work_ns(stage: StageId, item: &Item) -> i64 {
     let hop = item.hops[stage as usize];
     hop.finished_ns.saturating_sub(hop.started_ns)

@@ -9,6 +9,8 @@ use crate::conformance::result::floats;
 /// A message that no stage may send, after the name of its fault.
 pub(crate) type Malformed = (&'static str, Recorded);
 
+const SHORTER: &str = "a payload shorter than its header says";
+
 /// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
 pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
     let item = valid.item();
@@ -21,7 +23,13 @@ pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>,
         ("a previous scan after its scan", valid.about(&late)),
     ];
     all.extend(match topic {
-        Scan::TOPIC => scans(valid)?,
+        Scan::TOPIC => changes::<Scan>(
+            valid,
+            &[
+                ("an angle that is NaN", &|h| h.azimuth_rad[3] = f32::NAN),
+                (SHORTER, &|h| h.first_byte = u32::MAX),
+            ],
+        )?,
         Masked::TOPIC => masks(valid)?,
         Rotation::TOPIC => changes::<Rotation>(
             valid,
@@ -60,40 +68,22 @@ fn changes<M: Message<Header: Copy>>(
     changed.collect()
 }
 
-fn scans(valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
-    changes::<Scan>(
-        valid,
-        &[
-            ("an angle that is NaN", &|h| h.azimuth_rad[3] = f32::NAN),
-            ("a payload shorter than its header says", &|h| {
-                h.first_byte = u32::MAX
-            }),
-        ],
-    )
-}
-
 fn masks(valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
     let mut all = changes::<Masked>(
         valid,
         &[
             ("a velocity that is NaN", &|h| h.twist[0] = f32::NAN),
             ("rasters of another size", &|h| h.n += 1),
-            ("a payload shorter than its header says", &|h| {
-                h.points = u32::MAX
-            }),
+            (SHORTER, &|h| h.points = u32::MAX),
         ],
     )?;
     let header = valid.header::<Masked>()?;
     let mut values = floats(&valid.payload);
-    let points = header.points(&values).unwrap_or_default().len() * 5;
-    if points > 0 {
+    if !header.points(&values).unwrap_or_default().is_empty() {
         let blocks = (header.n as usize * header.n as usize).div_ceil(16) * 16;
         values[blocks * header.rasters as usize + 2] = f32::NAN;
-        let payload = bytemuck::cast_slice(&values);
-        all.push((
-            "a point that is NaN",
-            Recorded::of::<Masked>(&header, payload, 0),
-        ));
+        let message = Recorded::of::<Masked>(&header, bytemuck::cast_slice(&values), 0);
+        all.push(("a point that is NaN", message));
     }
     Ok(all)
 }

@@ -7,18 +7,18 @@ use std::{
 };
 
 use gyre_messages::{
-    Hop, Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId,
-    compose, flag,
+    Hop, Item, Message, Motion, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, compose, flag,
 };
 use gyre_radar::continues;
-use gyre_stage::{clock, wake::Signals};
+use gyre_stage::{StageError, clock, wake::Signals};
 use gyre_supervise::{
     Scheduling,
     rig::{Feed, Process, Recorded, Rig, Tap},
 };
+use gyre_terminal::Failure;
 
 use crate::conformance::{
-    ProgramError,
+    Interrupted,
     harness::start_of_trajectory,
     test::{InputScans, Test},
     topics::StageTopics,
@@ -37,7 +37,6 @@ impl Reference {
         self.0.get(topic)?.get(seq as usize)
     }
 
-    /// Returns the messages of a topic.
     pub(crate) fn topic(&self, topic: &str) -> &[Recorded] {
         self.0.get(topic).map_or(&[], Vec::as_slice)
     }
@@ -52,10 +51,11 @@ impl Reference {
         test: &Test,
         scans: &mut InputScans,
         signals: &Signals,
-    ) -> Result<Self, ProgramError> {
+    ) -> Result<Self, Failure> {
         let scans = read(scans)?;
         if scans.len() < 3 {
-            return Err(ProgramError::TooFew(scans.len().saturating_sub(1)));
+            let scans = scans.len().saturating_sub(1);
+            return Err(format!("{scans} scans are too few to test a stage with: name a recording of more, or raise --scans").into());
         }
         let rig = test.rig("own", signals, true)?;
         OwnPipeline::begin(test, &rig, scans)?.run()
@@ -75,7 +75,7 @@ pub(crate) struct Context<'a> {
 }
 
 /// Reads the scans, as the source does; the end of the stream follows.
-fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ProgramError> {
+fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, Failure> {
     let mut read: Vec<Recorded> = Vec::new();
     let mut bytes = vec![0; scans.dataset.limits().bytes];
     let mut before: Option<Item> = None;
@@ -129,7 +129,7 @@ struct OwnPipeline<'a> {
 }
 
 impl<'a> OwnPipeline<'a> {
-    fn begin(test: &Test, rig: &'a Rig<'a>, scans: Vec<Recorded>) -> Result<Self, ProgramError> {
+    fn begin(test: &Test, rig: &'a Rig<'a>, scans: Vec<Recorded>) -> Result<Self, Failure> {
         let manifest = rig.manifest();
         let mut stages = test.stages.clone();
         stages.retain(|it| !matches!(it, StageId::RadarReplay | StageId::PoseIntegration));
@@ -155,16 +155,15 @@ impl<'a> OwnPipeline<'a> {
             stall_timeout: test.demands.start_timeout,
             reference: Reference::default(),
             last_pose: None,
-            motions: if manifest.refines {
-                Refined::TOPIC
-            } else {
-                Motion::TOPIC
+            motions: match manifest.refines {
+                true => Refined::TOPIC,
+                false => Motion::TOPIC,
             },
             unsent: scans.into_iter().peekable(),
         })
     }
 
-    fn run(mut self) -> Result<Reference, ProgramError> {
+    fn run(mut self) -> Result<Reference, Failure> {
         let mut progress = Instant::now();
         while !self.has_ended() {
             self.scans.answer_handshakes()?;
@@ -175,7 +174,7 @@ impl<'a> OwnPipeline<'a> {
                 self.require_living(progress.elapsed())?;
                 let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
                 if self.rig.sleep(&taps, POLL_PERIOD)? {
-                    return Err(ProgramError::Interrupted);
+                    return Err(Interrupted.into());
                 }
             }
         }
@@ -191,7 +190,7 @@ impl<'a> OwnPipeline<'a> {
         has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
     }
 
-    fn receive(&mut self) -> Result<bool, ProgramError> {
+    fn receive(&mut self) -> Result<bool, StageError> {
         let mut any = false;
         for (topic, tap) in &self.taps {
             while let Some(message) = tap.receive()? {
@@ -203,7 +202,7 @@ impl<'a> OwnPipeline<'a> {
     }
 
     /// Publishes the pose of an item that all stages have answered; returns whether there was one.
-    fn integrate(&mut self) -> Result<bool, ProgramError> {
+    fn integrate(&mut self) -> Result<bool, StageError> {
         let next = self.reference.topic(Pose::TOPIC).len() as u64;
         let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
         if !self.taps.iter().all(is_done) {
@@ -212,28 +211,25 @@ impl<'a> OwnPipeline<'a> {
         let Some(motion) = self.reference.get(self.motions, next) else {
             return Ok(false);
         };
-        let pose = self.pose(&motion.header::<Motion>()?);
-        self.last_pose = Some(pose).filter(|pose| !pose.item.is(flag::END));
+        let motion = motion.header::<Motion>()?;
+        let mut pose = PoseHeader {
+            item: motion.item,
+            ..PoseHeader::default()
+        };
+        let is_end = motion.item.is(flag::END);
+        if !is_end {
+            pose = compose(self.last_pose.as_ref(), &motion);
+            pose.item.flags |= flag::SYNC;
+        }
+        self.last_pose = (!is_end).then_some(pose);
         let pose = Recorded::of::<Pose>(&pose, &[], 0);
         self.poses.send(&pose)?;
         self.reference.push(Pose::TOPIC, pose);
         Ok(true)
     }
 
-    fn pose(&self, motion: &MotionHeader) -> PoseHeader {
-        let mut pose = PoseHeader {
-            item: motion.item,
-            ..PoseHeader::default()
-        };
-        if !motion.item.is(flag::END) {
-            pose = compose(self.last_pose.as_ref(), motion);
-            pose.item.flags |= flag::SYNC;
-        }
-        pose
-    }
-
     /// Publishes the scans that the window admits; returns whether there was one.
-    fn admit(&mut self) -> Result<bool, ProgramError> {
+    fn admit(&mut self) -> Result<bool, StageError> {
         let newest = (self.reference.topic(Pose::TOPIC).len() as u64).checked_sub(1);
         let window = self.rig.manifest().window;
         let mut any = false;
@@ -259,21 +255,24 @@ impl<'a> OwnPipeline<'a> {
         Ok(any)
     }
 
-    fn require_living(&mut self, idle: Duration) -> Result<(), ProgramError> {
+    fn require_living(&mut self, idle: Duration) -> Result<(), Failure> {
         for (stage, process) in &mut self.processes {
             if let Some(death) = process.death() {
-                return Err(ProgramError::Own {
-                    stage: stage.name(),
-                    reason: death.last_output.unwrap_or(death.cause),
-                });
+                let reason = death.last_output.unwrap_or(death.cause);
+                return Err(own_ended(stage.name(), &reason));
             }
         }
         match idle < self.stall_timeout {
             true => Ok(()),
-            false => Err(ProgramError::Own {
-                stage: "pipeline",
-                reason: format!("it made no progress for {idle:.0?}"),
-            }),
+            false => Err(own_ended(
+                "pipeline",
+                &format!("it made no progress for {idle:.0?}"),
+            )),
         }
     }
+}
+
+/// The end of a stage of Gyre that the test needs.
+pub(crate) fn own_ended(stage: &str, reason: &str) -> Failure {
+    format!("cannot compute the inputs: our own {stage} ended: {reason}").into()
 }

@@ -10,9 +10,7 @@ use crate::conformance::rule::{Rule, Verdict};
 /// The result of the test of a program.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The stage that it replaces.
     pub stage: &'static str,
-    /// The program and its arguments.
     pub command: Vec<String>,
     /// The scans that its inputs were computed from.
     pub scans: usize,
@@ -29,11 +27,9 @@ pub struct Report {
     pub deviation: Option<String>,
 }
 
-/// A rule and the verdict on it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Judged {
     pub rule: Rule,
-    /// The section of the contract.
     pub section: &'static str,
     /// The conduct of a program that keeps it.
     pub says: &'static str,
@@ -50,11 +46,9 @@ const PERCENTILE_ITEMS: u64 = 100;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Work {
     pub items: u64,
-    /// Median, ms.
     pub p50_ms: f64,
     /// 99th percentile, ms; `None` of fewer than a hundred items.
     pub p99_ms: Option<f64>,
-    /// Maximum, ms.
     pub max_ms: f64,
 }
 
@@ -85,33 +79,25 @@ impl Work {
 impl Report {
     /// Returns whether no rule is broken, and none was not reached.
     pub fn conforms(&self) -> bool {
-        let fails =
-            |judged: &Judged| matches!(judged.verdict, Verdict::Broken(_) | Verdict::NotReached);
-        !self.rules.iter().any(fails)
+        let not_reached = |judged: &Judged| judged.verdict == Verdict::NotReached;
+        self.broken() == 0 && !self.rules.iter().any(not_reached)
     }
 
-    /// Returns the number of rules that are broken.
     pub fn broken(&self) -> usize {
-        let rules = self.rules.iter();
-        rules
-            .filter(|judged| matches!(judged.verdict, Verdict::Broken(_)))
-            .count()
+        let is_broken = |judged: &&Judged| matches!(judged.verdict, Verdict::Broken(_));
+        self.rules.iter().filter(is_broken).count()
     }
 }
 
 impl fmt::Display for Work {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            items,
-            p50_ms,
-            p99_ms,
-            max_ms,
-        } = self;
-        write!(f, "p50 {p50_ms:.2} ms, ")?;
-        if let Some(p99_ms) = p99_ms {
-            write!(f, "p99 {p99_ms:.2} ms, ")?;
-        }
-        write!(f, "max {max_ms:.2} ms of {items} items")
+        let (p50_ms, max_ms, items) = (self.p50_ms, self.max_ms, self.items);
+        let p99 = self.p99_ms.map(|ms| format!("p99 {ms:.2} ms, "));
+        let p99 = p99.unwrap_or_default();
+        write!(
+            f,
+            "p50 {p50_ms:.2} ms, {p99}max {max_ms:.2} ms of {items} items"
+        )
     }
 }
 
@@ -127,29 +113,24 @@ impl fmt::Display for Judged {
         if let Verdict::DoesNotApply(reason) = self.verdict {
             write!(f, ": {reason}")?;
         }
-        sentences
-            .iter()
-            .try_for_each(|sentence| write!(f, "\n{:<30}{sentence}", ""))
+        let mut sentences = sentences.iter();
+        sentences.try_for_each(|sentence| write!(f, "\n{:<30}{sentence}", ""))
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for judged in &self.rules {
-            writeln!(f, "{judged}")?;
-        }
+        self.rules.iter().try_for_each(|it| writeln!(f, "{it}"))?;
         writeln!(f)?;
-        if let Some(work) = &self.work {
-            writeln!(f, "work on an item  {work}")?;
+        for (name, work) in [
+            ("work on an item ", self.work),
+            ("until the answer", self.answers),
+            ("our own stage   ", self.own_work),
+        ] {
+            work.map_or(Ok(()), |work| writeln!(f, "{name} {work}"))?;
         }
-        if let Some(answers) = &self.answers {
-            writeln!(f, "until the answer {answers}")?;
-        }
-        if let Some(own) = &self.own_work {
-            writeln!(f, "our own stage    {own}")?;
-            if let Some(work) = &self.work {
-                writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
-            }
+        if let (Some(own), Some(work)) = (self.own_work, self.work) {
+            writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
         }
         if let Some(deviation) = &self.deviation {
             writeln!(f, "results          {deviation}")?;
@@ -166,52 +147,41 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn of(times_ms: &[i64]) -> Option<Work> {
-        Work::of(times_ms.iter().map(|ms| ms * 1_000_000))
-    }
+    use crate::conformance::rule::Findings;
 
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 2e-3 * b
     }
 
     #[test]
-    fn the_maximum_of_few_items_is_called_so_and_the_first_items_do_not_count() {
-        let times = [&[900, 80, 70, 60][..], &[2; 19], &[5]].concat();
-        let work = of(&times);
-        assert!(work.is_some_and(|it| it.items == 20 && it.p99_ms.is_none()));
-        let judged = work.map(|it| it.judged());
+    fn a_hundred_items_have_a_percentile_and_the_first_items_do_not_count() {
+        let of = |times_ms: &[i64]| Work::of(times_ms.iter().map(|ms| ms * 1_000_000));
+        let few = of(&[&[900, 80, 70, 60][..], &[2; 19], &[5]].concat());
+        assert!(few.is_some_and(|it| it.items == 20 && it.p99_ms.is_none()));
+        let judged = few.map(|it| it.judged());
         assert!(judged.is_some_and(|(ms, name)| near(ms, 5.0) && name == "maximum"));
-        assert_eq!(of(&times[..4]), None);
-    }
-
-    #[test]
-    fn a_hundred_items_have_a_percentile() {
-        let times = [&[0; 4][..], &[2; 198], &[5, 9]].concat();
-        let work = of(&times);
-        assert!(work.is_some_and(|it| it.p99_ms.is_some_and(|ms| near(ms, 2.0))));
-        assert!(work.is_some_and(|it| near(it.max_ms, 9.0)));
+        assert_eq!(of(&[900, 80, 70, 60]), None);
+        let many = of(&[&[0; 4][..], &[2; 198], &[5, 9]].concat());
+        assert!(many.is_some_and(|it| it.p99_ms.is_some_and(|ms| near(ms, 2.0))));
+        assert!(many.is_some_and(|it| near(it.max_ms, 9.0)));
     }
 
     #[test]
     fn a_rule_that_was_not_reached_is_not_broken() {
-        let report = |verdict| Report {
+        let report = |findings: Findings| Report {
             stage: "masking",
             command: Vec::new(),
             scans: 8,
-            rules: vec![Judged {
-                rule: Rule::Resumes,
-                section: Rule::Resumes.section(),
-                says: Rule::Resumes.says(),
-                verdict,
-            }],
+            rules: findings.judged(),
             work: None,
             answers: None,
             own_work: None,
             deviation: None,
         };
-        let not_reached = report(Verdict::NotReached);
+        let not_reached = report(Findings::default());
         assert!(!not_reached.conforms() && not_reached.broken() == 0);
-        assert_eq!(report(Verdict::Broken(Vec::new())).broken(), 1);
+        let mut findings = Findings::default();
+        findings.broken(Rule::Resumes, "it has a gap");
+        assert_eq!(report(findings).broken(), 1);
     }
 }

@@ -40,11 +40,10 @@ fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
     header.azimuth_stamp_ns[azimuths..].fill(0);
     header.azimuth_rad[azimuths..].fill(0.0);
     header.azimuth_flags[azimuths..].fill(0);
-    let sweep = header.view(&message.payload);
-    let rows = sweep
-        .iter()
-        .flat_map(|sweep| (0..azimuths).flat_map(|row| sweep.row(row).to_vec()));
-    let rows: Vec<u8> = rows.collect();
+    let mut rows = Vec::new();
+    if let Some(sweep) = header.view(&message.payload) {
+        (0..azimuths).for_each(|row| rows.extend_from_slice(sweep.row(row)));
+    }
     // Where in the payload the rows are is no result.
     (header.first_byte, header.stride) = (0, 0);
     Ok([message.with::<Scan>(&header).header_bytes(), &rows].concat())
@@ -80,14 +79,11 @@ fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
 /// The differences of results that have other bytes.
 #[derive(Debug, Default)]
 pub(crate) struct Differences {
-    /// Mean absolute difference of the cells of the rasters.
-    mask: Vec<f64>,
+    /// Mean absolute differences of the cells of the rasters; lengths of the differences of the
+    /// translations, m; absolute differences of the yaws, degrees.
+    all: [Vec<f64>; 3],
     /// Sum of the means of the cells of the first rasters.
     mask_levels: f64,
-    /// Length of the difference of the translations, m.
-    translation_m: Vec<f64>,
-    /// Absolute difference of the yaws, degrees.
-    rotation_deg: Vec<f64>,
 }
 
 impl Differences {
@@ -99,37 +95,38 @@ impl Differences {
         one: &Recorded,
         other: &Recorded,
     ) -> Result<[Option<f64>; 3], StageError> {
-        match topic {
-            Scan::TOPIC => Ok([None; 3]),
+        let differences = match topic {
+            Scan::TOPIC => [None; 3],
             Masked::TOPIC => {
                 let [one, other] = [cells(one)?, cells(other)?];
                 let pairs = || one.iter().zip(&other);
                 let mean = |sum: f64| sum / pairs().count().max(1) as f64;
-                let difference = mean(pairs().map(|(a, b)| f64::from((a - b).abs())).sum());
-                self.mask.push(difference);
                 self.mask_levels += mean(pairs().map(|(a, _)| f64::from(*a)).sum());
-                Ok([Some(difference), None, None])
+                let difference = mean(pairs().map(|(a, b)| f64::from((a - b).abs())).sum());
+                [Some(difference), None, None]
             }
             _ => {
                 let (one, other) = (planar(topic, one)?, planar(topic, other)?);
                 let rotation_deg = wrap_angle(other[2] - one[2]).to_degrees().abs();
-                self.rotation_deg.push(rotation_deg);
                 let translation_m = (other[0] - one[0]).hypot(other[1] - one[1]);
                 let translation_m = (topic != Rotation::TOPIC).then_some(translation_m);
-                self.translation_m.extend(translation_m);
-                Ok([None, translation_m, Some(rotation_deg)])
+                [None, translation_m, Some(rotation_deg)]
             }
+        };
+        for (all, difference) in self.all.iter_mut().zip(differences) {
+            all.extend(difference);
         }
+        Ok(differences)
     }
 
-    /// Returns their percentiles.
     pub(crate) fn spreads(&self) -> Spreads {
-        let count = self.mask.len();
+        let [mask, translation_m, rotation_deg] = self.all.each_ref().map(|it| Spread::of(it));
+        let count = self.all[0].len();
         Spreads {
-            mask: Spread::of(&self.mask),
+            mask,
             mask_level: (count > 0).then(|| self.mask_levels / count as f64),
-            translation_m: Spread::of(&self.translation_m),
-            rotation_deg: Spread::of(&self.rotation_deg),
+            translation_m,
+            rotation_deg,
         }
     }
 }
@@ -147,25 +144,18 @@ pub struct Spreads {
     pub mask: Option<Spread>,
     /// Mean of the cells of the first rasters, for comparison.
     pub mask_level: Option<f64>,
-    /// Difference of the translations, m.
     pub translation_m: Option<Spread>,
-    /// Difference of the rotations, degrees.
     pub rotation_deg: Option<Spread>,
 }
 
-/// Percentiles of differences.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Median.
     pub p50: f64,
-    /// 99th percentile.
     pub p99: f64,
-    /// Maximum.
     pub max: f64,
 }
 
 impl Spreads {
-    /// Returns the rows of a table.
     pub(crate) fn rows(&self) -> Vec<String> {
         let rows = [
             ("mask", self.mask, ""),

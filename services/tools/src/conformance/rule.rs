@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
+use crate::conformance::report::Judged;
+
 /// Defines the rules: name, section of `docs/replace-a-stage.md` or option that demands it, and the
 /// conduct of a program that keeps it.
 macro_rules! rules {
@@ -19,7 +21,6 @@ macro_rules! rules {
         }
 
         impl Rule {
-            /// All rules, in the order of the contract.
             pub const ALL: [Self; [$($says,)+].len()] = [$(Self::$rule,)+];
 
             /// Returns the conduct of a program that keeps it.
@@ -63,11 +64,9 @@ rules! {
     KeepsBudget: "--budget-ms", "works within the budget";
 }
 
-/// The verdict on a rule.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "verdict", content = "why")]
 pub enum Verdict {
-    /// Nothing against it.
     Kept,
     /// Broken: sentences about the breaches.
     Broken(Vec<String>),
@@ -80,25 +79,28 @@ pub enum Verdict {
 /// The number of sentences that are kept for each rule; more would repeat the same fault.
 const MAX_SENTENCES: usize = 4;
 
-/// The verdicts so far.
 #[derive(Debug, Default)]
-pub(crate) struct Findings(BTreeMap<Rule, Verdict>);
+pub(crate) struct Findings {
+    verdicts: BTreeMap<Rule, Verdict>,
+    /// The result bytes of the first scenario, by item.
+    pub first_results: BTreeMap<u64, Vec<u8>>,
+}
 
 impl Findings {
     /// Notes that a rule was checked, and nothing was found unless there is a breach.
     pub(crate) fn checked(&mut self, rule: Rule) {
-        self.0.entry(rule).or_insert(Verdict::Kept);
+        self.verdicts.entry(rule).or_insert(Verdict::Kept);
     }
 
-    /// Notes that a rule does not apply.
     pub(crate) fn not_for(&mut self, rule: Rule, reason: &'static str) {
-        self.0.entry(rule).or_insert(Verdict::DoesNotApply(reason));
+        self.verdicts
+            .entry(rule)
+            .or_insert(Verdict::DoesNotApply(reason));
     }
 
-    /// Notes a breach.
     pub(crate) fn broken(&mut self, rule: Rule, sentence: impl fmt::Display) {
         let sentence = sentence.to_string();
-        match self.0.entry(rule).or_insert(Verdict::Kept) {
+        match self.verdicts.entry(rule).or_insert(Verdict::Kept) {
             Verdict::Broken(sentences) if sentences.contains(&sentence) => {}
             Verdict::Broken(sentences) if sentences.len() == MAX_SENTENCES => {}
             Verdict::Broken(sentences) => sentences.push(sentence),
@@ -115,8 +117,13 @@ impl Findings {
     }
 
     /// Returns the verdicts on all rules, in their order.
-    pub(crate) fn verdicts(mut self) -> Vec<(Rule, Verdict)> {
-        let of = |rule| (rule, self.0.remove(&rule).unwrap_or(Verdict::NotReached));
+    pub(crate) fn judged(mut self) -> Vec<Judged> {
+        let of = |rule: Rule| Judged {
+            rule,
+            section: rule.section(),
+            says: rule.says(),
+            verdict: self.verdicts.remove(&rule).unwrap_or(Verdict::NotReached),
+        };
         Rule::ALL.map(of).into()
     }
 }
@@ -132,13 +139,12 @@ mod tests {
         (0..9).for_each(|item| findings.broken(Rule::OneForOne, format!("item {}", item % 2)));
         findings.checked(Rule::OneForOne);
         findings.not_for(Rule::KeepsWindow, "it is no source");
-        let verdicts: BTreeMap<_, _> = findings.verdicts().into_iter().collect();
+        let judged = findings.judged().into_iter();
+        let verdicts: BTreeMap<_, _> = judged.map(|it| (it.rule, it.verdict)).collect();
         let twice = Verdict::Broken(vec!["item 0".to_owned(), "item 1".to_owned()]);
         assert_eq!(verdicts[&Rule::OneForOne], twice);
-        assert_eq!(
-            verdicts[&Rule::KeepsWindow],
-            Verdict::DoesNotApply("it is no source")
-        );
+        let no_source = Verdict::DoesNotApply("it is no source");
+        assert_eq!(verdicts[&Rule::KeepsWindow], no_source);
         assert_eq!(verdicts[&Rule::PassesEnd], Verdict::NotReached);
         assert_eq!(verdicts.len(), Rule::ALL.len());
     }

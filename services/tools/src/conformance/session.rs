@@ -1,26 +1,27 @@
 //! One process under test in a run of its own: its inputs and its outputs.
 
-mod examine;
 mod feeding;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt,
-    ops::Range,
+    ops::RangeFrom,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Pose, StageId, flag};
-use gyre_supervise::{Death, Scheduling, rig::Recorded};
+use gyre_messages::{Item, Message, Pose, StageId, flag};
+use gyre_stage::StageError;
+use gyre_supervise::{Death, Scheduling, SuperviseError, rig::Recorded};
+use gyre_terminal::Failure;
 
 use crate::conformance::{
-    ProgramError,
+    Interrupted,
     harness::{Harness, Sent, start_of_trajectory},
+    item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
     result::result_bytes,
     rule::{Findings, Rule},
     test::{Demands, Test},
-    topics::Direction,
 };
 
 /// The number of items under way at most.
@@ -43,15 +44,12 @@ pub(crate) struct Session<'a> {
     pub pace: Pace,
     /// The first item that is not sent automatically.
     pub until: u64,
-    /// The next item to be sent.
     next: u64,
-    /// The newest item that it has answered.
-    newest: Option<u64>,
+    pub newest: Option<u64>,
     /// The last item of this life of the process.
     last: Option<u64>,
     /// The outputs, in order, over all its lives.
     pub outputs: Vec<Recorded>,
-    /// The topics whose publishers it has notified.
     notified: BTreeSet<&'static str>,
     /// The time of the first sending of each item: an item that a sink has journalled in one life
     /// and sends in the next keeps its stamps.
@@ -59,12 +57,9 @@ pub(crate) struct Session<'a> {
     progress: Instant,
 }
 
-/// The end of a wait.
 #[derive(Clone, Debug)]
 pub(crate) enum Waited {
-    /// The condition holds.
     Done,
-    /// The process has ended.
     Died(Death),
     /// Nothing happened for too long.
     TimedOut,
@@ -93,13 +88,10 @@ impl<'a> Session<'a> {
         context: Context<'a>,
         name: &str,
         findings: &'a mut Findings,
-    ) -> Result<Self, ProgramError> {
-        let Context {
-            test,
-            reference,
-            signals,
-        } = context;
-        let harness = Harness::open(test.rig(name, signals, true)?, test.candidate.stage)?;
+    ) -> Result<Self, Failure> {
+        let (test, reference) = (context.test, context.reference);
+        let rig = test.rig(name, context.signals, true)?;
+        let harness = Harness::open(rig, test.candidate.stage)?;
         harness.feed(Pose::TOPIC, &start_of_trajectory())?;
         Ok(Self {
             harness,
@@ -126,27 +118,25 @@ impl<'a> Session<'a> {
         &self.test.demands
     }
 
-    /// Returns the topic that the process publishes.
     pub(crate) fn output_topic(&self) -> &'static str {
         self.harness.topics.output
     }
 
     /// Starts the process and waits until it has opened the topic that it publishes.
-    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, ProgramError> {
+    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, Failure> {
         self.spawn(command)?;
         let limit = self.demands().start_timeout;
         self.wait(limit, |session| session.harness.has_publisher())
     }
 
-    /// Starts the process.
-    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ProgramError> {
+    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), SuperviseError> {
         self.last = None;
         self.notified.clear();
         self.harness.start(command, &Scheduling::default())
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.
-    pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, ProgramError> {
+    pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, Failure> {
         let limit = self.demands().item_timeout;
         self.wait(limit, |session| session.newest >= Some(seq))
     }
@@ -157,7 +147,7 @@ impl<'a> Session<'a> {
         &mut self,
         limit: Duration,
         done: impl Fn(&Self) -> bool,
-    ) -> Result<Waited, ProgramError> {
+    ) -> Result<Waited, Failure> {
         self.progress = Instant::now();
         loop {
             self.exchange()?;
@@ -167,9 +157,11 @@ impl<'a> Session<'a> {
             }
             if let Some(death) = self.harness.death() {
                 self.receive()?;
-                return Ok(match done(self) {
-                    true => Waited::Done,
-                    false => Waited::Died(death),
+                let is_done = done(self);
+                return Ok(if is_done {
+                    Waited::Done
+                } else {
+                    Waited::Died(death)
                 });
             }
             if self.progress.elapsed() > limit {
@@ -181,35 +173,37 @@ impl<'a> Session<'a> {
 
     /// Waits for a time while the run continues around the process; returns whether the process is
     /// still alive.
-    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, ProgramError> {
+    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, Failure> {
         let since = Instant::now();
         let ended = self.wait(time, |_| since.elapsed() >= time)?;
         Ok(!matches!(ended, Waited::Died(_)))
     }
 
-    fn sleep(&self) -> Result<(), ProgramError> {
+    fn sleep(&self) -> Result<(), Failure> {
         match self.harness.sleep(POLL_PERIOD)? {
-            true => Err(ProgramError::Interrupted),
+            true => Err(Interrupted.into()),
             false => Ok(()),
         }
     }
 
     /// Answers handshakes and receives.
-    fn exchange(&mut self) -> Result<(), ProgramError> {
+    fn exchange(&mut self) -> Result<(), StageError> {
         self.notified.extend(self.harness.answer_handshakes()?);
         self.receive()
     }
 
     /// Receives the messages of the process, and examines them.
-    fn receive(&mut self) -> Result<(), ProgramError> {
+    fn receive(&mut self) -> Result<(), StageError> {
         while let Some(sent) = self.harness.receive()? {
             match sent {
                 Sent::Message(output) => {
                     self.findings.checked(Rule::SendsValid);
-                    self.examine(&output);
                     let item = output.item();
-                    self.outputs.push(output);
-                    if !item.is(flag::BASE) {
+                    if item.is(flag::BASE) {
+                        self.outputs.push(output);
+                    } else {
+                        self.examine(&item, output.received_ns);
+                        self.outputs.push(output);
                         self.answered(item.seq)?;
                     }
                 }
@@ -224,22 +218,63 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
+    /// Examines one item that the process has sent, alone and after the one before.
+    fn examine(&mut self, item: &Item, read_ns: i64) {
+        let seq = item.seq;
+        self.findings.checked(Rule::OneForOne);
+        if let Some(last) = self.last.filter(|last| seq != last + 1) {
+            let reason = match seq > last {
+                true => format!("{} is missing", last + 1),
+                false => "it is a duplicate or out of order".to_owned(),
+            };
+            let sentence = format!("it sent item {seq} after item {last}: {reason}");
+            self.findings.broken(Rule::OneForOne, sentence);
+        }
+        self.last = Some(seq);
+        self.examine_copy(item);
+        if !item.is(flag::END) {
+            // The poses of an earlier life are sent with its stamps.
+            let is_first = !self.has(seq);
+            let sent_ns = self.sent_ns.get(&seq).copied().filter(|_| is_first);
+            self.findings.checked(Rule::StampsWork);
+            if let Some(sentence) = wrong_stamps(self.stage(), item, sent_ns, read_ns) {
+                self.findings.broken(Rule::StampsWork, sentence);
+            }
+        }
+    }
+
+    fn examine_copy(&mut self, item: &Item) {
+        let (stage, seq) = (self.stage(), item.seq);
+        let Some(copied) = self.harness.topics.copied() else {
+            return;
+        };
+        let Some(input) = self.reference.get(copied, seq).map(Recorded::item) else {
+            let sentence = format!("it sent item {seq}, which no input has");
+            return self.findings.broken(Rule::OneForOne, sentence);
+        };
+        self.findings.checked(Rule::CopiesItem);
+        for field in not_copied(stage, &input, item) {
+            let sentence = format!("item {seq}: {field} is not that of the input on `{copied}`");
+            self.findings.broken(Rule::CopiesItem, sentence);
+        }
+    }
+
     /// Kills the process and removes its leftovers.
-    pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
+    pub(crate) fn kill(&mut self) -> Result<(), Failure> {
         self.harness.kill()?;
         self.receive()?;
         Ok(self.harness.rig.remove_dead()?)
     }
 
     /// Sends SIGTERM; returns how the process ended, `None` if it did not in time.
-    pub(crate) fn stop(&mut self) -> Result<Option<Death>, ProgramError> {
+    pub(crate) fn stop(&mut self) -> Result<Option<Death>, Failure> {
         self.harness.terminate();
         self.pace = Pace::Hold;
         self.ended_within(self.demands().stop_timeout)
     }
 
     /// Waits for the end of the process; `None` if it does not end in time.
-    pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, ProgramError> {
+    pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, Failure> {
         let since = Instant::now();
         loop {
             self.exchange()?;
@@ -256,10 +291,15 @@ impl<'a> Session<'a> {
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
     pub(crate) fn not_notified(&self) -> Vec<&'static str> {
-        let feeds = self.harness.feeds.iter();
-        let silent =
-            feeds.filter(|(topic, feed)| feed.subscribers() > 0 && !self.notified.contains(*topic));
-        silent.map(|(topic, _)| *topic).collect()
+        let subscribed = self
+            .harness
+            .feeds
+            .iter()
+            .filter(|(_, it)| it.subscribers() > 0);
+        let topics = subscribed.map(|(topic, _)| *topic);
+        topics
+            .filter(|topic| !self.notified.contains(topic))
+            .collect()
     }
 
     /// Returns whether the process has opened a topic.
@@ -272,16 +312,10 @@ impl<'a> Session<'a> {
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
         let feeds = &self.harness.feeds;
         let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
-        let inputs = self.harness.topics.leading(Direction::Forward);
+        let inputs = self.harness.topics.forward.iter().copied();
         inputs.filter(is_unread).collect()
     }
 
-    /// Returns the newest item that the process has sent.
-    pub(crate) fn newest(&self) -> Option<u64> {
-        self.newest
-    }
-
-    /// Returns its messages about an item, in all its lives.
     pub(crate) fn about(&self, seq: u64) -> impl Iterator<Item = &Recorded> {
         let items = self.outputs.iter();
         items.filter(move |it| it.item().seq == seq && !it.item().is(flag::BASE))
@@ -300,7 +334,7 @@ impl<'a> Session<'a> {
     }
 
     /// Returns the result bytes of the first message about each item.
-    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, ProgramError> {
+    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, StageError> {
         let mut results = BTreeMap::new();
         for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
             let bytes = result_bytes(self.output_topic(), output)?;
@@ -309,20 +343,19 @@ impl<'a> Session<'a> {
         Ok(results)
     }
 
-    /// Notes each output whose bytes differ from the first scenario.
+    /// Notes each output from a place on whose bytes differ from the first scenario.
     pub(crate) fn compare(
         &mut self,
-        first: &BTreeMap<u64, Vec<u8>>,
-        outputs: Range<usize>,
+        outputs: RangeFrom<usize>,
         rule: Rule,
         when: &str,
-    ) -> Result<(), ProgramError> {
+    ) -> Result<(), StageError> {
         self.findings.checked(rule);
         for output in &self.outputs[outputs] {
             let item = output.item();
             let bytes = result_bytes(self.harness.topics.output, output)?;
-            let differs = first.get(&item.seq).is_some_and(|first| *first != bytes);
-            if differs && !item.is(flag::BASE) {
+            let first = self.findings.first_results.get(&item.seq);
+            if first.is_some_and(|first| *first != bytes) && !item.is(flag::BASE) {
                 let sentence = format!("item {} has other bytes {when}", item.seq);
                 self.findings.broken(rule, sentence);
             }

@@ -4,9 +4,6 @@
 //! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it
 //! nor fails with it. The program gets the observed items one at a time. The only cost for the
 //! observed run is processor time.
-//!
-//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
-//! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
 
 mod life;
 mod observation;
@@ -18,10 +15,11 @@ mod shadowing;
 use std::{fs, path::PathBuf, time::Duration};
 
 use gyre_messages::{StageId, Window};
-use gyre_stage::{Manifest, observer::ObservedRun, wake::Signals};
+use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
 use gyre_supervise::Scheduling;
+use gyre_terminal::Failure;
 
-use crate::conformance::{Candidate, ProgramError};
+use crate::conformance::{Candidate, at};
 
 pub use record::Counts;
 pub use report::{Beside, Report, Verdict};
@@ -34,15 +32,12 @@ use shadowing::Shadowing;
 #[derive(Clone, Debug)]
 pub struct Options {
     pub stage: StageId,
-    /// The program and its arguments.
     pub command: Vec<String>,
     /// The program of the guardian, which ends the shadow if this process is killed.
     pub gyre: String,
-    /// The priority of the shadow.
     pub scheduling: Scheduling,
     /// Time for it to open its topics.
     pub start_timeout: Duration,
-    /// Time for an item.
     pub item_timeout: Duration,
     /// Items to compare; `None`: until the run ends.
     pub scans: Option<u64>,
@@ -68,22 +63,22 @@ pub fn shadow(
     run: &ObservedRun,
     options: &Options,
     observe: &mut dyn FnMut(&str),
-) -> Result<Report, ProgramError> {
+) -> Result<Report, Failure> {
     let signals = Signals::install()?;
     let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
     if let Some(folder) = &options.report {
         let created = gyre_storage::create_folder(folder);
-        created.map_err(|error| ProgramError::file(folder)(error.source))?;
+        created.map_err(|error| at(folder)(error.source))?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
-    let folder = folder.map_err(ProgramError::file(&std::env::temp_dir()))?;
+    let folder = folder.map_err(at(&std::env::temp_dir()))?;
     let program = ShadowProgram {
         candidate: candidate(run, options)?,
         folder: folder.path().to_owned(),
         output: in_report("shadow.txt"),
     };
     if let Some(path) = &program.output {
-        fs::write(path, "").map_err(ProgramError::file(path))?;
+        fs::write(path, "").map_err(at(path))?;
     }
     let topic = program.candidate.topics().output;
     let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
@@ -91,15 +86,16 @@ pub fn shadow(
     let record = shadowing.run(observe)?;
     let report = Report::of(options.stage.name(), &options.command, &record);
     if let Some(path) = in_report("shadow.json") {
-        let text = serde_json::to_string_pretty(&report)?;
-        fs::write(&path, text).map_err(ProgramError::file(&path))?;
+        let text = serde_json::to_string_pretty(&report);
+        let text = text.map_err(|error| format!("cannot write shadow.json: {error}"))?;
+        fs::write(&path, text).map_err(at(&path))?;
     }
     Ok(report)
 }
 
 /// Returns the program, in a run like the observed one but lossless: the scans that the run's
 /// masking has dropped are not sent at all.
-fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, ProgramError> {
+fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageError> {
     let manifest = run.manifest();
     let configuration = manifest.root.join("config.toml");
     Ok(Candidate {
@@ -116,7 +112,6 @@ fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, ProgramE
             },
             ..manifest.clone()
         },
-        configuration: fs::read_to_string(&configuration)
-            .map_err(ProgramError::file(&configuration))?,
+        configuration: fs::read_to_string(&configuration).map_err(at(&configuration))?,
     })
 }

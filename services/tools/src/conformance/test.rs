@@ -5,9 +5,9 @@ use std::{io, ops::Range, path::Path, time::Duration};
 use gyre_datasets::Dataset;
 use gyre_messages::StageId;
 use gyre_stage::wake::Signals;
-use gyre_supervise::rig::Rig;
+use gyre_supervise::{SuperviseError, rig::Rig};
 
-use crate::conformance::{Candidate, ProgramError};
+use crate::conformance::{Candidate, at};
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -16,20 +16,16 @@ pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
 pub struct Test {
     /// The program. Each of its runs writes to a folder below its manifest's `out`.
     pub candidate: Candidate,
-    /// The stages of a run with this configuration.
     pub stages: Vec<StageId>,
     /// Writes the other files of a run's root, as the list of a recording's files.
     pub prepare: Prepare,
-    /// The limits.
     pub demands: Demands,
 }
 
 /// Time limits of a program, and optional demands on it.
 #[derive(Clone, Debug)]
 pub struct Demands {
-    /// Time for its start.
     pub start_timeout: Duration,
-    /// Time for one item.
     pub item_timeout: Duration,
     /// Time for its exit after SIGTERM, and after an input that it has to refuse.
     pub stop_timeout: Duration,
@@ -55,11 +51,9 @@ impl Default for Demands {
     }
 }
 
-/// The scans that the inputs are computed from.
 pub struct InputScans {
     /// An open recording or simulation.
     pub dataset: Box<dyn Dataset>,
-    /// The scans to play.
     pub played: Range<usize>,
 }
 
@@ -70,11 +64,11 @@ impl Test {
         name: &str,
         signals: &'a Signals,
         has_services: bool,
-    ) -> Result<Rig<'a>, ProgramError> {
+    ) -> Result<Rig<'a>, SuperviseError> {
         let out = self.candidate.manifest.out.join(name);
         let rig = self.candidate.rig(out, signals, has_services)?;
         let root = &rig.manifest().root;
-        (self.prepare)(root).map_err(ProgramError::file(root))?;
+        (self.prepare)(root).map_err(at(root))?;
         Ok(rig)
     }
 }

@@ -1,89 +1,67 @@
 //! The topics of each stage.
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, TopicSizes};
+use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window};
 use gyre_stage::Manifest;
 
-/// The direction of a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Direction {
-    /// Down the stream: item `seq` is sent for the stage to answer with its item `seq`.
-    Forward,
-    /// Back to an earlier stage: item `seq` is sent after the stage has answered it.
-    Feedback,
-}
-
-/// The topics of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct StageTopics {
-    /// The topics that it may subscribe to. Of several that lead
-    /// forward, the last comes from farthest down the stream.
-    pub inputs: Vec<(&'static str, Direction)>,
-    /// The topic that it publishes.
+    /// The inputs that lead down the stream: item `seq` is sent for the stage to answer with its
+    /// item `seq`. The last one comes from farthest down the stream.
+    pub forward: Vec<&'static str>,
+    /// The inputs that lead back to an earlier stage: item `seq` is sent after the stage has
+    /// answered it.
+    pub feedback: Vec<&'static str>,
     pub output: &'static str,
-    /// The sizes of that topic's queues.
-    pub sizes: TopicSizes,
 }
 
 impl StageTopics {
-    /// The topics of a stage in a run with this manifest.
     pub(crate) fn of(stage: StageId, manifest: &Manifest) -> Self {
-        use Direction::{Feedback, Forward};
+        const SCAN: &str = Scan::TOPIC;
+        const MASKED: &str = Masked::TOPIC;
+        const MOTION: &str = Motion::TOPIC;
         let motions = match manifest.refines {
             true => Refined::TOPIC,
-            false => Motion::TOPIC,
+            false => MOTION,
         };
-        let (inputs, output) = match stage {
-            StageId::RadarReplay => (vec![(Pose::TOPIC, Feedback)], Scan::TOPIC),
-            StageId::Masking => (
-                vec![
-                    (Scan::TOPIC, Forward),
-                    (Motion::TOPIC, Feedback),
-                    (Pose::TOPIC, Feedback),
-                ],
-                Masked::TOPIC,
-            ),
-            StageId::RotationSearch => (vec![(Masked::TOPIC, Forward)], Rotation::TOPIC),
-            StageId::TranslationSearch => (
-                vec![(Masked::TOPIC, Forward), (Rotation::TOPIC, Forward)],
-                Motion::TOPIC,
-            ),
-            StageId::JointSearch => (vec![(Masked::TOPIC, Forward)], Motion::TOPIC),
-            StageId::Refinement => (
-                vec![(Masked::TOPIC, Forward), (Motion::TOPIC, Forward)],
-                Refined::TOPIC,
-            ),
-            StageId::PoseIntegration if manifest.window.slam => (
-                vec![(Masked::TOPIC, Forward), (motions, Forward)],
-                Pose::TOPIC,
-            ),
-            StageId::PoseIntegration => (vec![(motions, Forward)], Pose::TOPIC),
+        let mut feedback = Vec::new();
+        let (forward, output) = match stage {
+            StageId::RadarReplay => {
+                feedback = vec![Pose::TOPIC];
+                (vec![], SCAN)
+            }
+            StageId::Masking => {
+                feedback = vec![MOTION, Pose::TOPIC];
+                (vec![SCAN], MASKED)
+            }
+            StageId::RotationSearch => (vec![MASKED], Rotation::TOPIC),
+            StageId::TranslationSearch => (vec![MASKED, Rotation::TOPIC], MOTION),
+            StageId::JointSearch => (vec![MASKED], MOTION),
+            StageId::Refinement => (vec![MASKED, MOTION], Refined::TOPIC),
+            StageId::PoseIntegration if manifest.window.slam => {
+                (vec![MASKED, motions], Pose::TOPIC)
+            }
+            StageId::PoseIntegration => (vec![motions], Pose::TOPIC),
         };
-        let topics = gyre_messages::topics(&manifest.window);
-        let sizes = topics.into_iter().find(|topic| topic.name == output);
         Self {
-            sizes: sizes.map_or_else(
-                || Pose::sizes(&manifest.window),
-                |topic| (topic.sizes)(&manifest.window),
-            ),
-            inputs,
+            forward,
+            feedback,
             output,
         }
     }
 
-    /// Returns the inputs that lead in this direction.
-    pub(crate) fn leading(
-        &self,
-        direction: Direction,
-    ) -> impl Iterator<Item = &'static str> + use<> {
-        let inputs = self.inputs.clone();
-        inputs
-            .into_iter()
-            .filter(move |(_, its)| *its == direction)
-            .map(|(topic, _)| topic)
+    /// Returns all topics that it may subscribe to.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &'static str> {
+        self.forward.iter().chain(&self.feedback).copied()
     }
 
     /// Returns the topic whose items the stage copies; `None` for a source.
     pub(crate) fn copied(&self) -> Option<&'static str> {
-        self.leading(Direction::Forward).last()
+        self.forward.last().copied()
+    }
+
+    /// Returns the number of messages that the stage keeps for late readers.
+    pub(crate) fn history(&self, window: &Window) -> usize {
+        let sizes = gyre_messages::topic(self.output).map(|topic| (topic.sizes)(window));
+        sizes.unwrap_or_else(|| Pose::sizes(window)).history
     }
 }

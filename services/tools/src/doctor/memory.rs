@@ -3,17 +3,11 @@
 use std::path::Path;
 
 use gyre_messages::Footprint;
-use gyre_stage::{
-    run::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory},
-    wake::Signals,
-};
+use gyre_stage::run::{SHARED_MEMORY, free_shared_memory};
 use gyre_supervise::memory::Room;
-use rustix::{
-    fs::{Access, access, statfs, statvfs},
-    process::getpid,
-};
+use rustix::fs::{Access, access, statfs, statvfs};
 
-use crate::doctor::finding::Finding;
+use crate::doctor::Finding;
 
 /// The `f_type` of a tmpfs.
 const TMPFS: i128 = 0x0102_1994;
@@ -72,55 +66,30 @@ pub fn shared_memory(footprint: &Footprint) -> Finding {
     }
 }
 
-/// Makes the root of a run and removes it again.
-pub fn place_in_shared_memory() -> Finding {
-    let subject = "its directory";
-    // A name that no results folder has.
-    let name = format!("doctor {}", getpid().as_raw_nonzero());
-    let made = Signals::install()
-        .map_err(RootError::Signals)
-        .and_then(|signals| RunRoot::acquire(Path::new(&name), &signals));
-    match made {
-        Ok(root) => {
-            let parent = root.path().parent().unwrap_or(root.path());
-            Finding::good(
-                subject,
-                format!("{}: a run can be made there", parent.display()),
-            )
-        }
-        Err(error) => Finding::good(subject, "no run can be made").bad(error.to_string()),
-    }
-}
-
 pub fn results(out: &Path) -> Finding {
     // The first folder that exists: a run makes the others.
     let absolute = std::path::absolute(out).unwrap_or_else(|_| out.to_owned());
     let there = absolute.ancestors().find(|path| path.exists());
     let there = there.unwrap_or(Path::new("/"));
     let elsewhere = "name another folder with --out";
+    let folder = there.display();
+    let finding = |found: String| Finding::good("results", found);
     let disk = match statvfs(there) {
         Ok(disk) => disk,
-        Err(error) => {
-            let found = format!("{}: {error}", there.display());
-            return Finding::good("results", found).bad(elsewhere);
-        }
+        Err(error) => return finding(format!("{folder}: {error}")).bad(elsewhere),
     };
     if !there.is_dir() || access(there, Access::WRITE_OK).is_err() {
-        let found = format!("{}: cannot be written to", there.display());
-        return Finding::good("results", found).bad(elsewhere);
+        return finding(format!("{folder}: cannot be written to")).bad(elsewhere);
     }
     let free = disk.f_bavail * disk.f_frsize;
     let scans = free.saturating_sub(RESULTS) / RESULTS_PER_SCAN;
-    let found = format!(
-        "{}: {} free, room for {scans} scans",
-        there.display(),
+    let found = finding(format!(
+        "{folder}: {} free, room for {scans} scans",
         size(free)
-    );
+    ));
     match free < RESULTS {
-        true => {
-            Finding::good("results", found).bad(format!("free {} or {elsewhere}", size(RESULTS)))
-        }
-        false => Finding::good("results", found),
+        true => found.bad(format!("free {} or {elsewhere}", size(RESULTS))),
+        false => found,
     }
 }
 

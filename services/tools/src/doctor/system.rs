@@ -8,7 +8,7 @@ use gyre_run::MOST_OPEN_FILES;
 use gyre_stage::python_function::Interpreter;
 use rustix::process::{Resource, getrlimit};
 
-use crate::doctor::finding::Finding;
+use crate::doctor::Finding;
 
 /// Files that a publisher opens for each observer: its queue, its event and its socket.
 const FILES_PER_OBSERVER: u64 = 3;
@@ -28,11 +28,8 @@ const GOVERNORS: &str = "/sys/devices/system/cpu/cpufreq";
 pub fn kernel() -> Finding {
     let system = rustix::system::uname();
     let text = |part: &std::ffi::CStr| part.to_string_lossy().into_owned();
-    let (name, release) = (text(system.sysname()), text(system.release()));
-    Finding::good(
-        "kernel",
-        format!("{name} {release}, {}", text(system.machine())),
-    )
+    let [name, release, machine] = [system.sysname(), system.release(), system.machine()].map(text);
+    Finding::good("kernel", format!("{name} {release}, {machine}"))
 }
 
 pub fn processors() -> Finding {
@@ -79,10 +76,10 @@ pub fn governor() -> Finding {
         .filter_map(|policy| fs::read_to_string(policy.path().join("scaling_governor")).ok())
         .map(|governor| governor.trim().to_owned())
         .collect();
-    let names = governors.iter().cloned().collect::<Vec<_>>().join(", ");
-    match (governors.len(), names.as_str()) {
-        (0, _) => Finding::good("cpu governor", "not visible, as on most virtual machines"),
-        (_, "performance") => Finding::good("cpu governor", names),
+    let names = governors.into_iter().collect::<Vec<_>>().join(", ");
+    match names.as_str() {
+        "" => Finding::good("cpu governor", "not visible, as on most virtual machines"),
+        "performance" => Finding::good("cpu governor", names),
         _ => Finding::good("cpu governor", names)
             .limited("latencies vary with the clock rate: `cpupower frequency-set -g performance`"),
     }
@@ -91,12 +88,11 @@ pub fn governor() -> Finding {
 pub fn clock() -> Finding {
     let source = fs::read_to_string(CLOCK).unwrap_or_default();
     let source = source.trim();
+    let found = Finding::good("clock", format!("monotonic, from {source}"));
     match source {
         "" => Finding::good("clock", "monotonic; its source is not visible"),
-        fast if FAST_CLOCKS.contains(&fast) => {
-            Finding::good("clock", format!("monotonic, from {fast}"))
-        }
-        slow => Finding::good("clock", format!("monotonic, from {slow}")).limited(
+        fast if FAST_CLOCKS.contains(&fast) => found,
+        _ => found.limited(
             "each reading takes about a microsecond, and a scan has some sixty: boot with clocksource=tsc if the \
              processor allows it",
         ),
@@ -119,14 +115,15 @@ pub fn open_files(observers: usize) -> Finding {
 }
 
 pub fn processes() -> Finding {
-    match getrlimit(Resource::Nproc).current {
-        Some(limit) if limit < PROCESSES => {
-            Finding::good("processes", format!("at most {limit} of this user")).bad(format!(
-                "a run needs up to {PROCESSES} with their threads: `ulimit -u 1024`"
-            ))
-        }
-        Some(limit) => Finding::good("processes", format!("at most {limit} of this user")),
-        None => Finding::good("processes", "no limit"),
+    let Some(limit) = getrlimit(Resource::Nproc).current else {
+        return Finding::good("processes", "no limit");
+    };
+    let found = Finding::good("processes", format!("at most {limit} of this user"));
+    match limit < PROCESSES {
+        true => found.bad(format!(
+            "a run needs up to {PROCESSES} with their threads: `ulimit -u 1024`"
+        )),
+        false => found,
     }
 }
 
@@ -145,20 +142,19 @@ pub fn onnx_runtime() -> Finding {
         runtime::open(&path)?;
         Ok(path)
     });
-    match opened {
-        Ok(path) => Finding::good("ONNX Runtime", path.display().to_string()),
-        Err(error) => {
-            let found = match error {
-                RuntimeError::Missing => {
-                    "none: rten computes learned masks and moving objects, which takes longer"
-                }
-                _ => {
-                    "cannot be used: no learned masks and moving objects, unless masking.backend is `rten`"
-                }
-            };
-            Finding::good("ONNX Runtime", found).limited(error.to_string())
+    let error = match opened {
+        Ok(path) => return Finding::good("ONNX Runtime", path.display().to_string()),
+        Err(error) => error,
+    };
+    let found = match error {
+        RuntimeError::Missing => {
+            "none: rten computes learned masks and moving objects, which takes longer"
         }
-    }
+        _ => {
+            "cannot be used: no learned masks and moving objects, unless masking.backend is `rten`"
+        }
+    };
+    Finding::good("ONNX Runtime", found).limited(error.to_string())
 }
 
 /// The interpreter of stages that are functions of Python.
@@ -170,13 +166,9 @@ pub fn python() -> Finding {
             return Finding::good("Python", format!("none: {without}")).limited(error.to_string());
         }
     };
-    let Interpreter {
-        executable,
-        version: [major, minor, micro],
-        numpy,
-    } = found;
+    let ([major, minor, micro], executable) = (found.version, &found.executable);
     let python = format!("{executable}, {major}.{minor}.{micro}");
-    match numpy {
+    match found.numpy {
         Some(numpy) => Finding::good("Python", format!("{python}, with numpy {numpy}")),
         None => {
             Finding::good("Python", format!("{python}, without numpy: {without}")).limited(format!(

@@ -24,7 +24,6 @@ use crate::export::source::{Lost, Source};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
-/// The file with the options of a recording.
 const OPTIONS: &str = "dataset.toml";
 /// The ends of the names of lists that lie beside the images.
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
@@ -64,7 +63,6 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     writer.counts.describe(out)
 }
 
-/// Opens the recording of a run.
 fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure> {
     let data = configuration.data();
     if configuration.streamed().is_some() {
@@ -122,25 +120,19 @@ impl Writer {
         }
         self.counts.repaired += 1;
         self.counts.azimuths += lost;
-        let places = self.places(index, lost)?;
-        write_file(&to, self.image(&places)?)?;
-        Ok(())
-    }
-
-    /// Returns where the azimuths of a scan were lost: anywhere, if live mode has dropped it.
-    fn places(&mut self, index: usize, lost: usize) -> Result<LostAzimuths, Failure> {
-        match self.found.get(&(index as u64)) {
+        let places = match self.found.get(&(index as u64)) {
+            // Anywhere, if live mode has dropped it.
             None => {
                 self.counts.anywhere += 1;
-                let azimuths = self.scan.geometry.azimuths;
-                Ok(LostAzimuths::anywhere(lost, azimuths))
+                LostAzimuths::anywhere(lost, self.scan.geometry.azimuths)
             }
-            Some(found) if found.count() == lost => Ok(*found),
+            Some(found) if found.count() == lost => *found,
             Some(found) => {
-                let (file, found) = (self.dataset.file(index).display(), found.count());
-                Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into())
+                let (file, found) = (from.display(), found.count());
+                return Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into());
             }
-        }
+        };
+        Ok(write_file(&to, self.image(&places)?)?)
     }
 
     /// Returns the repaired scan as a file, laid out as the one that it is from.
@@ -205,17 +197,15 @@ struct Counts {
 
 impl Counts {
     fn describe(&self, out: &Path) -> Result<(), Failure> {
-        if self.anywhere > 0 {
-            let scans = self.anywhere;
+        let (out, scans, anywhere) = (out.display(), self.scans, self.anywhere);
+        let (repaired, azimuths) = (self.repaired, self.azimuths);
+        if anywhere > 0 {
             print::note(format_args!(
-                "{scans} scans have lost azimuths but no pose, so that it is not known where: their azimuths are stretched over the whole turn"
+                "{anywhere} scans have lost azimuths but no pose, so that it is not known where: their azimuths are stretched over the whole turn"
             ));
         }
-        let (out, scans) = (out.display(), self.scans);
-        let (repaired, azimuths) = (self.repaired, self.azimuths);
         print::line(format_args!(
             "{out}: {scans} scans, {repaired} of them repaired, which had lost {azimuths} azimuths"
-        ))?;
-        Ok(())
+        ))
     }
 }

@@ -22,13 +22,8 @@ const CONFIGURATION: &str = "/radar_data/configuration_data";
 const AZIMUTHS: &str = "/radar_data/fft_data";
 const B_SCANS: &str = "/radar_data/b_scan_msg";
 
-/// Writes the scans of a source.
 pub struct ScanWriter {
-    open: Option<Open>,
     losses: Losses,
-}
-
-struct Open {
     scans: Scans,
     scan: OwnedScan,
     lost: Lost,
@@ -61,7 +56,6 @@ struct Losses {
 }
 
 impl Losses {
-    /// Takes a scan as it is written.
     fn add(&mut self, scan: &PolarScan<'_>) {
         let is_measured = |flags: u8| flags & flag::MEASURED != 0;
         let chirps = flag::CHIRP_KNOWN | flag::CHIRP_UP;
@@ -72,17 +66,16 @@ impl Losses {
         let rows = rows.filter(|row| scan.row(*row).iter().any(|power| *power > 0));
         self.interpolated += rows.count() as u64;
         let written = scan.stamp_ns.iter().zip(scan.flags);
-        let written = written.filter(|(_, flags)| is_measured(**flags));
-        let mut written = written.map(|(stamp_ns, _)| *stamp_ns);
-        if let Some(first_ns) = written.next() {
-            let read_ns = middle_ns(first_ns, written.next_back().unwrap_or(first_ns));
+        let mut written = written.filter(|(_, flags)| is_measured(**flags));
+        if let Some((first_ns, _)) = written.next() {
+            let last_ns = written.next_back().map_or(first_ns, |(last_ns, _)| last_ns);
+            let read_ns = middle_ns(*first_ns, *last_ns);
             let by_ns = read_ns.abs_diff(scan.geometry.stamp_ns);
             self.retimed += u64::from(by_ns > 0);
             self.retimed_by_ns = self.retimed_by_ns.max(by_ns);
         }
     }
 
-    /// Takes the constants that are not zero.
     fn add_constants(&mut self, scan: &SweepGeometry, eccentricity_rad: f32) {
         self.constants = vec![
             ("range_offset_m", scan.range_offset_m),
@@ -90,107 +83,6 @@ impl Losses {
             ("azimuth_eccentricity_rad", eccentricity_rad),
         ];
         self.constants.retain(|(_, value)| *value != 0.0);
-    }
-
-    /// Returns the losses as whole sentences.
-    fn sentences(&self) -> Vec<String> {
-        let mut sentences = Vec::new();
-        if self.unreadable > 0 {
-            let unreadable = self.unreadable;
-            sentences.push(format!(
-                "{unreadable} scans cannot be read, and are not in the bag"
-            ));
-        }
-        if self.without_encoder {
-            sentences.push(
-                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
-                    .to_owned(),
-            );
-        }
-        if self.chirps {
-            sentences.push("Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned());
-        }
-        if self.interpolated > 0 {
-            let rows = self.interpolated;
-            sentences.push(format!(
-                "interpolated rows: {rows}. Navtech's messages cannot carry them; a run on the bag finds them missing"
-            ));
-        }
-        if self.placed > 0 {
-            let scans = self.placed;
-            sentences.push(format!(
-                "{scans} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans"
-            ));
-        }
-        if self.not_placed > 0 {
-            let scans = self.not_placed;
-            sentences.push(format!(
-                "{scans} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
-            ));
-        }
-        if self.retimed > 0 {
-            let (scans, ms) = (self.retimed, self.retimed_by_ns as f64 * 1e-6);
-            sentences.push(format!(
-                "{scans} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
-            ));
-        }
-        if !self.constants.is_empty() {
-            let constants = self.constants.iter();
-            let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
-            sentences.push(format!(
-                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{}",
-                settings.collect::<String>()
-            ));
-        }
-        sentences
-    }
-}
-
-impl ScanWriter {
-    /// Adds the topics of scans, if they are wanted and there are any.
-    pub fn begin(
-        bag: &mut BagWriter,
-        source: &mut Source,
-        forms: &[ScanForm],
-        frame: &str,
-    ) -> Result<Self, Failure> {
-        let mut writer = Self {
-            open: None,
-            losses: Losses::default(),
-        };
-        let is_wanted = |form| forms.contains(&form);
-        if is_wanted(ScanForm::None) {
-            return Ok(writer);
-        }
-        let Some(mut scans) = source.scans()? else {
-            print::note("the run was of a radar, and has no scans: --record keeps them");
-            return Ok(writer);
-        };
-        let Some(scan) = first(&mut scans)? else {
-            return Ok(writer);
-        };
-        let radar = writer.radar(&scans, &scan)?;
-        writer
-            .losses
-            .add_constants(&scan.geometry, scans.eccentricity_rad);
-        writer.open = Some(Open {
-            messages: ScanMessages::new(radar, frame),
-            configuration: bag.topic(CONFIGURATION, Kept::ForLater)?,
-            azimuths: match is_wanted(ScanForm::Fft) {
-                true => Some(bag.topic(AZIMUTHS, Kept::ForNobody)?),
-                false => None,
-            },
-            b_scans: match is_wanted(ScanForm::BScan) {
-                true => Some(bag.topic(B_SCANS, Kept::ForNobody)?),
-                false => None,
-            },
-            lost: source.lost()?,
-            rows: PlacedRows::default(),
-            scan,
-            scans,
-            is_described: false,
-        });
-        Ok(writer)
     }
 
     /// Returns the radar's description of itself in these scans.
@@ -206,7 +98,7 @@ impl ScanWriter {
             })
         };
         let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
-        self.losses.without_encoder = !encoder.is_exact;
+        self.without_encoder = !encoder.is_exact;
         let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
         Ok(Radar {
             azimuth_samples: small(azimuths)?,
@@ -221,14 +113,74 @@ impl ScanWriter {
         })
     }
 
-    /// Writes the next scan that can be read, and returns its time; `None` at the end.
-    pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
-        let Some(open) = &mut self.open else {
+    fn sentences(&self) -> Vec<String> {
+        let (unreadable, interpolated) = (self.unreadable, self.interpolated);
+        let (placed, not_placed, retimed) = (self.placed, self.not_placed, self.retimed);
+        let ms = self.retimed_by_ns as f64 * 1e-6;
+        let constants = self.constants.iter();
+        let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
+        let settings: String = settings.collect();
+        let sentences = [
+            (unreadable > 0, format!("{unreadable} scans cannot be read, and are not in the bag")),
+            (self.without_encoder, "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn".to_owned()),
+            (self.chirps, "Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned()),
+            (interpolated > 0, format!("interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing")),
+            (placed > 0, format!("{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans")),
+            (not_placed > 0, format!("{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right")),
+            (retimed > 0, format!("{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away")),
+            (!settings.is_empty(), format!("Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}")),
+        ];
+        let lost = sentences.into_iter().filter(|(is_lost, _)| *is_lost);
+        lost.map(|(_, sentence)| sentence).collect()
+    }
+}
+
+impl ScanWriter {
+    /// Adds the topics of scans, if they are wanted and there are any.
+    pub fn begin(
+        bag: &mut BagWriter,
+        source: &mut Source,
+        forms: &[ScanForm],
+        frame: &str,
+    ) -> Result<Option<Self>, Failure> {
+        if forms.contains(&ScanForm::None) {
+            return Ok(None);
+        }
+        let Some(mut scans) = source.scans()? else {
+            print::note("the run was of a radar, and has no scans: --record keeps them");
             return Ok(None);
         };
-        while let Some(index) = open.scans.played.next() {
-            match open.scans.read(index, &mut open.scan) {
-                Ok(()) => return open.write(index, bag, &mut self.losses).map(Some),
+        let Some(scan) = first(&mut scans)? else {
+            return Ok(None);
+        };
+        let mut losses = Losses::default();
+        let radar = losses.radar(&scans, &scan)?;
+        losses.add_constants(&scan.geometry, scans.eccentricity_rad);
+        let configuration = bag.topic(CONFIGURATION, Kept::ForLater)?;
+        let fft = forms.contains(&ScanForm::Fft);
+        let azimuths = fft.then(|| bag.topic(AZIMUTHS, Kept::ForNobody));
+        let azimuths = azimuths.transpose()?;
+        let b_scans = forms.contains(&ScanForm::BScan);
+        let b_scans = b_scans.then(|| bag.topic(B_SCANS, Kept::ForNobody));
+        Ok(Some(Self {
+            losses,
+            messages: ScanMessages::new(radar, frame),
+            configuration,
+            azimuths,
+            b_scans: b_scans.transpose()?,
+            lost: source.lost()?,
+            rows: PlacedRows::default(),
+            scan,
+            scans,
+            is_described: false,
+        }))
+    }
+
+    /// Writes the next scan that can be read, and returns its time; `None` at the end.
+    pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
+        while let Some(index) = self.scans.played.next() {
+            match self.scans.read(index, &mut self.scan) {
+                Ok(()) => return self.write(index, bag).map(Some),
                 Err(error @ ReadError::Io { .. }) => return Err(error.into()),
                 Err(error) => {
                     print::note(format_args!("scan {index} is left out: {error}"));
@@ -243,23 +195,16 @@ impl ScanWriter {
     pub fn describe_losses(&self) {
         self.losses.sentences().iter().for_each(print::note);
     }
-}
 
-impl Open {
-    fn write(
-        &mut self,
-        index: usize,
-        bag: &mut BagWriter,
-        losses: &mut Losses,
-    ) -> Result<i64, Failure> {
+    fn write(&mut self, index: usize, bag: &mut BagWriter) -> Result<i64, Failure> {
         let mut scan = self.scan.view();
         if let Some(lost) = self.lost.get(&(index as u64))
             && lost.count() > 0
         {
             scan = self.rows.place(&scan, lost);
-            losses.placed += u64::from(stale_rows(&scan) == 0);
+            self.losses.placed += u64::from(stale_rows(&scan) == 0);
         }
-        losses.add(&scan);
+        self.losses.add(&scan);
         let stamps = &scan.stamp_ns[..scan.geometry.azimuths];
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
             return Ok(scan.geometry.stamp_ns);
@@ -300,7 +245,6 @@ impl Scans {
     }
 }
 
-/// Returns the first scan that can be read, if there is one.
 fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
     let mut scan = OwnedScan::with_limits(scans.dataset.limits());
     for index in scans.played.clone() {
@@ -372,15 +316,12 @@ mod tests {
         only(&early, 0.0, "up to 0.500 ms away");
         let mut far = scan();
         (far.geometry.range_offset_m, far.geometry.doppler_s) = (-0.31, 0.04);
-        only(
-            &far,
-            0.0,
-            "with --set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04",
-        );
+        let constants = "--set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04";
+        only(&far, 0.0, constants);
         only(
             &whole,
             0.0025,
-            "with --set dataset.azimuth_eccentricity_rad=0.0025",
+            "--set dataset.azimuth_eccentricity_rad=0.0025",
         );
         let mut rising = scan();
         rising.flags[0] |= flag::CHIRP_KNOWN;

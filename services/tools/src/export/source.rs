@@ -6,32 +6,32 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::maps::map;
 use gyre_configuration::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, UncertainMotion};
 use gyre_journal::{
     self as journal,
     objects::{LoggedObjects, listed},
 };
 use gyre_mapping::grid;
 use gyre_messages::{
-    Correction, CorrectionHeader, Message, Objects, ObjectsHeader, Pose as PoseTopic, PoseHeader,
-    flag,
+    Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
+    PoseHeader, flag, outcome,
 };
 use gyre_radar::{LostAzimuths, Trajectory};
-use gyre_recording::Recording;
-use gyre_recording::bags::{BagWriter, Kept};
+use gyre_recording::{
+    Recording,
+    bags::{BagWriter, Kept},
+};
 use gyre_ros2_messages::{
     Mounting,
-    frames::{Frames, occupancy_grid},
+    frames::{Frames, Interval, occupancy_grid},
 };
 use gyre_slam::RecordReader;
 use gyre_terminal::{Failure, print};
 
-use crate::export::places::Place;
+use crate::maps::map;
 
-/// The source of an export.
 pub struct Source {
     path: PathBuf,
     kind: Kind,
@@ -40,9 +40,51 @@ pub struct Source {
 enum Kind {
     /// The folder of a run's results.
     Run(Box<Configuration>),
-    /// A recording of a run.
     Recording,
     Dataset,
+}
+
+/// A pose of the radar with what led to it.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The number of the scan in the run.
+    pub seq: u64,
+    /// Time of the scan, ns since 1970.
+    pub stamp_ns: i64,
+    /// The pose in the frame of the first scan.
+    pub pose: UncertainMotion,
+    /// The motion from the previous scan; `None` where the chain of motions begins.
+    pub since: Option<Interval>,
+    /// The pose of the odometry frame in the map frame, with SLAM.
+    pub map_from_odometry: Option<Pose>,
+    /// The objects, of a run that tracks them; `None` where they are not known.
+    pub objects: Option<Vec<ListedObject>>,
+}
+
+impl Place {
+    /// Returns the place of a pose of a run; `None` for the end of the stream.
+    pub fn of(pose: &PoseHeader) -> Option<Self> {
+        if pose.item.is(flag::END) {
+            return None;
+        }
+        let motion = pose.motion.motion();
+        let since = Interval {
+            motion: UncertainMotion {
+                motion: motion.motion,
+                covariance: motion.covariance,
+            },
+            duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
+        };
+        Some(Self {
+            seq: pose.item.seq,
+            stamp_ns: pose.item.stamp_ns,
+            pose: pose.pose(),
+            since: (!pose.item.is(flag::BREAK)).then_some(since),
+            map_from_odometry: None,
+            objects: None,
+        })
+    }
 }
 
 /// The poses of a run, in order.
@@ -51,11 +93,9 @@ pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
 /// Where azimuths of scans were lost, by the number of the scan in its recording.
 pub type Lost = BTreeMap<u64, LostAzimuths>;
 
-/// The scans of a source.
 pub struct Scans {
     pub dataset: Box<dyn Dataset>,
     pub played: std::ops::Range<usize>,
-    /// The eccentricity of the encoder, rad.
     pub eccentricity_rad: f32,
     /// True if the angles are corrected by it.
     pub is_corrected: bool,
@@ -64,7 +104,6 @@ pub struct Scans {
 }
 
 impl Source {
-    /// Determines the kind of a path.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         let kind = match path {
             path if gyre_recording::is_recording(path) => Kind::Recording,
@@ -98,13 +137,23 @@ impl Source {
                 let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
                 let records = journal::records(&journal::path(&self.path))?;
                 let poses = records.into_iter().flatten();
-                Ok(Box::new(poses.filter_map(move |pose| match pose {
-                    Ok(pose) => {
-                        let place = corrected_by(Place::of(&pose)?, corrected.as_ref());
-                        Some(with_objects(place, &mut tracked))
+                let mut place = move |pose: &PoseHeader| -> Result<Option<Place>, Failure> {
+                    let Some(mut place) = Place::of(pose) else {
+                        return Ok(None);
+                    };
+                    let near = |it: &Trajectory| it.near(place.stamp_ns, Trajectory::ROUNDING_NS);
+                    let in_map: Option<Pose> = corrected.as_ref().and_then(near);
+                    let inverse = place.pose.motion.inverse();
+                    place.map_from_odometry = in_map.map(|pose| pose * inverse);
+                    let seq = place.seq as usize;
+                    if seq < tracked.len() {
+                        let objects = tracked.read(seq)?.objects;
+                        place.objects = Some(objects.iter().map(listed).collect());
                     }
-                    Err(error) => Some(Err(error.into())),
-                })))
+                    Ok(Some(place))
+                };
+                let places = poses.map(move |pose| place(&pose?));
+                Ok(Box::new(places.filter_map(Result::transpose)))
             }
             Kind::Recording => recorded(gyre_recording::open_recording(&self.path)?),
             Kind::Dataset => Ok(Box::new(iter::empty())),
@@ -128,44 +177,43 @@ impl Source {
 
     /// Returns the scans; `None` of a run of a radar, which leaves none.
     pub fn scans(&self) -> Result<Option<Scans>, Failure> {
-        match &self.kind {
-            Kind::Run(configuration) if configuration.is_radar() => Ok(None),
-            Kind::Run(configuration) => {
-                let mut configuration = configuration.clone();
-                // The angles of an encoder are written as it counts them: who reads them corrects
-                // its eccentricity.
-                let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
-                configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
-                let dataset = gyre_configuration::open(&configuration)?.dataset;
-                let played = configuration.source.played(dataset.scans());
-                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
+        if let Kind::Run(configuration) = &self.kind {
+            if configuration.is_radar() {
+                return Ok(None);
             }
-            Kind::Recording => {
-                let options = gyre_recording::stored_options(&self.path)?;
-                let dataset = gyre_recording::open(&self.path, &DatasetOptions::default())?;
-                Ok(Some(Scans {
-                    played: dataset.first()..dataset.len(),
-                    dataset,
-                    eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
-                    is_corrected: true,
-                    encoder_counts: options.encoder_counts,
-                }))
-            }
-            Kind::Dataset => {
-                let eccentricity =
-                    gyre_recording::stored_options(&self.path)?.azimuth_eccentricity_rad;
-                let options = DatasetOptions {
-                    azimuth_eccentricity_rad: Some(0.0),
-                    ..DatasetOptions::default()
-                };
-                let dataset = gyre_recording::open(&self.path, &options)?;
-                let played = dataset.first()..dataset.len();
-                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
-            }
+            let mut configuration = configuration.clone();
+            // The angles of an encoder are written as it counts them: who reads them corrects its
+            // eccentricity.
+            let eccentricity = &mut configuration.dataset.azimuth_eccentricity_rad;
+            let eccentricity_rad = eccentricity.replace(0.0).unwrap_or_default();
+            let dataset = gyre_configuration::open(&configuration)?.dataset;
+            return Ok(Some(Scans {
+                played: configuration.source.played(dataset.scans()),
+                encoder_counts: dataset.encoder_counts(),
+                dataset,
+                eccentricity_rad,
+                is_corrected: false,
+            }));
         }
+        let is_corrected = matches!(self.kind, Kind::Recording);
+        let stored = gyre_recording::stored_options(&self.path)?;
+        let options = DatasetOptions {
+            azimuth_eccentricity_rad: (!is_corrected).then_some(0.0),
+            ..DatasetOptions::default()
+        };
+        let dataset = gyre_recording::open(&self.path, &options)?;
+        Ok(Some(Scans {
+            played: dataset.first()..dataset.len(),
+            encoder_counts: match is_corrected {
+                true => stored.encoder_counts,
+                false => dataset.encoder_counts(),
+            },
+            dataset,
+            eccentricity_rad: stored.azimuth_eccentricity_rad.unwrap_or_default(),
+            is_corrected,
+        }))
     }
 
-    /// Writes the map of a run that has keyframes.
     pub fn write_map(
         &self,
         bag: &mut BagWriter,
@@ -189,58 +237,13 @@ impl Source {
             }
         };
         let grid = grid(&mut evidence)?;
-        let size = [grid.columns, grid.rows];
-        let grid = occupancy_grid(
-            stamp_ns,
-            &frames.map,
-            grid.cell_m,
-            size,
-            grid.corner_m,
-            grid.values,
-        );
+        let (size, corner_m) = ([grid.columns, grid.rows], grid.corner_m);
+        let (frame, cell_m) = (&frames.map, grid.cell_m);
+        let grid = occupancy_grid(stamp_ns, frame, cell_m, size, corner_m, grid.values);
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())
     }
-}
-
-impl Scans {
-    fn uncorrected(
-        dataset: Box<dyn Dataset>,
-        played: std::ops::Range<usize>,
-        eccentricity_rad: Option<f32>,
-    ) -> Self {
-        Self {
-            encoder_counts: dataset.encoder_counts(),
-            dataset,
-            played,
-            eccentricity_rad: eccentricity_rad.unwrap_or_default(),
-            is_corrected: false,
-        }
-    }
-}
-
-/// Adds the pose of the odometry frame in the map frame, if the corrected trajectory has the pose.
-fn corrected_by(place: Place, corrected: Option<&Trajectory>) -> Place {
-    let near = |poses: &Trajectory| poses.near(place.stamp_ns, Trajectory::ROUNDING_NS);
-    let in_map: Option<Pose> = corrected.and_then(near);
-    Place {
-        map_from_odometry: in_map.map(|pose| pose * place.pose.motion.inverse()),
-        ..place
-    }
-}
-
-/// Adds the objects, if the log has them.
-fn with_objects(place: Place, tracked: &mut RecordReader<LoggedObjects>) -> Result<Place, Failure> {
-    let seq = place.seq as usize;
-    if seq >= tracked.len() {
-        return Ok(place);
-    }
-    let objects = tracked.read(seq)?.objects;
-    Ok(Place {
-        objects: Some(objects.iter().map(listed).collect()),
-        ..place
-    })
 }
 
 /// Returns the poses of a recording, each with its objects, and the correction that was known then.

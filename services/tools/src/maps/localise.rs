@@ -1,16 +1,11 @@
 //! `gyre localise`: finds a drive in a map.
-//!
-//! - `scans`: registers scan after scan by odometry in this process;
-//! - `known`: opens the map;
-//! - `fixes`: `fixes.csv`;
-//! - `counts`: found, lost and skipped scans.
 
 mod counts;
-pub mod fixes;
 mod scans;
 pub mod searched_map;
 
 use std::{
+    fmt::Write,
     io::IsTerminal,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -20,14 +15,13 @@ use std::{
 use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_datasets::write_tum;
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, covariance, xy_yaw};
 use gyre_mapping::{Map, Overlay, map_png};
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out};
-use gyre_slam::localisation::{Localisation, Localiser, Observation, Status};
+use gyre_slam::localisation::{Localisation, Localiser, Map as KeptMap, Observation, Status};
 use gyre_storage::{self as storage, Draft};
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -85,28 +79,24 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let _locked = Out::lock_for(out, Content::FIXES)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
-    let mut path = Fixed {
-        stamps_ns: Vec::new(),
-        pieces: vec![Vec::new()],
-    };
-    let (started, mut counts) = (Instant::now(), Counts::default());
+    let (started, mut found) = (Instant::now(), Found::default());
     let ended = follow(
         &mut scans,
         &mut localiser,
         &mut fixes,
-        &mut counts,
-        &mut path,
+        &mut found,
         &configuration,
     );
-    let searched = counts.scans() + PROBES * usize::from(!scans.is_empty());
+    let counts = &found.counts;
+    let searched = counts.scans() + PROBES * usize::from(!scans.played.is_empty());
     let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / searched.max(1) as f64;
     fixes.commit()?;
-    let drawn = draw(&arguments.map, &path, out);
+    let drawn = draw(&arguments.map, &found, out);
     ended?;
     drawn?;
     let figures = Figures {
-        counts: &counts,
-        left_out: scans.left_out(),
+        counts,
+        left_out: scans.left_out,
         ms_a_scan,
         fixes: out.join(FIXES),
     };
@@ -119,30 +109,29 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     }
     match counts.has_fix() {
         true => Ok(ExitCode::SUCCESS),
-        false => Err(format!(
-            "no scan of {} was found in {}: it may be of another place, or made with settings for \
-             another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are \
-             searched; source.first and source.scans choose a part",
-            configuration.data(),
-            arguments.map.display()
-        )
-        .into()),
+        false => {
+            let (data, map) = (configuration.data(), arguments.map.display());
+            Err(format!("no scan of {data} was found in {map}: it may be of another place, or made with settings for another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are searched; source.first and source.scans choose a part").into())
+        }
     }
 }
 
-/// The scans with a fix.
-struct Fixed {
+/// The scans with a fix, and the counts of all.
+#[derive(Default)]
+struct Found {
+    counts: Counts,
     stamps_ns: Vec<i64>,
     /// Their poses, in pieces with a fix for each scan; the last may be empty.
     pieces: Vec<Vec<Pose>>,
 }
 
-impl Fixed {
-    fn add(&mut self, stamp_ns: i64, found: &Localisation) {
+impl Found {
+    fn add(&mut self, scan: &RegisteredScan<'_>, found: &Localisation) {
+        self.counts.add(scan, found.status);
         let is_fix = matches!(found.status, Status::Found | Status::Tracked);
         match (&found.fix, self.pieces.last_mut()) {
             (Some(fix), Some(piece)) if is_fix => {
-                self.stamps_ns.push(stamp_ns);
+                self.stamps_ns.push(scan.observation.stamp_ns);
                 piece.push(fix.pose.motion);
             }
             (_, Some(piece)) if piece.is_empty() => {}
@@ -157,36 +146,74 @@ fn follow(
     scans: &mut Scans,
     localiser: &mut Localiser,
     fixes: &mut Draft,
-    counts: &mut Counts,
-    path: &mut Fixed,
+    all: &mut Found,
     configuration: &Configuration,
 ) -> Result<(), Failure> {
-    fixes.append(fixes::HEADER)?;
-    let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
+    fixes.append(HEADER)?;
+    all.pieces.push(Vec::new());
+    let (mut progress, mut row) = (Progress::new(scans.played.len()), String::new());
     while let Some(scan) = scans.register_next()? {
         if scan.starts {
             localiser.reset();
         }
         let found = localiser.locate(&scan.observation);
         row.clear();
-        fixes::write_row(&scan, &found, localiser.map(), &mut row);
+        write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
-        counts.add(&scan, found.status);
-        path.add(scan.observation.stamp_ns, &found);
+        all.add(&scan, &found);
+        let counts = &all.counts;
         progress.show(counts.scans(), found.status);
-        if counts.scans() == FIRST && !counts.has_fix() && !scans.is_empty() {
+        if counts.scans() == FIRST && !counts.has_fix() && !scans.played.is_empty() {
             let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
             if !Scans::open(configuration)?.any_of(PROBES, is_found)? {
                 break;
             }
         }
     }
-    progress.finish();
+    if let Some(bar) = progress.bar {
+        bar.finish_and_clear();
+    }
     Ok(())
 }
 
+const HEADER: &str = "scan,stamp_ns,status,x_m,y_m,yaw_rad,\
+    cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,correlation,place\n";
+
+/// Writes the row of a scan to `text`, in fixed decimals, so that equal fixes give equal bytes.
+/// Unknown values are empty.
+fn write_row(scan: &RegisteredScan<'_>, found: &Localisation, map: &KeptMap, text: &mut String) {
+    let (number, stamp_ns) = (scan.number, scan.observation.stamp_ns);
+    let status = status_name(found.status);
+    let _ = write!(text, "{number},{stamp_ns},{status},");
+    let Some(fix) = &found.fix else {
+        text.push_str(",,,,,,,,,,\n");
+        return;
+    };
+    for value in xy_yaw(&fix.pose.motion) {
+        let _ = write!(text, "{value:.6},");
+    }
+    for value in covariance::pack(&fix.pose.covariance) {
+        let _ = write!(text, "{value:.12},");
+    }
+    let place = map.keyframes()[fix.keyframe].scan;
+    let _ = match found.status {
+        Status::Predicted | Status::Lost => writeln!(text, ",{place}"),
+        Status::Found | Status::Tracked => writeln!(text, "{:.6},{place}", fix.correlation),
+    };
+}
+
+/// The word for a status.
+fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Lost => "lost",
+        Status::Found => "found",
+        Status::Tracked => "tracked",
+        Status::Predicted => "predicted",
+    }
+}
+
 /// Writes the fixes as TUM, and draws them over the map.
-fn draw(map: &Path, path: &Fixed, out: &Path) -> Result<(), Failure> {
+fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
     let trajectory = Trajectory {
         stamp_ns: Some(path.stamps_ns.clone()),
@@ -226,19 +253,13 @@ impl Progress {
     }
 
     fn show(&mut self, done: usize, status: Status) {
-        let name = fixes::status_name(status);
+        let name = status_name(status);
         if let Some(bar) = &self.bar {
             bar.set_position(done as u64);
             bar.set_message(name);
         } else if self.last_line.elapsed() >= EVERY {
             print::note(format_args!("{done}/{} scans  {name}", self.scans));
             self.last_line = Instant::now();
-        }
-    }
-
-    fn finish(self) {
-        if let Some(bar) = self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -39,16 +39,14 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         Some(map) => extend::extend(arguments, map)?,
         None => draw_run(arguments)?,
     };
+    let (keyframes, tiles) = (drawing.keyframes(), drawing.evidence().tiles().len());
+    let out = arguments.out.display();
     print::line(format_args!(
-        "{} keyframes in {} tiles, in {}",
-        drawing.keyframes(),
-        drawing.evidence().tiles().len(),
-        arguments.out.display()
+        "{keyframes} keyframes in {tiles} tiles, in {out}"
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Draws a run and writes its map.
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
     let given = arguments.trajectory.clone();
@@ -65,10 +63,9 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let lines = draw(&mut keyframes, &poses, &loops, &mut drawing)?;
     let (count, total) = (drawing.keyframes(), keyframes.len());
     if count < total {
+        let (left_out, file) = (total - count, trajectory.display());
         print::note(format_args!(
-            "{} of {total} keyframes have no pose in {} and are left out",
-            total - count,
-            trajectory.display()
+            "{left_out} of {total} keyframes have no pose in {file} and are left out"
         ));
     }
     let (out, origin) = (&arguments.out, origin(arguments)?);
@@ -121,23 +118,18 @@ pub fn exists(path: &Path) -> Result<bool, StorageError> {
     path.try_exists().map_err(StorageError::at("read", path))
 }
 
-/// Reads the configuration of a run.
 pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
     Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
-/// Opens the keyframes of a run.
 pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     require_results(run)?;
     let path = records_path::<Keyframe>(run);
-    match exists(&path)? {
-        true => Ok(RecordReader::open(run)?),
-        false => Err(format!(
-            "{} does not exist: a run keeps keyframes with --set slam.kind=graph",
-            path.display()
-        )
-        .into()),
+    if exists(&path)? {
+        return Ok(RecordReader::open(run)?);
     }
+    let path = path.display();
+    Err(format!("{path} does not exist: a run keeps keyframes with --set slam.kind=graph").into())
 }
 
 /// The lines drawn over the keyframes, in the frame of the trajectory.
@@ -210,6 +202,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::fs;
 
+    use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
     use gyre_mapping::Map;
@@ -238,13 +231,7 @@ mod tests {
         MapArguments {
             run: folder.join("run"),
             out: folder.join("map"),
-            format: vec![
-                MapFormat::Folder,
-                MapFormat::Png,
-                MapFormat::Geotiff,
-                MapFormat::Pgm,
-                MapFormat::Web,
-            ],
+            format: MapFormat::value_variants().to_vec(),
             trajectory: None,
             extend: None,
             cell_m: 0.5,
@@ -255,11 +242,8 @@ mod tests {
     /// The results of a run of four keyframes, where the trajectory lacks the last keyframe.
     fn run(folder: &Path) {
         fs::create_dir_all(folder.join("run/journal")).unwrap();
-        fs::write(
-            folder.join("run/config.toml"),
-            "[points]\nmax_range_m = 60.0\n",
-        )
-        .unwrap();
+        let configuration = "[points]\nmax_range_m = 60.0\n";
+        fs::write(folder.join("run/config.toml"), configuration).unwrap();
         let mut log = RecordLog::open(&folder.join("run")).unwrap();
         let mut tum = Vec::new();
         for seq in 0..4 {
@@ -291,18 +275,10 @@ mod tests {
         let kept = gyre_slam::localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
         assert_eq!(kept.pose(2).translation.x, 6.0);
-        assert_eq!(
-            (opened.options().cell_m, opened.options().reach_m),
-            (0.5, 60.0)
-        );
-        for name in [
-            "map.png",
-            "map.tif",
-            "map.pgm",
-            "map.yaml",
-            "web/tiles.json",
-            "web/0/0/0.png",
-        ] {
+        let options = opened.options();
+        assert_eq!((options.cell_m, options.reach_m), (0.5, 60.0));
+        let names = "map.png map.tif map.pgm map.yaml web/tiles.json web/0/0/0.png";
+        for name in names.split(' ') {
             assert!(out.join(name).is_file(), "{name}");
         }
     }
@@ -320,65 +296,41 @@ mod tests {
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
         let kept = gyre_slam::localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
+        // The corrected trajectory comes before the trajectory of odometry.
+        fs::remove_file(out.join("tiles/holiday.jpg")).unwrap();
+        map(&arguments(folder.path())).unwrap();
+        assert_eq!(Map::open(&out).unwrap().keyframes(), 1);
     }
 
     #[test]
-    fn a_map_that_another_command_is_writing_is_left_to_it() {
+    fn a_folder_that_another_command_is_writing_is_left_to_it() {
         let folder = tempfile::tempdir().unwrap();
         run(folder.path());
-        let out = folder.path().join("map");
+        let (out, extended) = (folder.path().join("map"), folder.path().join("extended"));
+        let refused = |arguments: &MapArguments| map(arguments).unwrap_err().to_string();
         let other = Out::lock_for(&out, Content::MAP).unwrap();
-        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
-        assert!(
-            refused.starts_with("another command is writing to")
-                && refused.contains(&format!("process {}", std::process::id())),
-            "{refused}"
-        );
+        let said = refused(&arguments(folder.path()));
+        let process = format!("process {}", std::process::id());
+        assert!(said.starts_with("another command is writing to") && said.contains(&process));
         assert!(!out.join("map.toml").exists());
         drop(other);
         map(&arguments(folder.path())).unwrap();
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
-    }
 
-    #[test]
-    fn a_folder_that_another_command_is_writing_is_known_before_the_search_for_places() {
-        let folder = tempfile::tempdir().unwrap();
-        run(folder.path());
-        map(&arguments(folder.path())).unwrap();
+        // It is known before the search for places.
         let vertices = (0..4).map(|k| format!("VERTEX_SE2 {k} {k} 0 0\n"));
         let edges = (1..4).map(|k| format!("EDGE_SE2 {} {k} 1 0 0 1 0 0 1 0 1\n", k - 1));
-        fs::write(
-            folder.path().join("run/graph.g2o"),
-            vertices.chain(edges).collect::<String>(),
-        )
-        .unwrap();
-        let extended = folder.path().join("extended");
+        let graph: String = vertices.chain(edges).collect();
+        fs::write(folder.path().join("run/graph.g2o"), graph).unwrap();
         let arguments = MapArguments {
             out: extended.clone(),
-            extend: Some(folder.path().join("map")),
+            extend: Some(out),
             ..arguments(folder.path())
         };
-        let refused = || map(&arguments).unwrap_err().to_string();
         let other = Out::lock_for(&extended, Content::MAP).unwrap();
-        assert!(refused().starts_with("another command"), "{}", refused());
+        assert!(refused(&arguments).starts_with("another command"));
         drop(other);
-        assert!(
-            refused().starts_with("no keyframe of"),
-            "the search is next: {}",
-            refused()
-        );
-    }
-
-    #[test]
-    fn the_corrected_trajectory_comes_before_that_of_odometry() {
-        let folder = tempfile::tempdir().unwrap();
-        run(folder.path());
-        correct_first_keyframe(folder.path());
-        map(&arguments(folder.path())).unwrap();
-        assert_eq!(
-            Map::open(&folder.path().join("map")).unwrap().keyframes(),
-            1
-        );
+        assert!(refused(&arguments).starts_with("no keyframe of"));
     }
 
     #[test]
@@ -405,12 +357,9 @@ mod tests {
     fn a_run_without_keyframes_is_refused_with_what_to_do() {
         let folder = tempfile::tempdir().unwrap();
         let refused = map(&arguments(folder.path())).unwrap_err().to_string();
-        assert!(
-            refused.contains(
-                "keyframes.log does not exist: a run keeps keyframes with --set slam.kind=graph"
-            ),
-            "{refused}"
-        );
+        let remedy =
+            "keyframes.log does not exist: a run keeps keyframes with --set slam.kind=graph";
+        assert!(refused.contains(remedy), "{refused}");
         assert!(!folder.path().join("map").exists());
     }
 }

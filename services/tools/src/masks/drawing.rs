@@ -4,11 +4,12 @@
 
 use std::path::Path;
 
+use gyre_terminal::Failure;
 use ndarray::Array2;
 
 use crate::masks::{
     inspection::{Inspection, MaskedRaster},
-    picture::{PictureError, write_rgb},
+    picture::write_rgb,
 };
 
 type Colour = [u8; 3];
@@ -43,7 +44,10 @@ impl Canvas {
         };
         for (row, panels) in rows.iter().enumerate() {
             for (column, panel) in panels.iter().enumerate() {
-                canvas.place(panel, scale, [MARGIN + row * step, MARGIN + column * step]);
+                let corner = [MARGIN + row * step, MARGIN + column * step];
+                for (cell, colour) in panel.indexed_iter() {
+                    canvas.square(place(corner, cell.into(), scale), scale, *colour);
+                }
             }
         }
         canvas.mark_points(&inspection.points, scale, [MARGIN, MARGIN + 3 * step]);
@@ -52,27 +56,15 @@ impl Canvas {
 
     /// Pictures of one width below each other.
     pub fn stack(pictures: &[Self]) -> Self {
-        let width = pictures.first().map_or(0, |picture| picture.width);
+        let pixels = pictures.iter().flat_map(|picture| &picture.pixels);
         Self {
-            width,
-            pixels: pictures
-                .iter()
-                .flat_map(|picture| &picture.pixels)
-                .copied()
-                .collect(),
+            width: pictures.first().map_or(0, |picture| picture.width),
+            pixels: pixels.copied().collect(),
         }
     }
 
-    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
         write_rgb(path, self.width, &self.pixels)
-    }
-
-    /// Draws cells, each as a square of `scale` pixels a side.
-    fn place(&mut self, cells: &Array2<Colour>, scale: usize, corner: [usize; 2]) {
-        for ((row, column), colour) in cells.indexed_iter() {
-            let place = [corner[0] + row * scale, corner[1] + column * scale];
-            self.square(place, scale, *colour);
-        }
     }
 
     fn square(&mut self, [row, column]: [usize; 2], side: usize, colour: Colour) {
@@ -85,11 +77,15 @@ impl Canvas {
     fn mark_points(&mut self, points: &[([usize; 2], f32)], scale: usize, corner: [usize; 2]) {
         let mut points = points.to_vec();
         points.sort_by(|a, b| a.1.total_cmp(&b.1));
-        for ([row, column], factor) in points {
-            let place = [corner[0] + row * scale, corner[1] + column * scale];
-            self.square(place, scale + 1, colour(factor));
+        for (cell, factor) in points {
+            self.square(place(corner, cell, scale), scale + 1, colour(factor));
         }
     }
+}
+
+/// Returns the pixel where a cell begins that is drawn as a square of `scale` pixels a side.
+fn place(corner: [usize; 2], cell: [usize; 2], scale: usize) -> [usize; 2] {
+    [0, 1].map(|axis| corner[axis] + cell[axis] * scale)
 }
 
 /// The panels of a raster, without the points.
@@ -106,7 +102,6 @@ fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
     ]
 }
 
-/// Returns the value that this share of the cells exceeds.
 fn exceeded_by(share: f32, cells: &Array2<f32>) -> f32 {
     let mut cells: Vec<f32> = cells.iter().copied().collect();
     let rank = cells.len() - 1 - (share * cells.len() as f32) as usize;
@@ -128,16 +123,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_run_from_dark_to_bright() {
-        assert_eq!((colour(-1.0), colour(9.0)), (colour(0.0), colour(1.0)));
-        let brightness = |share: usize| {
-            let colour = colour(share as f32 / 16.0).map(u32::from);
-            colour.iter().sum::<u32>()
-        };
-        assert!((0..16).all(|share| brightness(share) < brightness(share + 1)));
-    }
-
-    #[test]
     fn the_brightest_colour_goes_to_a_share_of_the_cells() {
         let cells = Array2::from_shape_fn((40, 50), |(row, column)| {
             ((row * 50 + column) * 7 % 2000) as f32
@@ -145,6 +130,9 @@ mod tests {
         assert_eq!(exceeded_by(1e-3, &cells), 1997.0);
         assert_eq!(exceeded_by(0.0, &cells), 1999.0);
         assert_eq!(exceeded_by(0.5, &Array2::from_elem((1, 1), 3.0)), 3.0);
+        assert_eq!((colour(-1.0), colour(9.0)), (colour(0.0), colour(1.0)));
+        let [dark, bright] = [0.1, 0.9].map(|share| colour(share).map(u32::from));
+        assert!(dark.iter().sum::<u32>() < bright.iter().sum::<u32>());
     }
 
     #[test]
@@ -163,28 +151,20 @@ mod tests {
         };
         let [one, two] = [vec![raster(30.0)], vec![raster(30.0), raster(120.0)]]
             .map(|rasters| Canvas::of(&inspection(rasters)));
-        assert_eq!(
-            (one.width, one.pixels.len() / one.width),
-            (4 * 256 + 5 * MARGIN, 256 + 2 * MARGIN)
-        );
-        assert_eq!(
-            (two.width, two.pixels.len() / two.width),
-            (one.width, 2 * 256 + 3 * MARGIN)
-        );
+        let width = 4 * 256 + 5 * MARGIN;
+        assert_eq!((one.width, two.width), (width, width));
+        assert_eq!(one.pixels.len() / width, 256 + 2 * MARGIN);
+        assert_eq!(two.pixels.len() / width, 2 * 256 + 3 * MARGIN);
         let at = |canvas: &Canvas, row: usize, panel: usize| {
             canvas.pixels[row * canvas.width + MARGIN + panel * (256 + MARGIN)]
         };
-        assert_eq!(
-            [0, 1, 2, 3].map(|panel| at(&two, MARGIN, panel)),
-            [colour(0.25), grey(0.5), colour(1.0), grey(0.1)]
-        );
+        let panels = [0, 1, 2, 3].map(|panel| at(&two, MARGIN, panel));
+        assert_eq!(panels, [colour(0.25), grey(0.5), colour(1.0), grey(0.1)]);
         assert_eq!(at(&two, 256 + 2 * MARGIN, 0), colour(1.0));
         assert_eq!(at(&one, MARGIN - 1, 0), AROUND);
         // The last cell's dot.
         let end = (MARGIN + 255) * one.width + MARGIN + 3 * (256 + MARGIN) + 255;
-        assert_eq!(
-            (one.pixels[end], Canvas::stack(&[one]).pixels.len()),
-            (colour(1.0), 268 * 1054)
-        );
+        assert_eq!(one.pixels[end], colour(1.0));
+        assert_eq!(Canvas::stack(&[one]).pixels.len(), 268 * 1054);
     }
 }

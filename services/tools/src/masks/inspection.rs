@@ -12,7 +12,6 @@ pub const HEADER: &str = "  scan   power %   above floor %   cells %   points % 
 /// Above this factor a cell or a point counts as kept.
 const KEPT: f32 = 0.5;
 
-/// A scan and its mask.
 pub struct Inspection {
     /// The scan's place in the recording.
     pub number: usize,
@@ -54,18 +53,16 @@ impl Inspection {
     pub fn figures(&self) -> Figures {
         let raster = &self.rasters[0];
         let masked = sum(&raster.masked);
-        let kept = |factors: &mut dyn Iterator<Item = f32>| {
-            let (kept, all) = factors.fold((0, 0), |(kept, all), factor| {
-                (kept + usize::from(factor > KEPT), all + 1)
-            });
-            percent(kept as f64, f64::from(all))
+        let kept = |factors: Vec<f32>| {
+            let kept = factors.iter().filter(|factor| **factor > KEPT).count();
+            percent(kept as f64, factors.len() as f64)
         };
         Figures {
             scan: self.number,
             power_percent: percent(masked, sum(&raster.whole)),
             above_floor_percent: percent(masked, raster.above_floor),
-            cells_percent: kept(&mut raster.mask.iter().copied()),
-            points_percent: kept(&mut self.points.iter().map(|(_, factor)| *factor)),
+            cells_percent: kept(raster.mask.iter().copied().collect()),
+            points_percent: kept(self.points.iter().map(|(_, factor)| *factor).collect()),
             forward_m_s: self.twist.map(|twist| twist.vx_mps),
             yaw_rate_deg_s: self.twist.map(|twist| twist.yaw_rate_radps.to_degrees()),
         }
@@ -75,20 +72,21 @@ impl Inspection {
 impl fmt::Display for Figures {
     /// Writes the columns of [`HEADER`].
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let figure = |figure: Option<f64>, digits: usize| {
-            figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.digits$}"))
-        };
-        write!(
-            f,
-            "{:6} {:>9} {:>15} {:>9} {:>10} {:>8} {:>8}",
-            self.scan,
-            figure(self.power_percent, 1),
-            figure(self.above_floor_percent, 1),
-            figure(self.cells_percent, 1),
-            figure(self.points_percent, 1),
-            figure(self.forward_m_s, 2),
-            figure(self.yaw_rate_deg_s, 2),
-        )
+        write!(f, "{:6}", self.scan)?;
+        for (figure, width, digits) in [
+            (self.power_percent, 9, 1),
+            (self.above_floor_percent, 15, 1),
+            (self.cells_percent, 9, 1),
+            (self.points_percent, 10, 1),
+            (self.forward_m_s, 8, 2),
+            (self.yaw_rate_deg_s, 8, 2),
+        ] {
+            match figure {
+                Some(figure) => write!(f, " {figure:>width$.digits$}")?,
+                None => write!(f, " {:>width$}", "-")?,
+            }
+        }
+        Ok(())
     }
 }
 

@@ -1,7 +1,5 @@
 //! Masks scans one after the other as a run does, and inspects chosen ones.
 
-use std::error::Error;
-
 use gyre_configuration::{Configuration, Played};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::SparsePoint;
@@ -10,7 +8,7 @@ use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
 use gyre_scan_matching::{RefinementConfig, RefinementKind};
 use gyre_terminal::{Failure, print};
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 
 use crate::masks::inspection::{Inspection, MaskedRaster};
 
@@ -24,7 +22,6 @@ pub struct MaskInspector {
     dataset: Box<dyn Dataset>,
     odometry: Odometry,
     lag: usize,
-    /// The scan that comes next.
     next: usize,
     /// The last two registered scans, newest first.
     last: [OwnedScan; 2],
@@ -33,7 +30,6 @@ pub struct MaskInspector {
     samples: ScanSamples,
     /// The velocities that the last two scans were compensated with.
     twists: [Option<gyre_geometry::Twist>; 2],
-    /// Where their azimuths were lost.
     lost: [LostAzimuths; 2],
     rows: PlacedRows,
     floor: u8,
@@ -53,10 +49,9 @@ impl MaskInspector {
             ..configuration.odometry.clone()
         };
         let floor = config.masking.floor();
-        let threshold = if floor == 0 {
-            MaskKind::None
-        } else {
-            MaskKind::Threshold
+        let threshold = match floor {
+            0 => MaskKind::None,
+            _ => MaskKind::Threshold,
         };
         let plain = |kind| {
             let masking = MaskingConfig {
@@ -128,16 +123,12 @@ impl MaskInspector {
     }
 
     fn inspection(&mut self, number: usize) -> Result<Inspection, Failure> {
-        let masked = [
-            Some(self.odometry.raster()),
-            self.odometry.previous_raster(),
-        ];
-        let masked = masked.map(|raster| raster.map(|raster| raster.to_owned()));
-        let mut rasters = Vec::new();
-        for (scan, masked) in masked.into_iter().enumerate() {
-            if let Some(masked) = masked {
-                rasters.push(self.masked_raster(scan, masked)?);
-            }
+        let newest = self.odometry.raster().to_owned();
+        let before = self.odometry.previous_raster();
+        let before = before.map(|raster| raster.to_owned());
+        let mut rasters = vec![self.masked_raster(0, newest)?];
+        if let Some(before) = before {
+            rasters.push(self.masked_raster(1, before)?);
         }
         Ok(Inspection {
             number,
@@ -148,11 +139,7 @@ impl MaskInspector {
     }
 
     /// The raster of the last scan (0) or the one before (1), without and with its mask.
-    fn masked_raster(
-        &mut self,
-        scan: usize,
-        masked: Array2<f32>,
-    ) -> Result<MaskedRaster, Box<dyn Error + Send + Sync>> {
+    fn masked_raster(&mut self, scan: usize, masked: Array2<f32>) -> Result<MaskedRaster, Failure> {
         let sweep = Sweep {
             number: 0,
             scan: self.rows.place(&self.last[scan].view(), &self.lost[scan]),
@@ -164,7 +151,14 @@ impl MaskInspector {
         }
         let [whole, above_floor] = plain;
         let factors = self.odometry.factors(scan);
-        let mask = mask_above(self.floor, &above_floor, factors);
+        // Nothing where no power is above the threshold, else the network's factor, if there is a
+        // network.
+        let mask = Array2::from_shape_fn(above_floor.dim(), |cell| {
+            match self.floor == 0 || above_floor[cell] > 0.0 {
+                true => factors.as_ref().map_or(1.0, |factors| factors[cell]),
+                false => 0.0,
+            }
+        });
         Ok(MaskedRaster {
             whole,
             mask,
@@ -185,19 +179,4 @@ impl MaskInspector {
         };
         Ok(points.filter_map(factor).collect())
     }
-}
-
-/// The weight of each cell: nothing where no power is above the threshold, else the network's
-/// factor, if there is a network.
-fn mask_above(
-    floor: u8,
-    above_floor: &Array2<f32>,
-    factors: Option<ArrayView2<'_, f32>>,
-) -> Array2<f32> {
-    Array2::from_shape_fn(above_floor.dim(), |cell| {
-        match floor == 0 || above_floor[cell] > 0.0 {
-            true => factors.map_or(1.0, |factors| factors[cell]),
-            false => 0.0,
-        }
-    })
 }

@@ -26,9 +26,9 @@ impl RunChoice {
     /// Returns the folder that is named. An old way to name it gets a hint.
     pub fn named(&self) -> Option<&Path> {
         if let Some(out) = &self.out {
+            let out = out.display();
             print::note(format_args!(
-                "gyre: a run is now named without --out, as its last argument: {}",
-                out.display()
+                "gyre: a run is now named without --out, as its last argument: {out}"
             ));
         }
         self.run.as_deref().or(self.out.as_deref())

@@ -58,35 +58,30 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
     let mut run = start(&output).map_err(|error| format!("cannot start the run: {error}"))?;
     loop {
         if let Some(status) = run.try_wait()? {
-            return ended(status, &mut output, begin, out);
+            return end(status, &mut output, begin, out);
         }
         if let Some(status) = status_of(out, run.id()) {
-            let name = out.display();
-            let count = status.processes.len();
+            let (name, pid, count) = (out.display(), status.pid, status.processes.len());
             let does = status.notice.unwrap_or(format!("runs: {count} processes"));
             print::line(format_args!(
-                "{name} {does}, supervised by {}; gyre ps, top, logs -f, down",
-                status.pid
+                "{name} {does}, supervised by {pid}; gyre ps, top, logs -f, down"
             ))?;
             return Ok(ExitCode::SUCCESS);
         }
         if signals.sleep(PERIOD)? {
-            interrupt(&run);
-            return ended(run.wait()?, &mut output, begin, out);
+            // It may have ended.
+            let _ = kill_process(Pid::from_child(&run), Signal::INT);
+            return end(run.wait()?, &mut output, begin, out);
         }
     }
 }
 
 /// Starts `gyre run` with the arguments of this process.
 fn start(output: &File) -> std::io::Result<Child> {
-    let arguments = env::args_os().skip(1).scan(false, |is_found, argument| {
-        let is_command = !*is_found && argument == "up";
-        *is_found |= is_command;
-        Some(match is_command {
-            true => OsString::from("run"),
-            false => argument,
-        })
-    });
+    let mut arguments: Vec<OsString> = env::args_os().skip(1).collect();
+    if let Some(command) = arguments.iter_mut().find(|it| it.as_os_str() == "up") {
+        *command = "run".into();
+    }
     Command::new(own())
         .args(arguments)
         .env(DETACHED, "1")
@@ -104,18 +99,8 @@ fn status_of(out: &Path, pid: u32) -> Option<Status> {
     (status.pid == pid && is_up).then_some(status)
 }
 
-fn interrupt(run: &Child) {
-    // It may have ended.
-    let _ = kill_process(Pid::from_child(run), Signal::INT);
-}
-
 /// Repeats the output of an ended run, and its exit code.
-fn ended(
-    status: ExitStatus,
-    output: &mut File,
-    begin: u64,
-    out: &Path,
-) -> Result<ExitCode, Failure> {
+fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<ExitCode, Failure> {
     let mut bytes = Vec::new();
     output.seek(SeekFrom::Start(begin))?;
     output.read_to_end(&mut bytes)?;

@@ -2,7 +2,7 @@
 
 use std::{
     env,
-    io::{self, IsTerminal, Write},
+    io::{self, IsTerminal},
     path::{Path, PathBuf},
 };
 
@@ -12,7 +12,6 @@ use gyre_terminal::{Failure, print};
 use crate::operate::arguments::RunChoice;
 
 impl RunChoice {
-    /// Returns the named folder, or the folder of the only run.
     pub fn folder(&self) -> Result<PathBuf, Failure> {
         match self.named() {
             Some(run) => Ok(run.to_owned()),
@@ -52,16 +51,13 @@ fn name(run: &Control) {
 
 fn only_run() -> Result<Control, Failure> {
     let mut runs = Control::of_all();
-    match (runs.pop(), runs.is_empty()) {
-        (None, _) => Err("no run is running: `gyre up` or `gyre run` starts one".into()),
-        (Some(run), true) => Ok(run),
-        (Some(last), false) => {
-            let names = runs.iter().chain([&last]).map(|run| run.out().display());
-            let names: Vec<String> = names.map(|name| name.to_string()).collect();
-            let names = names.join(", ");
-            Err(format!("several runs are running: name one of {names}").into())
-        }
+    if runs.len() > 1 {
+        let names = runs.iter().map(|run| run.out().display().to_string());
+        let names = names.collect::<Vec<_>>().join(", ");
+        return Err(format!("several runs are running: name one of {names}").into());
     }
+    let none = "no run is running: `gyre up` or `gyre run` starts one";
+    Ok(runs.pop().ok_or(none)?)
 }
 
 /// Asks on a terminal whether a run from elsewhere is meant.
@@ -73,12 +69,7 @@ fn confirm(out: &Path, started_in: &Path, what: &str) -> Result<(), Failure> {
         )
         .into());
     }
-    let mut terminal = io::stderr();
-    write!(
-        terminal,
-        "gyre: the only run writes to {out} and was started from {started_in}: {what}? [y/N] "
-    )?;
-    terminal.flush()?;
+    eprint!("gyre: the only run writes to {out} and was started from {started_in}: {what}? [y/N] ");
     let mut answer = String::new();
     io::stdin().read_line(&mut answer)?;
     match agrees(&answer) {

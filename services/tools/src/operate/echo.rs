@@ -7,20 +7,17 @@ use std::{
     time::Duration,
 };
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
-    Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
-    MotionEstimate, MotionHeader, Objects, ObjectsHeader, Pose, PoseHeader, Refined, Rotation,
-    Scan, fix_status,
+    Correction, Fix, FixHeader, Loop, Masked, Message, Motion, MotionEstimate, MotionHeader,
+    Objects, ObjectsHeader, Pose, Refined, Rotation, Scan, fix_status,
 };
 use gyre_stage::{
-    StageError,
-    observer::{Next, ObservedRun, Observer},
+    observer::{Next, ObservedRun},
     reader::Received,
 };
 use gyre_terminal::Failure;
-use thiserror::Error;
 
 use crate::operate::arguments::RunChoice;
 
@@ -32,105 +29,63 @@ pub struct EchoArguments {
     pub words: Vec<PathBuf>,
 }
 
+/// Prints the messages of a topic of the run that writes to a folder.
+type Echo = fn(&Path) -> Result<(), Failure>;
+
 /// The topics of a run, in the order of the stream.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Topic {
-    /// Scans as measured.
-    Scan,
-    /// Masked rasters and points.
-    Masked,
-    /// Rotations between scans.
-    Rotation,
-    /// Motions between scans.
-    Motion,
-    /// Motions after refinement.
-    Refined,
-    /// Poses.
-    Pose,
-    /// Loops between keyframes, in a run with SLAM.
-    Loop,
-    /// Corrections of the odometry, in a run with SLAM.
-    Correction,
-    /// Places of keyframes in a map, in a run with SLAM that names one.
-    Fix,
-    /// Numbers of moving objects, in a run that tracks them.
-    Objects,
-}
+const TOPICS: [(&str, Echo); 10] = [
+    (Scan::TOPIC, |out| observe::<Scan>(out, scan)),
+    (Masked::TOPIC, |out| observe::<Masked>(out, masked)),
+    (Rotation::TOPIC, |out| observe::<Rotation>(out, rotation)),
+    (Motion::TOPIC, |out| {
+        observe::<Motion>(out, |it| motion(it.header()))
+    }),
+    (Refined::TOPIC, |out| {
+        observe::<Refined>(out, |it| motion(it.header()))
+    }),
+    (Pose::TOPIC, |out| observe::<Pose>(out, pose)),
+    (Loop::TOPIC, |out| observe::<Loop>(out, closed)),
+    (Correction::TOPIC, |out| {
+        observe::<Correction>(out, correction)
+    }),
+    (Fix::TOPIC, |out| observe::<Fix>(out, |it| fix(it.header()))),
+    (Objects::TOPIC, |out| {
+        observe::<Objects>(out, |it| objects(it.header()))
+    }),
+];
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
 pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
-    let (out, topic) = chosen_topic(&arguments.words)?;
-    let out = &out;
-    match topic {
-        Topic::Scan => observe::<Scan>(out, scan),
-        Topic::Masked => observe::<Masked>(out, masked),
-        Topic::Rotation => observe::<Rotation>(out, rotation),
-        Topic::Motion => observe::<Motion>(out, |message| motion(message.header())),
-        Topic::Refined => observe::<Refined>(out, |message| motion(message.header())),
-        Topic::Pose => observe::<Pose>(out, |message| pose(message.header())),
-        Topic::Loop => observe::<Loop>(out, |message| closed(message.header())),
-        Topic::Correction => observe::<Correction>(out, |message| correction(message.header())),
-        Topic::Fix => observe::<Fix>(out, |message| fix(message.header())),
-        Topic::Objects => observe::<Objects>(out, |message| objects(message.header())),
-    }
-}
-
-/// Returns the run and the topic that are named.
-fn chosen_topic(words: &[PathBuf]) -> Result<(PathBuf, Topic), Failure> {
+    let words = &arguments.words;
     let topic = |word: &PathBuf| {
-        let name = word.to_str().filter(|_| !word.is_dir());
-        name.and_then(|name| Topic::from_str(name, false).ok())
+        let name = word.to_str().filter(|_| !word.is_dir())?;
+        TOPICS.iter().find(|(topic, _)| *topic == name)
     };
-    let topics: Vec<Topic> = words.iter().filter_map(topic).collect();
+    let topics: Vec<_> = words.iter().filter_map(topic).collect();
     let runs: Vec<&PathBuf> = words.iter().filter(|word| topic(word).is_none()).collect();
-    match (&topics[..], &runs[..]) {
-        ([] | [_], [] | [_]) => {
-            let run = RunChoice::named_by(runs.first().copied().cloned());
-            Ok((
-                run.folder()?,
-                topics.first().copied().unwrap_or(Topic::Pose),
-            ))
-        }
+    let echo: Echo = match (&topics[..], &runs[..]) {
+        ([(_, echo)], [] | [_]) => *echo,
+        ([], [] | [_]) => |out: &Path| observe::<Pose>(out, pose),
         _ => {
-            let topics = Topic::value_variants().iter();
-            let names =
-                topics.filter_map(|topic| Some(topic.to_possible_value()?.get_name().to_owned()));
-            let names: Vec<String> = names.collect();
-            Err(format!(
-                "name a run, the folder of its results, and a topic: {}",
-                names.join(", ")
-            )
-            .into())
+            let names = TOPICS.map(|(name, _)| name).join(", ");
+            let usage = "name a run, the folder of its results, and a topic";
+            return Err(format!("{usage}: {names}").into());
         }
+    };
+    let run = RunChoice::named_by(runs.first().copied().cloned());
+    let printed = echo(&run.folder()?);
+    match printed.map_err(|error| error.downcast::<io::Error>()) {
+        Ok(()) => Ok(ExitCode::SUCCESS),
+        // Nobody reads it any more, as after `gyre echo OUT | head`.
+        Err(Ok(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
+        Err(Ok(error)) => Err(format!("cannot print: {error}").into()),
+        Err(Err(error)) => Err(error),
     }
 }
 
-fn observe<M: Message>(
-    out: &Path,
-    describe: impl Fn(&Received<M>) -> String,
-) -> Result<ExitCode, Failure> {
+fn observe<M: Message>(out: &Path, words: impl Fn(&Received<M>) -> String) -> Result<(), Failure> {
     let run = ObservedRun::writing_to(out)?;
     let mut observer = run.observe::<M>()?;
-    match print_all(&mut observer, describe) {
-        // Nobody reads it any more, as after `gyre echo OUT | head`.
-        Err(EchoError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {}
-        printed => printed?,
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-#[derive(Debug, Error)]
-enum EchoError {
-    #[error(transparent)]
-    Stage(#[from] StageError),
-    #[error("cannot print: {0}")]
-    Print(#[from] io::Error),
-}
-
-fn print_all<M: Message>(
-    observer: &mut Observer<'_, M>,
-    describe: impl Fn(&Received<M>) -> String,
-) -> Result<(), EchoError> {
     let mut lines = BufWriter::new(io::stdout().lock());
     let mut received = 0_u64;
     loop {
@@ -149,7 +104,7 @@ fn print_all<M: Message>(
                 if missed > 0 {
                     writeln!(lines, "{missed} missed")?;
                 }
-                writeln!(lines, "{seq}: scan {scan}, {}", describe(message))?;
+                writeln!(lines, "{seq}: scan {scan}, {}", words(message))?;
             }
             Next::Idle => {}
             Next::Ended => break,
@@ -176,22 +131,15 @@ fn scan(message: &Received<Scan>) -> String {
 
 fn masked(message: &Received<Masked>) -> String {
     let header = message.header();
-    let (n, cell_m) = (header.n, header.cell_m);
-    format!(
-        "{} raster{} of {n} x {n} cells of {cell_m} m, {} points",
-        header.rasters,
-        if header.rasters == 1 { "" } else { "s" },
-        header.points
-    )
+    let (n, cell_m, rasters, points) = (header.n, header.cell_m, header.rasters, header.points);
+    let s = if rasters == 1 { "" } else { "s" };
+    format!("{rasters} raster{s} of {n} x {n} cells of {cell_m} m, {points} points")
 }
 
 fn rotation(message: &Received<Rotation>) -> String {
     let rotation = &message.header().rotation;
-    format!(
-        "yaw {:.3} deg, score {:.3}",
-        rotation.angle_rad.to_degrees(),
-        rotation.score
-    )
+    let (yaw_deg, score) = (rotation.angle_rad.to_degrees(), rotation.score);
+    format!("yaw {yaw_deg:.3} deg, score {score:.3}")
 }
 
 fn motion(header: &MotionHeader) -> String {
@@ -201,7 +149,8 @@ fn motion(header: &MotionHeader) -> String {
     format!("{place}, score {:.3}{standing}", motion.score)
 }
 
-fn pose(header: &PoseHeader) -> String {
+fn pose(message: &Received<Pose>) -> String {
+    let header = message.header();
     let place = place(header.x_m, header.y_m, header.yaw_rad);
     format!("{place}{}", standing(&header.motion))
 }
@@ -213,13 +162,15 @@ fn standing(motion: &MotionEstimate) -> &'static str {
     }
 }
 
-fn closed(header: &LoopHeader) -> String {
+fn closed(message: &Received<Loop>) -> String {
+    let header = message.header();
     let place = place(header.x_m, header.y_m, header.yaw_rad);
     let (scan, correlation) = (header.item.previous_scan, header.correlation);
     format!("at scan {scan}: {place}, correlation {correlation:.3}")
 }
 
-fn correction(header: &CorrectionHeader) -> String {
+fn correction(message: &Received<Correction>) -> String {
+    let header = message.header();
     let place = place(header.x_m, header.y_m, header.yaw_rad);
     let (keyframes, loops) = (header.keyframes, header.loops);
     format!("{place}, {keyframes} keyframes, {loops} loops")
@@ -238,16 +189,13 @@ fn fix(header: &FixHeader) -> String {
 }
 
 fn objects(header: &ObjectsHeader) -> String {
-    let moving = header.list().iter().filter(|object| object.is_moving());
-    let moving = moving.map(|object| {
-        let (place, speed_mps) = (
-            place(object.x_m, object.y_m, object.yaw_rad),
-            object.speed_mps(),
-        );
-        format!("; {}: {place}, {speed_mps:.1} m/s", object.id)
-    });
-    let counts = format!("{} objects, {} move", header.objects, header.moving);
-    std::iter::once(counts).chain(moving).collect()
+    let mut text = format!("{} objects, {} move", header.objects, header.moving);
+    for object in header.list().iter().filter(|object| object.is_moving()) {
+        let place = place(object.x_m, object.y_m, object.yaw_rad);
+        let (id, speed_mps) = (object.id, object.speed_mps());
+        text += &format!("; {id}: {place}, {speed_mps:.1} m/s");
+    }
+    text
 }
 
 fn place(x_m: f64, y_m: f64, yaw_rad: f64) -> String {

@@ -12,8 +12,9 @@ use std::{
 use gyre_configuration::process_names;
 use gyre_stage::{control::Control, wake::Signals};
 use gyre_terminal::{Failure, print};
+use serde_json::Value;
 
-use crate::operate::{arguments::LogsArguments, events};
+use crate::operate::arguments::LogsArguments;
 
 /// Time between two looks at the files.
 const PERIOD: Duration = Duration::from_millis(200);
@@ -71,35 +72,27 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
         let names = names.join(", ");
         return Err(format!("there is no process `{process}`; there are {names}").into());
     }
-    let printed = names
-        .into_iter()
-        .filter(|name| process.is_none_or(|process| process == *name))
-        .map(|name| Log {
-            path: out.join("log").join(format!("{name}.txt")),
-            kind: Kind::Printed(name.to_owned()),
-            position: None,
-        });
-    let mut logs: Vec<Log> = printed.filter(|log| log.path.exists()).collect();
-    logs.push(Log {
-        path: events,
-        kind: Kind::Events(process.map(str::to_owned)),
+    names.retain(|name| process.is_none_or(|process| process == *name));
+    let log = |path, printed_by: Option<&str>| Log {
+        path,
+        printed_by: printed_by.map(str::to_owned),
+        process: process.map(str::to_owned),
         position: None,
-    });
-    Ok(logs)
+    };
+    let path = |name: &str| out.join("log").join(format!("{name}.txt"));
+    let printed = names.iter().map(|name| log(path(name), Some(*name)));
+    let printed = printed.filter(|log| log.path.exists());
+    Ok(printed.chain([log(events, None)]).collect())
 }
 
 struct Log {
     path: PathBuf,
-    kind: Kind,
+    /// The process that has printed it; `None`: it is `log.jsonl`.
+    printed_by: Option<String>,
+    /// The process whose events are printed; `None`: all.
+    process: Option<String>,
     /// The file that was read last, by its inode, and how far.
     position: Option<(u64, u64)>,
-}
-
-enum Kind {
-    /// `log.jsonl`, of one process or of all.
-    Events(Option<String>),
-    /// The output of a process.
-    Printed(String),
 }
 
 impl Log {
@@ -132,11 +125,33 @@ impl Log {
 
     /// Returns a line for a person; `None` if it is of another process.
     fn line(&self, line: &str) -> Option<String> {
-        match &self.kind {
-            Kind::Events(process) => events::readable(line.trim_end(), process.as_deref()),
-            Kind::Printed(process) => Some(format!("{process}: {}", line.trim_end())),
+        match &self.printed_by {
+            Some(process) => Some(format!("{process}: {}", line.trim_end())),
+            None => readable(line.trim_end(), self.process.as_deref()),
         }
     }
+}
+
+/// Returns an event as a line: `21:04:05.678 WARN masking: sentence, key=value`; `None` if it is of
+/// another process than `process`, or is no event.
+fn readable(line: &str, process: Option<&str>) -> Option<String> {
+    let event: Value = serde_json::from_str(line).ok()?;
+    let text = |place| event.pointer(place).and_then(Value::as_str);
+    let stage = text("/span/stage").unwrap_or_default();
+    if process.is_some_and(|process| process != stage) {
+        return None;
+    }
+    let (time, level) = (text("/timestamp")?, text("/level")?);
+    let fields = event.get("fields")?.as_object()?;
+    let message = text("/fields/message").unwrap_or_default();
+    let others = fields.iter().filter(|(key, _)| *key != "message");
+    let others: String = others
+        .map(|(key, value)| format!(", {key}={value}"))
+        .collect();
+    // The time of day to the millisecond of `2026-11-23T21:04:05.678901Z`.
+    let clock = time.split_once('T').map_or(time, |(_, day)| day);
+    let clock = clock.get(..12).unwrap_or(clock);
+    Some(format!("{clock} {level} {stage}: {message}{others}"))
 }
 
 #[cfg(test)]
@@ -152,7 +167,8 @@ mod tests {
         let path = folder.path().join("masking.txt");
         let mut log = Log {
             path: path.clone(),
-            kind: Kind::Printed("masking".to_owned()),
+            printed_by: Some("masking".to_owned()),
+            process: None,
             position: None,
         };
         assert!(log.lines().is_empty(), "it is not there yet");
@@ -168,5 +184,17 @@ mod tests {
         file.set_len(0).unwrap();
         file.write_all(b"3\n").unwrap();
         assert_eq!(log.lines(), ["masking: 3"], "it was emptied meanwhile");
+    }
+
+    const LINE: &str = r#"{"timestamp":"2026-11-23T21:04:05.678901Z","level":"WARN","fields":{"message":"skipped: it is damaged","scan":7},"target":"gyre_stage::source","span":{"stage":"radar-replay","name":"process"},"spans":[]}"#;
+
+    #[test]
+    fn an_event_is_a_line_with_its_time_its_process_and_its_fields() {
+        let line = "21:04:05.678 WARN radar-replay: skipped: it is damaged, scan=7";
+        assert_eq!(readable(LINE, None).as_deref(), Some(line));
+        assert_eq!(readable(LINE, Some("radar-replay")).as_deref(), Some(line));
+        assert_eq!(readable(LINE, Some("masking")), None);
+        assert_eq!(readable("{", None), None);
+        assert_eq!(readable("[]", None), None);
     }
 }

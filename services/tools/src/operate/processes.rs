@@ -1,6 +1,6 @@
 //! `gyre ps`: the running runs and their processes.
 
-use std::{fmt, process::ExitCode};
+use std::process::ExitCode;
 
 use gyre_stage::{
     StageError,
@@ -37,7 +37,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
         }
         PsArguments { json: true, .. } => print::line(serde_json::to_string_pretty(&rows)?)?,
         _ if is_none => print::line(NO_RUN)?,
-        _ => rows.iter().map(Listed).try_for_each(print::line)?,
+        _ => rows.iter().map(listed).try_for_each(print::line)?,
     }
     match faults.is_empty() {
         true => Ok(ExitCode::SUCCESS),
@@ -45,36 +45,27 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// A run as a table.
-struct Listed<'a>(&'a UsedRun);
-
-impl fmt::Display for Listed<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let UsedRun { status, usage } = self.0;
-        writeln!(f, "{}", status.out.display())?;
-        writeln!(f, "{}", summary(status))?;
-        writeln!(
-            f,
-            "  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}",
-            "process", "pid", "state", "for", "cpu", "memory", "restarts"
-        )?;
-        for (process, usage) in status.processes.iter().zip(usage) {
-            let usage = usage.unwrap_or_default();
-            writeln!(
-                f,
-                "  {:20} {:>8} {:9} {:>8} {:>7.1} s {:>5.0} MB {:>9}{}",
-                process.name,
-                process.pid,
-                process.activity.name(),
-                process.activity_s.map_or_else(String::new, duration),
-                usage.cpu_s,
-                usage.own_bytes as f64 * 1e-6,
-                process.restarts,
-                remarks(process),
-            )?;
-        }
-        Ok(())
+fn listed(UsedRun { status, usage }: &UsedRun) -> String {
+    let (out, summary) = (status.out.display(), summary(status));
+    let mut table = format!(
+        "{out}\n{summary}\n  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}\n",
+        "process", "pid", "state", "for", "cpu", "memory", "restarts"
+    );
+    for (process, usage) in status.processes.iter().zip(usage) {
+        let usage = usage.unwrap_or_default();
+        let activity_s = process.activity_s.map(duration).unwrap_or_default();
+        table += &format!(
+            "  {:20} {:>8} {:9} {activity_s:>8} {:>7.1} s {:>5.0} MB {:>9}{}\n",
+            process.name,
+            process.pid,
+            process.activity.name(),
+            usage.cpu_s,
+            usage.own_bytes as f64 * 1e-6,
+            process.restarts,
+            remarks(process),
+        );
     }
+    table
 }
 
 /// Returns the faults of a run, a sentence each.
@@ -101,18 +92,16 @@ fn ills(status: &Status) -> Vec<String> {
 /// Returns the state of a run in a line.
 pub fn summary(status: &Status) -> String {
     let mode = if status.live { "live" } else { "lossless" };
-    let notice = status.notice.iter().map(|it| format!("; {it}"));
-    let pose = status.last_pose_s.map_or_else(String::new, |age| {
-        format!(", the last {} ago", duration(age))
-    });
+    let (phase, uptime) = (status.phase.name(), duration(status.uptime_s));
+    let (pid, poses, dropped) = (status.pid, status.poses, status.dropped);
+    let age = status.last_pose_s.map(duration);
+    let age = age
+        .map(|age| format!(", the last {age} ago"))
+        .unwrap_or_default();
+    let notice = status.notice.as_ref().map(|it| format!("; {it}"));
+    let notice = notice.unwrap_or_default();
     format!(
-        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped{}",
-        status.phase.name(),
-        duration(status.uptime_s),
-        status.pid,
-        status.poses,
-        status.dropped,
-        notice.collect::<String>()
+        "{phase} for {uptime}, {mode}, supervised by {pid}: {poses} poses{age}, {dropped} dropped{notice}"
     )
 }
 
@@ -143,14 +132,14 @@ pub fn lacks(received: &Received) -> String {
         (received.foreign_messages, "messages of others"),
         (received.reconnections(), "reconnections"),
     ];
-    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
-    let counts: String = counts
-        .map(|(count, of)| format!("  {count} {of}"))
-        .collect();
-    match received.is_receiving {
-        true => counts,
-        false => format!("  no azimuths{counts}"),
+    let mut lacks = match received.is_receiving {
+        true => String::new(),
+        false => "  no azimuths".to_owned(),
+    };
+    for (count, of) in counts.into_iter().filter(|(count, _)| *count > 0) {
+        lacks += &format!("  {count} {of}");
     }
+    lacks
 }
 
 /// Returns a time in two or three digits.

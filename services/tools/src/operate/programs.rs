@@ -24,23 +24,6 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
 /// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER_S: f64 = 5.0;
 
-/// The printed progress of a swap.
-#[derive(Default)]
-struct Waiting {
-    /// True if the program had taken over then.
-    told: Option<bool>,
-}
-
-impl Waiting {
-    /// Prints the reason for waiting once for each step of a swap.
-    fn explain(&mut self, pending: &PendingSwap) {
-        if pending.waited_s > EXPLAIN_AFTER_S && self.told != Some(pending.has_taken_over) {
-            self.told = Some(pending.has_taken_over);
-            print::note(format_args!("gyre: {}", sentence(pending)));
-        }
-    }
-}
-
 /// Explains the wait of a swap, its duration, and the remedy.
 fn sentence(pending: &PendingSwap) -> String {
     let (process, command) = (&pending.process, pending.command.join(" "));
@@ -67,25 +50,19 @@ const UNTRIED: u8 = 2;
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let what = format!("swap its {}", arguments.process);
     let run = chosen_to_change(&arguments.run, &what)?;
-    let command = arguments.command.as_deref().map(words);
-    let command = command.transpose()?;
+    let process = &arguments.process;
+    let mut command = arguments.command.as_deref().map(words).transpose()?;
     // Found as in this terminal: the supervisor may have been started with another PATH.
-    let command = command.map(|mut command: Vec<String>| {
-        if let Some(program) = command.first_mut() {
-            *program = Program::place_of(program).display().to_string();
-        }
-        command
-    });
-    let command = match &arguments.python {
-        None => command,
-        Some(file) => {
-            // By its own name: this process ends before the stage does.
-            let gyre = env::current_exe()
-                .map_err(|error| format!("cannot tell the program of this process: {error}"))?;
-            let (gyre, process) = (gyre.to_string_lossy(), &arguments.process);
-            Some(StageConfig::own_command(&gyre, process, Some(file)))
-        }
-    };
+    if let Some(program) = command.as_mut().and_then(|command| command.first_mut()) {
+        *program = Program::place_of(program).display().to_string();
+    }
+    if let Some(file) = &arguments.python {
+        // By its own name: this process ends before the stage does.
+        let gyre = env::current_exe()
+            .map_err(|error| format!("cannot tell the program of this process: {error}"))?;
+        let gyre = gyre.to_string_lossy();
+        command = Some(StageConfig::own_command(&gyre, process, Some(file)));
+    }
     let what = match &command {
         Some(command) => format!("`{}`", command.join(" ")),
         None => "the program that the run was begun with".to_owned(),
@@ -93,16 +70,24 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let directory = env::current_dir()
         .map_err(|error| format!("cannot tell the current directory: {error}"))?;
     let swap = Swap {
-        process: arguments.process.clone(),
+        process: process.clone(),
         command,
         directory,
         cold: arguments.cold,
     };
-    let mut waiting = Waiting::default();
-    if let Some(untried) = run.swap(swap, &mut |pending| waiting.explain(pending))? {
+    // Explains the wait once for each step of the swap.
+    let mut explained = None;
+    let mut explain = |pending: &PendingSwap| {
+        let step = Some(pending.has_taken_over);
+        if pending.waited_s > EXPLAIN_AFTER_S && explained != step {
+            explained = step;
+            print::note(format_args!("gyre: {}", sentence(pending)));
+        }
+    };
+    if let Some(untried) = run.swap(swap, &mut explain)? {
         print::note(format_args!("gyre: {untried}"));
         return Ok(ExitCode::from(UNTRIED));
     }
-    print::line(format_args!("{} is {what} now", arguments.process))?;
+    print::line(format_args!("{process} is {what} now"))?;
     Ok(ExitCode::SUCCESS)
 }

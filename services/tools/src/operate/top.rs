@@ -16,7 +16,7 @@ use gyre_stage::{
 use gyre_terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
-    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
+    crossterm::event::{self, Event, KeyCode, KeyModifiers},
 };
 
 use crate::operate::{arguments::TopArguments, choice::chosen};
@@ -72,27 +72,26 @@ fn show(
     snapshots: &mut Snapshots<'_>,
     every: Duration,
 ) -> Result<Option<Snapshot>, Failure> {
+    let mut last = None;
     loop {
         let snapshot = match snapshots.take() {
-            Ok(snapshot) => snapshot,
-            Err(_) if snapshots.has_ended() => return Ok(snapshots.last()),
+            Ok(snapshot) => last.insert(snapshot),
+            Err(_) if snapshots.has_ended() => return Ok(last),
             Err(error) => return Err(error),
         };
-        terminal.draw(|frame| screen::draw(frame, &snapshot))?;
-        let mut resized = false;
-        let quit = || match next_key()? {
-            Key::Quit => Ok(true),
-            Key::Resized => {
-                resized = true;
-                Ok(false)
-            }
-            Key::None => Ok(false),
+        terminal.draw(|frame| screen::draw(frame, snapshot))?;
+        // Each drawing has the size of the terminal as of then.
+        let quit = || {
+            let event = event::poll(PERIOD)?.then(event::read).transpose()?;
+            let key = event.as_ref().and_then(Event::as_key_press_event);
+            Ok(key.is_some_and(|key| match key.code {
+                KeyCode::Char('q') | KeyCode::Esc => true,
+                KeyCode::Char('c') => key.modifiers.contains(KeyModifiers::CONTROL),
+                _ => false,
+            }))
         };
         if wait(snapshots, every, quit)? {
             return Ok(None);
-        }
-        if resized {
-            terminal.autoresize()?;
         }
     }
 }
@@ -113,32 +112,5 @@ fn wait(
     Ok(false)
 }
 
-enum Key {
-    Quit,
-    Resized,
-    None,
-}
-
-/// Waits a moment for a key.
-fn next_key() -> Result<Key, Failure> {
-    if !event::poll(PERIOD)? {
-        return Ok(Key::None);
-    }
-    Ok(match event::read()? {
-        Event::Key(key) if key.kind == KeyEventKind::Press => {
-            let is_interrupt =
-                key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-            match key.code {
-                KeyCode::Char('q') | KeyCode::Esc => Key::Quit,
-                _ if is_interrupt => Key::Quit,
-                _ => Key::None,
-            }
-        }
-        Event::Resize(..) => Key::Resized,
-        _ => Key::None,
-    })
-}
-
-/// The poses of a run, for [`Snapshots`].
 type Poses<'run> = Observer<'run, gyre_messages::Pose>;
 type Scans<'run> = Observer<'run, gyre_messages::Scan>;

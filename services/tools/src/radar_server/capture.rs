@@ -14,9 +14,9 @@ use std::{
 
 use gyre_colossus::{Address, Configuration, Event, Message, Request};
 use gyre_stages::live_radar::{RadarParser, RadarSocket};
-use thiserror::Error;
+use gyre_terminal::Failure;
 
-use crate::radar_server::server::{Audience, Faults, Output, sleep_until};
+use crate::radar_server::server::{Output, sleep_until};
 
 /// The first bytes of a capture, with its version.
 pub const MAGIC: &[u8; 8] = b"GYRERAD1";
@@ -29,83 +29,35 @@ const POLL: Duration = Duration::from_millis(2);
 /// Encoder counts of a description by UDP, which has none. They are not sent.
 const ENCODER_COUNTS: u16 = 5600;
 
-/// A failure to make or to play a capture.
-#[derive(Debug, Error)]
-pub enum CaptureError {
-    #[error("no radar answers at {address} ({source}): check the address")]
-    NoAnswer {
-        /// The address of the radar.
-        address: String,
-        /// The system's reason.
-        source: io::Error,
-    },
-    #[error("{}: {source}", path.display())]
-    File {
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    #[error("{} is a damaged capture: {reason}", path.display())]
-    Damaged {
-        /// The path of the file.
-        path: PathBuf,
-        reason: &'static str,
-    },
-    #[error("{} was captured by {of}, and can only be played so: {advice}", path.display())]
-    Protocol {
-        /// The path of the file.
-        path: PathBuf,
-        of: &'static str,
-        advice: &'static str,
-    },
-    #[error("cannot serve as a radar: {0}")]
-    Network(#[from] io::Error),
+/// Returns a function that names the file of a system error.
+fn in_file(path: &Path) -> impl Fn(io::Error) -> String {
+    move |error| format!("{}: {error}", path.display())
 }
 
-impl CaptureError {
-    fn file(path: &Path) -> impl Fn(io::Error) -> Self {
-        move |source| Self::File {
-            path: path.to_owned(),
-            source,
-        }
-    }
-
-    fn damaged(path: &Path, reason: &'static str) -> Self {
-        Self::Damaged {
-            path: path.to_owned(),
-            reason,
-        }
-    }
+fn damaged(path: &Path, reason: &str) -> Failure {
+    format!("{} is a damaged capture: {reason}", path.display()).into()
 }
 
 /// The size of a recorded or played capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Captured {
     pub records: u64,
-    /// The bytes of the records.
     pub bytes: u64,
 }
 
-/// Records the bytes of the radar at `address` until it ends, or `stop` returns true.
-pub fn record(
-    address: &Address,
-    path: &Path,
-    stop: &dyn Fn() -> bool,
-) -> Result<Captured, CaptureError> {
-    let file = &CaptureError::file(path);
+/// Records the bytes of a radar until it ends, or `stop` returns true.
+pub fn record(radar: &Address, path: &Path, stop: &dyn Fn() -> bool) -> Result<Captured, Failure> {
+    let file = &in_file(path);
     // Before the radar is asked for anything: a file that is there is not overwritten.
     let mut out = io::BufWriter::new(File::create_new(path).map_err(file)?);
     let requests = [Request::RequestConfiguration, Request::StartFft];
-    let mut socket = RadarSocket::open(address, &requests).map_err(|source| {
+    let mut socket = RadarSocket::open(radar, &requests).map_err(|error| {
         // The file is empty.
         let _ = fs::remove_file(path);
-        CaptureError::NoAnswer {
-            address: address.to_string(),
-            source,
-        }
+        format!("no radar answers at {radar} ({error}): check the address")
     })?;
     out.write_all(MAGIC).map_err(file)?;
-    out.write_all(&[address.is_udp().into()]).map_err(file)?;
+    out.write_all(&[radar.is_udp().into()]).map_err(file)?;
     let (started, mut space) = (Instant::now(), vec![0; MAX_RECORD_BYTES]);
     let mut captured = Captured::default();
     while !stop() {
@@ -134,7 +86,6 @@ fn write_record(out: &mut impl Write, time: Duration, bytes: &[u8]) -> io::Resul
     out.write_all(bytes)
 }
 
-/// A capture that is read from its start.
 #[derive(Debug)]
 pub struct Capture {
     path: PathBuf,
@@ -144,8 +95,8 @@ pub struct Capture {
 
 impl Capture {
     /// Opens a capture; `None` if the file is something else, or a folder.
-    pub fn open(path: &Path) -> Result<Option<Self>, CaptureError> {
-        let failed = &CaptureError::file(path);
+    pub fn open(path: &Path) -> Result<Option<Self>, Failure> {
+        let failed = &in_file(path);
         if !path.is_file() {
             return Ok(None);
         }
@@ -161,20 +112,14 @@ impl Capture {
                 file,
                 is_udp: protocol == 1,
             })),
-            _ => Err(CaptureError::damaged(path, "its protocol is unknown")),
+            _ => Err(damaged(path, "its protocol is unknown")),
         }
-    }
-
-    /// Opens the same capture from its start.
-    fn reopen(&self) -> Result<Self, CaptureError> {
-        let no_capture = || CaptureError::damaged(&self.path, "it is no capture any more");
-        Self::open(&self.path)?.ok_or_else(no_capture)
     }
 
     /// Reads the next record into `bytes`, which have room for [`MAX_RECORD_BYTES`]; returns the
     /// time and the number of bytes. `None` at the end.
-    pub fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, CaptureError> {
-        let failed = &CaptureError::file(&self.path);
+    pub fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, Failure> {
+        let failed = &in_file(&self.path);
         let (mut time_ns, mut count) = ([0; 8], [0; 4]);
         if !read_whole(&mut self.file, &mut time_ns).map_err(failed)?
             || !read_whole(&mut self.file, &mut count).map_err(failed)?
@@ -183,20 +128,19 @@ impl Capture {
         }
         let count = u32::from_le_bytes(count) as usize;
         let Some(bytes) = bytes.get_mut(..count) else {
-            let reason = "a record has more bytes than any has";
-            return Err(CaptureError::damaged(&self.path, reason));
+            return Err(damaged(&self.path, "a record has more bytes than any has"));
         };
         let is_whole = read_whole(&mut self.file, bytes).map_err(failed)?;
         let time = Duration::from_nanos(u64::from_le_bytes(time_ns));
         if is_whole && time > MAX_TIME {
             let reason = "a record is of more than a year after the start";
-            return Err(CaptureError::damaged(&self.path, reason));
+            return Err(damaged(&self.path, reason));
         }
         Ok(is_whole.then_some((time, count)))
     }
 
     /// Reads up to the radar's first description of itself.
-    pub fn configuration(mut self) -> Result<Configuration, CaptureError> {
+    pub fn configuration(mut self) -> Result<Configuration, Failure> {
         let mut bytes = vec![0; MAX_RECORD_BYTES];
         let mut parser = RadarParser::new(self.is_udp, ENCODER_COUNTS);
         while let Some((_, count)) = self.next(&mut bytes)? {
@@ -210,8 +154,7 @@ impl Capture {
                 }
             }
         }
-        let reason = "no radar describes itself in it";
-        Err(CaptureError::damaged(&self.path, reason))
+        Err(damaged(&self.path, "no radar describes itself in it"))
     }
 }
 
@@ -227,16 +170,25 @@ fn read_whole(file: &mut impl Read, bytes: &mut [u8]) -> io::Result<bool> {
 /// Plays a capture as its radar, until it has ended or `stop` returns true. `rate` is a factor of
 /// its pace; `None`: as fast as it is read.
 pub fn play(
-    audience: Audience,
+    mut output: Output,
     mut capture: Capture,
     rate: Option<f64>,
     stop: &dyn Fn() -> bool,
-) -> Result<Captured, CaptureError> {
-    if matches!(audience, Audience::Group { .. }) != capture.is_udp {
-        return Err(other_protocol(capture.path, capture.is_udp));
+) -> Result<Captured, Failure> {
+    let path = &capture.path;
+    if matches!(output, Output::Group { .. }) != capture.is_udp {
+        let (of, advice) = match capture.is_udp {
+            true => ("UDP", "give the group as --udp GROUP:PORT"),
+            false => ("TCP", "leave out --udp"),
+        };
+        let path = path.display();
+        return Err(
+            format!("{path} was captured by {of}, and can only be played so: {advice}").into(),
+        );
     }
-    let radar = capture.reopen()?.configuration()?;
-    let mut output = Output::open(audience, &radar, Faults::default())?;
+    let none = || damaged(path, "it is no capture any more");
+    let radar = Capture::open(path)?.ok_or_else(none)?.configuration()?;
+    output.begin(&radar)?;
     let mut played = Captured::default();
     if !output.describe(&radar, stop) || !output.await_client(stop) {
         return Ok(played);
@@ -259,14 +211,6 @@ pub fn play(
     Ok(played)
 }
 
-fn other_protocol(path: PathBuf, is_udp: bool) -> CaptureError {
-    let (of, advice) = match is_udp {
-        true => ("UDP", "give the group as --udp GROUP:PORT"),
-        false => ("TCP", "leave out --udp"),
-    };
-    CaptureError::Protocol { path, of, advice }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -287,7 +231,7 @@ mod tests {
         bytes
     }
 
-    fn records(path: &Path) -> Result<Vec<(Duration, Vec<u8>)>, CaptureError> {
+    fn records(path: &Path) -> Result<Vec<(Duration, Vec<u8>)>, Failure> {
         let mut capture = Capture::open(path)?.unwrap();
         let (mut space, mut records) = (vec![0; MAX_RECORD_BYTES], Vec::new());
         while let Some((time, count)) = capture.next(&mut space)? {

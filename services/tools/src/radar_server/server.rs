@@ -2,7 +2,6 @@
 
 mod clients;
 mod faults;
-mod group;
 mod output;
 
 use std::{
@@ -12,57 +11,32 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
-use gyre_datasets::{Dataset, ReadError};
+use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
+use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, scan::flag};
-use thiserror::Error;
+use gyre_terminal::Failure;
 
-pub(crate) use clients::Clients;
+use crate::radar_server::RadarServerArguments;
+
+pub use clients::Clients;
 pub use faults::Faults;
-pub(crate) use group::Group;
-pub use gyre_colossus::{ByteOrder, ClockFormat};
-pub use output::Audience;
-pub(crate) use output::{Output, sleep_until};
+use faults::{is_nth, uniform};
+pub(crate) use output::sleep_until;
+pub use output::{Group, Output};
 
 /// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
 /// The longest wait within a recording: longer gaps are shortened to it.
 const MAX_WAIT: Duration = Duration::from_secs(2);
-/// The bytes of a garbled message.
+/// The azimuth before which garbage is sent, and its bytes.
+const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
 
-/// The options of a playback.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Playback {
-    /// Factor of the recorded pace; `None`: as fast as the clients read.
-    pub rate: Option<f64>,
-    /// Scans to play, by their index in the recording.
-    pub scans: Range<usize>,
-    /// Play the recording again and again, its times going on.
-    pub repeats: bool,
-    pub faults: Faults,
-    /// The format of the times.
-    pub clock: ClockFormat,
+/// Returns the sentence about a network that cannot be used.
+pub(crate) fn unserved(error: io::Error) -> String {
+    format!("cannot serve as a radar: {error}")
 }
 
-/// A failure to play a recording as a radar.
-#[derive(Debug, Error)]
-pub enum ServeError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    #[error("cannot serve as a radar: {0}")]
-    Network(#[from] io::Error),
-    #[error(
-        "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
-    )]
-    TooLarge {
-        azimuths: usize,
-        /// Range bins of an azimuth.
-        bins: usize,
-    },
-}
-
-/// The counts of a playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     pub scans: u64,
@@ -76,20 +50,30 @@ pub struct Played {
 
 /// Plays a recording until it has ended or `stop` returns true.
 pub fn serve(
-    audience: Audience,
+    mut output: Output,
     dataset: &mut dyn Dataset,
-    playback: &Playback,
+    scans: Range<usize>,
+    arguments: &RadarServerArguments,
     stop: &dyn Fn() -> bool,
-) -> Result<Played, ServeError> {
-    let first = playback.scans.start;
+) -> Result<Played, Failure> {
+    let first = scans.start;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    let output = Output::open(audience, &radar, playback.faults)?;
+    output.begin(&radar)?;
     let mut player = Player {
         output,
         radar,
-        playback,
+        faults: arguments.faults,
+        rate: arguments.rate.factor(),
+        clock: ClockFormat {
+            // Datagrams always have the network's order.
+            order: match arguments.big_endian || arguments.udp.is_some() {
+                true => ByteOrder::Big,
+                false => ByteOrder::Little,
+            },
+            ..ClockFormat::default()
+        },
         stop,
         message: Vec::new(),
         started: None,
@@ -102,14 +86,14 @@ pub fn serve(
     }
     loop {
         let mut last_ns = 0;
-        for index in playback.scans.clone() {
+        for index in scans.clone() {
             scan.geometry = dataset.read(index, scan.slot())?;
             if !player.play(scan.view()) {
                 return Ok(player.ended());
             }
             last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
         }
-        if !playback.repeats {
+        if !arguments.repeat {
             player.output.close();
             return Ok(player.ended());
         }
@@ -121,33 +105,42 @@ pub fn serve(
 }
 
 /// Returns the radar's description of itself.
-fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, ServeError> {
+fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, Failure> {
     let geometry = scan.geometry;
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);
-    let small =
-        |number: usize| u16::try_from(number).map_err(|_| ServeError::TooLarge { azimuths, bins });
-    let resolution_m = f64::from(geometry.range_resolution_m);
+    let small = |number: usize| {
+        let too_large = |_| {
+            format!(
+                "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
+            )
+        };
+        u16::try_from(number).map_err(too_large)
+    };
+    let rounded = |value: f64| value.round().min(f64::from(u16::MAX)) as u16;
+    let (resolution_m, period_ns) = (
+        geometry.range_resolution_m,
+        dataset.period_ns().max(1) as f64,
+    );
     Ok(Configuration {
         azimuth_samples: small(azimuths)?,
-        bin_size: (resolution_m * 1e4).round().min(f64::from(u16::MAX)) as u16,
+        bin_size: rounded(f64::from(resolution_m) * 1e4),
         range_in_bins: small(bins)?,
         encoder_size: dataset.encoder_counts().unwrap_or(ENCODER_COUNTS),
-        rotation_mhz: (1e12 / dataset.period_ns().max(1) as f64)
-            .round()
-            .min(f64::from(u16::MAX)) as u16,
-        packet_rate: (azimuths as f64 * 1e9 / dataset.period_ns().max(1) as f64)
-            .round()
-            .min(f64::from(u16::MAX)) as u16,
+        rotation_mhz: rounded(1e12 / period_ns),
+        packet_rate: rounded(azimuths as f64 * 1e9 / period_ns),
         range_gain: 1.0,
         range_offset: 0.0,
-        range_resolution_m: Some(geometry.range_resolution_m),
+        range_resolution_m: Some(resolution_m),
     })
 }
 
 struct Player<'a> {
     output: Output,
     radar: Configuration,
-    playback: &'a Playback,
+    faults: Faults,
+    /// Factor of the recorded pace; `None`: as fast as the clients read.
+    rate: Option<f64>,
+    clock: ClockFormat,
     stop: &'a dyn Fn() -> bool,
     message: Vec<u8>,
     /// When the first azimuth was due, and its time in the recording, ns.
@@ -164,11 +157,12 @@ impl Player<'_> {
         if !self.has_client() {
             return false;
         }
-        let faults = self.playback.faults;
-        if faults.stalls(self.played.scans) {
+        let faults = self.faults;
+        let number = self.played.scans;
+        if is_nth(number, faults.stall_every) {
             self.played.stalls += 1;
             self.started = None;
-            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s);
+            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s.clamp(0.0, 3600.0));
             if !sleep_until(due, self.stop) {
                 return false;
             }
@@ -180,8 +174,8 @@ impl Player<'_> {
             self.sweep_counter = self.sweep_counter.wrapping_add(1);
             // A row that was not measured was not sent by the radar either.
             let is_measured = scan.flags[row] & flag::MEASURED != 0;
-            let is_lost =
-                matches!(self.output, Output::Clients(_)) && faults.loses(self.played.scans, row);
+            let is_lost = matches!(self.output, Output::Clients(_))
+                && uniform(number, row as u64) < faults.lost;
             if !is_measured || is_lost {
                 self.played.lost_azimuths += 1;
                 continue;
@@ -189,7 +183,7 @@ impl Player<'_> {
             self.send(&scan, row);
             if let Output::Clients(clients) = &self.output
                 && row == scan.geometry.azimuths / 2
-                && faults.resets(self.played.scans)
+                && is_nth(number, faults.reset_every)
             {
                 self.played.resets += 1;
                 clients.reset();
@@ -212,13 +206,13 @@ impl Player<'_> {
 
     /// Waits for a first client; at the pace of the clients for one after each loss, too.
     fn has_client(&self) -> bool {
-        let waits = self.started.is_none() || self.playback.rate.is_none();
+        let waits = self.started.is_none() || self.rate.is_none();
         !waits || self.output.await_client(self.stop)
     }
 
     /// Waits until an azimuth is due; false on a request to stop.
     fn wait_until_due(&mut self, stamp_ns: i64) -> bool {
-        let Some(rate) = self.playback.rate else {
+        let Some(rate) = self.rate else {
             self.started.get_or_insert((Instant::now(), stamp_ns));
             return true;
         };
@@ -234,12 +228,12 @@ impl Player<'_> {
     }
 
     fn send(&mut self, scan: &PolarScan<'_>, row: usize) {
-        let faults = self.playback.faults;
+        let faults = self.faults;
         let encoder_size = self.radar.encoder_size;
         let turns = f64::from(scan.azimuth_rad[row]) / TAU;
         let encoder = (turns * f64::from(encoder_size)).round() as u16 % encoder_size;
         let stamp_ns = scan.stamp_ns[row] + self.shift_ns;
-        let (seconds, split_seconds) = self.playback.clock.fields(stamp_ns);
+        let (seconds, split_seconds) = self.clock.fields(stamp_ns);
         let azimuth = Azimuth {
             sweep_counter: self.sweep_counter,
             encoder,
@@ -247,7 +241,7 @@ impl Player<'_> {
             split_seconds,
             powers: Powers::Eight(scan.row(row)),
         };
-        if faults.garbles(self.played.scans, row) {
+        if row == GARBLED && is_nth(self.played.scans, faults.garbage_every) {
             self.output.send(GARBAGE);
         }
         match &mut self.output {

@@ -5,17 +5,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use gyre_evaluation::plot::paths_svg;
 use gyre_geometry::Pose;
 use gyre_messages::StageId;
+use gyre_results::figures::{Figure, GROUPS};
 use gyre_terminal::Failure;
 use toml::{Table, Value};
 
 use crate::report::{
-    figures::{Group, Row, groups},
     html::{escaped, png, section, svg},
     subject::{Run, Subject},
 };
 
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
+/// The pictures of a run: title, file and caption.
+#[rustfmt::skip]
+const PICTURES: [[&str; 3]; 3] = [
+    ["Map", "map.png", "Lighter places returned power more often"],
+    ["Errors", "errors.svg", "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion"],
+    ["Uncertainty", "bands.svg", "The error of each pose within three standard deviations that its covariance states"],
+];
 /// Larger maps are left out, bytes.
 const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
@@ -25,32 +32,15 @@ const BAR: f64 = 160.0;
 pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     let names: Vec<&str> = subjects.iter().map(|it| it.name.as_str()).collect();
     let title = names.join(" · ");
-    let groups = groups(subjects);
-    let is_first = |group: &&Group| !LAST.contains(&group.title);
-    let (first, last): (Vec<_>, Vec<_>) = groups.iter().partition(is_first);
+    let [map, errors, bands] = PICTURES.map(|picture| pictures(subjects, picture));
     let body = [
-        section("Figures", &figures(subjects, &first)),
+        section("Figures", &figures(subjects, false)),
         section("Trajectory", &trajectories(subjects)?),
-        pictures(
-            subjects,
-            "Map",
-            "map.png",
-            "Lighter places returned power more often",
-        ),
-        pictures(
-            subjects,
-            "Errors",
-            "errors.svg",
-            "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion",
-        ),
-        pictures(
-            subjects,
-            "Uncertainty",
-            "bands.svg",
-            "The error of each pose within three standard deviations that its covariance states",
-        ),
+        map,
+        errors,
+        bands,
         section("Latency by stage", &latencies(subjects)),
-        section("Counts and versions", &figures(subjects, &last)),
+        section("Counts and versions", &figures(subjects, true)),
         section("Configuration", &configurations(subjects)),
     ];
     Ok(format!(
@@ -66,87 +56,99 @@ pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     ))
 }
 
-/// Returns a table of figures; nothing without any.
-fn figures(subjects: &[Subject], groups: &[&Group]) -> String {
-    if groups.is_empty() {
-        return String::new();
+/// Returns a table of the figures that a subject has, of the last groups or of the others; nothing
+/// without any.
+fn figures(subjects: &[Subject], are_last: bool) -> String {
+    let (columns, mut rows) = (subjects.len() + 1, String::new());
+    let groups = GROUPS.iter();
+    for (title, figures) in groups.filter(|(title, _)| LAST.contains(title) == are_last) {
+        let figures: String = figures
+            .iter()
+            .filter_map(|it| figure(it, subjects))
+            .collect();
+        if !figures.is_empty() {
+            rows += &format!("<tr class=\"group\"><th colspan=\"{columns}\">{title}</th></tr>\n");
+            rows += &figures;
+        }
     }
-    let columns = subjects.len() + 1;
-    let mut rows = head(subjects);
-    for group in groups {
-        let title = group.title;
-        rows += &format!("<tr class=\"group\"><th colspan=\"{columns}\">{title}</th></tr>\n");
-        rows.extend(group.rows.iter().map(figure));
+    let head = head(subjects.iter());
+    match rows.is_empty() {
+        true => rows,
+        false => format!("<div class=\"wide\"><table>\n{head}{rows}</table></div>"),
     }
-    format!("<div class=\"wide\"><table>\n{rows}</table></div>")
+}
+
+/// Returns a row with a figure of all subjects; `None` if none has it. Of errors the smallest is
+/// marked, where there are several.
+fn figure(figure: &Figure, subjects: &[Subject]) -> Option<String> {
+    let values = subjects.iter().map(|it| figure.text(&it.figures));
+    let values: Vec<Option<String>> = values.collect();
+    values.iter().flatten().next()?;
+    let errors = subjects.iter().enumerate();
+    let errors = errors.filter_map(|(place, it)| Some((place, figure.error(&it.figures)?)));
+    let best = errors.min_by(|(_, one), (_, other)| one.total_cmp(other));
+    let best = best.map(|(place, _)| place).filter(|_| subjects.len() > 1);
+    let cell = |(place, value): (usize, &Option<String>)| {
+        let value = escaped(value.as_deref().unwrap_or(""));
+        match best == Some(place) {
+            true => format!("<td class=\"best\">{value}</td>"),
+            false => format!("<td>{value}</td>"),
+        }
+    };
+    let cells: String = values.iter().enumerate().map(cell).collect();
+    Some(format!(
+        "<tr><th>{}</th>{cells}</tr>\n",
+        escaped(figure.name)
+    ))
 }
 
 /// Returns the names of the subjects as a row, where there are several.
-fn head(subjects: &[Subject]) -> String {
+fn head<'a>(subjects: impl ExactSizeIterator<Item = &'a Subject>) -> String {
     if subjects.len() < 2 {
         return String::new();
     }
-    let names = subjects
-        .iter()
-        .map(|it| format!("<th>{}</th>", escaped(&it.name)));
-    format!(
-        "<thead><tr><th></th>{}</tr></thead>\n",
-        names.collect::<String>()
-    )
+    let names = subjects.map(|it| format!("<th>{}</th>", escaped(&it.name)));
+    let names: String = names.collect();
+    format!("<thead><tr><th></th>{names}</tr></thead>\n")
 }
 
-fn figure(row: &Row) -> String {
-    let cell = |(place, value): (usize, &Option<String>)| {
-        let class = match row.best == Some(place) {
-            true => " class=\"best\"",
-            false => "",
-        };
-        format!(
-            "<td{class}>{}</td>",
-            escaped(value.as_deref().unwrap_or(""))
-        )
-    };
-    let cells: String = row.values.iter().enumerate().map(cell).collect();
-    format!("<tr><th>{}</th>{cells}</tr>\n", escaped(row.name))
+fn runs(subjects: &[Subject]) -> impl Iterator<Item = (&Subject, &Run)> {
+    subjects
+        .iter()
+        .filter_map(|it| Some((it, it.run.as_ref()?)))
+}
+
+/// Returns the name of one of several runs as a title.
+fn title_of(subject: &Subject, subjects: &[Subject]) -> String {
+    match subjects.len() {
+        1 => String::new(),
+        _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
+    }
 }
 
 /// Draws all trajectories over the ground truth.
 fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     let truth = subjects.iter().find_map(|it| it.evaluation.as_ref());
     let truth = truth.map(|evaluation| evaluation.matched.truth());
-    let paths: Vec<(&str, Vec<Pose>)> = subjects
-        .iter()
-        .map(|it| (it.name.as_str(), it.drawn()))
-        .collect();
-    Ok(svg(
-        &paths_svg(&paths, truth)?,
-        "Trajectories seen from above",
-    ))
+    let paths = subjects.iter().map(|it| (it.name.as_str(), it.drawn()));
+    let paths: Vec<(&str, Vec<Pose>)> = paths.collect();
+    let drawn = paths_svg(&paths, truth)?;
+    Ok(svg(&drawn, "Trajectories seen from above"))
 }
 
 /// Returns a section with a picture of each run that has it.
-fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> String {
-    let runs = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)));
-    let pictures = runs.filter_map(|(subject, run)| {
+fn pictures(subjects: &[Subject], [title, name, caption]: [&str; 3]) -> String {
+    let pictures = runs(subjects).filter_map(|(subject, run)| {
         let bytes = run.picture(name)?;
         let picture = match str::from_utf8(&bytes) {
             Ok(text) => svg(text, title),
             Err(_) if bytes.len() > LARGEST_MAP => {
-                let path = run.folder.join(name);
-                format!(
-                    "<p>too large for this page: {}</p>",
-                    escaped(&path.display().to_string())
-                )
+                let path = escaped(&run.folder.join(name).display().to_string());
+                format!("<p>too large for this page: {path}</p>")
             }
             Err(_) => png(&bytes, title),
         };
-        let of = match subjects.len() {
-            1 => String::new(),
-            _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
-        };
-        Some(format!("{of}{picture}\n"))
+        Some(format!("{}{picture}\n", title_of(subject, subjects)))
     });
     match pictures.collect::<String>() {
         none if none.is_empty() => none,
@@ -154,19 +156,9 @@ fn pictures(subjects: &[Subject], title: &str, name: &str, caption: &str) -> Str
     }
 }
 
-/// Returns a table of the latencies of each run.
 fn latencies(subjects: &[Subject]) -> String {
-    let runs = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)));
-    let tables = runs.map(|(subject, run)| {
-        let of = match subjects.len() {
-            1 => String::new(),
-            _ => format!("<h3>{}</h3>\n", escaped(&subject.name)),
-        };
-        format!("{of}{}", latency(run))
-    });
-    tables.collect()
+    let table = |(subject, run)| title_of(subject, subjects) + &latency(run);
+    runs(subjects).map(table).collect()
 }
 
 fn latency(run: &Run) -> String {
@@ -210,10 +202,7 @@ fn latency(run: &Run) -> String {
 
 /// Returns the configuration of a run, or the keys that differ between several runs.
 fn configurations(subjects: &[Subject]) -> String {
-    let runs: Vec<(&Subject, &Run)> = subjects
-        .iter()
-        .filter_map(|it| Some((it, it.run.as_ref()?)))
-        .collect();
+    let runs: Vec<(&Subject, &Run)> = runs(subjects).collect();
     match &runs[..] {
         [] => String::new(),
         [(_, run)] => format!(
@@ -225,33 +214,25 @@ fn configurations(subjects: &[Subject]) -> String {
 }
 
 fn differences(runs: &[(&Subject, &Run)]) -> String {
-    let keys: Vec<BTreeMap<String, String>> = runs
-        .iter()
-        .map(|(_, run)| keys(&run.configuration))
-        .collect();
+    let keys = runs.iter().map(|(_, run)| keys(&run.configuration));
+    let keys: Vec<BTreeMap<String, String>> = keys.collect();
     let all: BTreeSet<&String> = keys.iter().flat_map(BTreeMap::keys).collect();
     let differ = |key: &&&String| keys.iter().any(|it| it.get(**key) != keys[0].get(**key));
     let rows = all.iter().filter(differ).map(|key| {
-        let cells = keys.iter().map(|it| {
-            let value = it.get(*key).map_or("", String::as_str);
-            format!("<td>{}</td>", escaped(value))
-        });
-        format!(
-            "<tr><th>{}</th>{}</tr>\n",
-            escaped(key),
-            cells.collect::<String>()
-        )
+        let values = keys
+            .iter()
+            .map(|it| it.get(*key).map_or("", String::as_str));
+        let cells = values.map(|value| format!("<td>{}</td>", escaped(value)));
+        let (key, cells) = (escaped(key), cells.collect::<String>());
+        format!("<tr><th>{key}</th>{cells}</tr>\n")
     });
     let rows: String = rows.collect();
     if rows.is_empty() {
         return "<p>All keys are equal.</p>".to_owned();
     }
-    let names = runs
-        .iter()
-        .map(|(it, _)| format!("<th>{}</th>", escaped(&it.name)));
+    let head = head(runs.iter().map(|(it, _)| *it));
     format!(
-        "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n<thead><tr><th></th>{}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>",
-        names.collect::<String>()
+        "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n{head}<tbody>\n{rows}</tbody></table></div>"
     )
 }
 
@@ -354,10 +335,8 @@ mod tests {
         run(&at("a"), 0.0, "[raster]\nn = 255\ncell_m = 0.8\n");
         run(&at("b"), 2.0, "[raster]\nn = 127\ncell_m = 0.8\n");
         let page = page_of(&[&at("a"), &at("b"), &at("other.tum")], &at("truth.tum"));
-        let row = page
-            .lines()
-            .find(|line| line.contains("ATE, rmse"))
-            .unwrap();
+        let mut lines = page.lines();
+        let row = lines.find(|line| line.contains("ATE, rmse")).unwrap();
         assert!(row.contains("<td class=\"best\">0.000</td>"), "{row}");
         assert_eq!(row.matches("<td").count(), 3, "{row}");
         assert!(page.contains("<tr><th>raster.n</th><td>255</td><td>127</td></tr>"));

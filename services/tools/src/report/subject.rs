@@ -13,9 +13,7 @@ use gyre_results::{SUMMARY, judgement::judge, require_results};
 use gyre_terminal::{Failure, print};
 use serde_json::{Value, json};
 
-/// A run or a trajectory.
 pub struct Subject {
-    /// The name in the page.
     pub name: String,
     /// The errors, where there is a ground truth that fits.
     pub evaluation: Option<Evaluation>,
@@ -23,16 +21,12 @@ pub struct Subject {
     /// The figures, as `summary.json` has them; the errors are those against the common ground
     /// truth.
     pub figures: Value,
-    /// The results that only a run of Gyre has.
     pub run: Option<Run>,
 }
 
-/// The results of a run.
 pub struct Run {
     pub folder: PathBuf,
-    /// `summary.json`.
     pub summary: Value,
-    /// `config.toml`.
     pub configuration: String,
 }
 

@@ -5,21 +5,19 @@ use std::{sync::Arc, thread, time::Duration};
 use gyre_messages::StageId;
 use gyre_run::{Limits, PlayedFault, RADAR_HZ, Scenario};
 use gyre_stage::run::{free_shared_memory, sweep};
+use gyre_terminal::Failure;
 
 use crate::stress::{
-    Report, StressError, TestedPipeline,
-    check::Check,
+    Report, TestedPipeline,
     fault::{self, FaultKind},
     helper::Work,
     pipeline::{Measured, Setup, measure},
-    report::{Figures, ScenarioOutcome, Step, Verdict},
-    search::{Found, Steps, largest, step_duration},
+    report::{Check, Figures, ScenarioOutcome, Verdict},
+    search::{Found, Step, Steps, largest, step_duration},
     witness_fault::{self, WitnessFault},
 };
 
-/// Scans of a burst.
 const BURST: u64 = 3;
-/// Share of the available memory that is taken.
 const MEMORY_SHARE: f64 = 0.9;
 /// Programs that read all topics.
 const OBSERVERS: usize = 8;
@@ -39,9 +37,7 @@ const MOST_HZ: f64 = 1000.0;
 /// The scenarios to carry out, and their options.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The scenarios, in this order.
     pub scenarios: Vec<Scenario>,
-    /// Time for which each is measured.
     pub duration: Duration,
     /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
     pub stages: Vec<StageId>,
@@ -89,7 +85,7 @@ struct Campaign<'a> {
 }
 
 impl Campaign<'_> {
-    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
         match self.scenario {
             Scenario::Ramp => self.ramp(note),
             Scenario::Fleet => self.fleet(note),
@@ -101,25 +97,21 @@ impl Campaign<'_> {
         ScenarioOutcome::new(self.scenario, self.options.duration)
     }
 
-    /// One run.
-    fn single(&self) -> Result<ScenarioOutcome, StressError> {
+    fn single(&self) -> Result<ScenarioOutcome, Failure> {
         if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
-            return Err(StressError::Usage(lacking));
+            return Err(lacking.into());
         }
         let setup = self.setup();
         if setup.faults.is_some() && setup.duration < fault::LEAST {
-            return Err(StressError::TooShort {
-                scenario: self.scenario.name(),
-                least_s: fault::LEAST.as_secs(),
-            });
+            let (scenario, least_s) = (self.scenario, fault::LEAST.as_secs());
+            return Err(format!("{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it").into());
         }
         let mut measured = measure(self.tested, &setup, Arc::new(()))?;
         let (problem, omitted) = (problem(&measured), measured.omitted.take());
-        let figures = measured.figures;
         Ok(ScenarioOutcome {
-            checks: checks(&self.limits, &figures),
+            checks: checks(&self.limits, &measured.figures),
             problem,
-            figures: Some(figures),
+            figures: Some(measured.figures),
             duration_s: setup.duration.as_secs_f64(),
             ..self.empty()
         }
@@ -128,10 +120,18 @@ impl Campaign<'_> {
     }
 
     fn setup(&self) -> Setup {
-        let duration = self.options.duration;
-        let mut setup = Setup::undisturbed(self.scenario, self.scenario.rate_hz(), duration);
-        setup.seed = self.options.seed;
-        match self.scenario {
+        let (scenario, options) = (self.scenario, self.options);
+        let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), options.duration);
+        let faults = |kind| {
+            let all = options.stages.is_empty();
+            let stages = if all {
+                &self.tested.stages
+            } else {
+                &options.stages
+            };
+            Some((kind, stages.clone(), options.seed))
+        };
+        match scenario {
             Scenario::Bursts => {
                 setup.burst = BURST;
                 setup.set.push(format!("source.burst={BURST}"));
@@ -140,17 +140,16 @@ impl Campaign<'_> {
                 let processors = thread::available_parallelism().map_or(1, usize::from);
                 setup.loads = vec![Work::Spin; processors];
             }
-            Scenario::Memory => {
-                setup.memory_share = Some(MEMORY_SHARE);
-            }
+            Scenario::Memory => setup.loads = vec![Work::Memory(MEMORY_SHARE)],
             Scenario::Observers => {
-                setup.observers = OBSERVERS;
+                let out = self.tested.run_out(&setup.name);
+                setup.loads = vec![Work::Observe(out); OBSERVERS];
                 // One place more for this process.
                 setup.set.push(format!("run.observers={}", OBSERVERS + 1));
             }
             Scenario::SlowStage => setup.set.extend(self.slow_stages()),
-            Scenario::Stopped => setup.faults = Some((FaultKind::Stop, self.stages())),
-            Scenario::Kills => setup.faults = Some((FaultKind::Kill, self.stages())),
+            Scenario::Stopped => setup.faults = faults(FaultKind::Stop),
+            Scenario::Kills => setup.faults = faults(FaultKind::Kill),
             _ => self.play_faults(&mut setup),
         }
         setup
@@ -171,28 +170,21 @@ impl Campaign<'_> {
             format!("{{kind='{kind}',from_s={from_s:?},for_s={for_s:?}}}")
         };
         let faults: Vec<String> = setup.played.iter().map(fault).collect();
-        setup
-            .set
-            .push(format!("source.faults=[{}]", faults.join(",")));
+        let faults = faults.join(",");
+        setup.set.push(format!("source.faults=[{faults}]"));
     }
 
-    fn stages(&self) -> Vec<StageId> {
-        match self.options.stages.is_empty() {
-            true => self.tested.stages.clone(),
-            false => self.options.stages.clone(),
-        }
-    }
-
-    fn slow_stages(&self) -> Vec<String> {
+    fn slow_stages(&self) -> impl Iterator<Item = String> {
         let stages = match self.options.stages.as_slice() {
             [] => &[StageId::Masking],
             stages => stages,
         };
         let delay_ms = 1e3 / self.scenario.rate_hz() * SLOWER;
-        let slowed = stages.iter();
-        slowed
-            .map(|stage| format!("stages.{}.delay_ms={delay_ms:.0}", stage.name()))
-            .collect()
+        let delay = move |stage: &StageId| {
+            let name = stage.name();
+            format!("stages.{name}.delay_ms={delay_ms:.0}")
+        };
+        stages.iter().map(delay)
     }
 
     /// The limits of each step: the limits of the budget, else no drop and a p99 of a period.
@@ -209,7 +201,7 @@ impl Campaign<'_> {
         })
     }
 
-    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
         let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
         let most = (MOST_HZ.min(MOST_HZ / self.tested.period.as_secs_f64()) / RADAR_HZ).log2();
         let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
@@ -219,7 +211,7 @@ impl Campaign<'_> {
         Ok(self.found(&found, rate_hz, steps, ("rate_hz", self.limits.rate_hz)))
     }
 
-    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
+    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
         let mut steps = Steps::new("radars", note);
         let passes = |radars| {
             steps.passes(|| match self.lacks_memory(radars) {
@@ -262,29 +254,29 @@ impl Campaign<'_> {
     }
 
     /// Measures so many pipelines at once at a rate: a step of this level.
-    fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, StressError> {
+    fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, Failure> {
         let duration = step_duration(self.options.duration, rate_hz);
-        let setups: Vec<_> = (0..pipelines)
-            .map(|number| Setup {
-                name: format!("{}-{number}", self.scenario),
-                ..Setup::undisturbed(self.scenario, rate_hz, duration)
-            })
-            .collect();
+        let setups = (0..pipelines).map(|number| Setup {
+            name: format!("{}-{number}", self.scenario),
+            ..Setup::undisturbed(self.scenario, rate_hz, duration)
+        });
         let measured: Vec<_> = thread::scope(|scope| {
             let ticket = Arc::new(());
-            let start = |setup| {
+            let start = |setup: Setup| {
                 let ticket = Arc::clone(&ticket);
-                scope.spawn(move || measure(self.tested, setup, ticket))
+                scope.spawn(move || measure(self.tested, &setup, ticket))
             };
-            let running: Vec<_> = setups.iter().map(start).collect();
+            let running: Vec<_> = setups.map(start).collect();
             drop(ticket);
             running.into_iter().map(|it| it.join()).collect()
         });
-        let mut all = Vec::new();
+        let (limits, mut all) = (self.step_limits(), Vec::new());
         for measured in measured {
-            let measured = measured.map_err(|_| StressError::Usage("a thread panicked".to_owned()));
-            match measured? {
-                Ok(measured) => all.push(measured),
+            match measured.map_err(|_| "a thread panicked")? {
+                Ok(measured) => {
+                    let checks = checks(&limits, &measured.figures);
+                    all.push((checks, problem(&measured), measured.figures));
+                }
                 // A machine that cannot even start so many does not carry them.
                 Err(error) if pipelines > 1 || rate_hz > RADAR_HZ => {
                     return Ok(Step::not_started(level, error.to_string()));
@@ -292,70 +284,59 @@ impl Campaign<'_> {
                 Err(error) => return Err(error),
             }
         }
-        let limits = self.step_limits();
-        let judged = all.into_iter().map(|measured| {
-            let problem = problem(&measured);
-            let figures = measured.figures;
-            (checks(&limits, &figures), problem, figures)
-        });
-        Ok(Step::of(level, judged.collect()))
+        Ok(Step::of(level, &all))
     }
 }
 
 /// Returns the reason why a run has failed, whatever its latency.
 fn problem(measured: &Measured) -> Option<String> {
+    let figures = &measured.figures;
     if let Some(said) = &measured.died {
         return Some(format!("the run has ended: {said}"));
     }
-    if let Some(unseen) = measured.figures.latency.counts.omitted() {
+    if let Some(unseen) = figures.latency.counts.omitted() {
         return Some(unseen);
     }
-    let mut faults = measured.figures.faults.iter();
-    let lost = faults.find(|fault| fault.recovery_ms.is_none());
-    let lost = lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage));
+    let mut lost = figures.faults.iter().filter(|it| it.recovery_ms.is_none());
+    if let Some(fault) = lost.next() {
+        return Some(format!("no pose has followed the fault of {}", fault.stage));
+    }
     // A fault that could not be observed is no result about the pipeline.
-    let mut told = measured.figures.witness_faults.iter();
-    lost.or_else(|| match measured.omitted {
-        None => told.find_map(WitnessFault::problem),
+    match measured.omitted {
+        None => figures
+            .witness_faults
+            .iter()
+            .find_map(WitnessFault::problem),
         Some(_) => None,
-    })
+    }
 }
 
-/// Compares the figures of a run with limits.
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
     let latency = &figures.latency.sensor_to_pose;
-    let percentile = |percentile| latency.judged(percentile);
-    let degraded = figures.motions.degraded_percent();
-    let at_most = [
-        ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
-        ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
+    let (drops, degraded) = (figures.drops_percent(), figures.motions.degraded_percent());
+    let (cpu, memory) = (Some(figures.cpu_percent()), Some(figures.memory_mb()));
+    let degraded_limit = limits.degraded_percent.filter(|_| degraded.is_some());
+    let recovery_limit = limits.recovery_ms.filter(|_| figures.had_faults());
+    let of_scans = [
+        ("p50_ms", latency.judged(latency.p50_ms), limits.p50_ms),
+        ("p99_ms", latency.judged(latency.p99_ms), limits.p99_ms),
         ("max_ms", latency.max_ms, limits.max_ms),
-        (
-            "drops_percent",
-            figures.drops_percent(),
-            limits.drops_percent,
-        ),
-        (
-            "cpu_percent",
-            Some(figures.cpu_percent()),
-            limits.cpu_percent,
-        ),
-        ("memory_mb", Some(figures.memory_mb()), limits.memory_mb),
-        (
-            "degraded_percent",
-            degraded,
-            limits.degraded_percent.filter(|_| degraded.is_some()),
-        ),
+        ("drops_percent", drops, limits.drops_percent),
     ];
+    let of_processes = [
+        ("cpu_percent", cpu, limits.cpu_percent),
+        ("memory_mb", memory, limits.memory_mb),
+    ];
+    let degraded = ("degraded_percent", degraded, degraded_limit);
+    let recovery = ("recovery_ms", figures.longest_recovery_ms(), recovery_limit);
     // Without scans only the cost of the processes can be judged.
     let has_scans = figures.latency.counts.due > 0;
-    let recovery = limits.recovery_ms.filter(|_| figures.had_faults());
-    let recovery =
-        recovery.map(|limit| Check::at_most("recovery_ms", figures.longest_recovery_ms(), limit));
-    at_most
-        .into_iter()
-        .filter(|(key, ..)| has_scans || ["cpu_percent", "memory_mb"].contains(key))
-        .filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
-        .chain(recovery)
+    let of_scans = of_scans.into_iter().filter(|_| has_scans);
+    let degraded = Some(degraded).filter(|_| has_scans);
+    let all = of_scans
+        .chain(of_processes)
+        .chain(degraded)
+        .chain([recovery]);
+    all.filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
         .collect()
 }

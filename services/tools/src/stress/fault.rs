@@ -28,7 +28,6 @@ const RETRY_PERIOD: Duration = Duration::from_millis(200);
 /// The shortest measurement that has time for a fault.
 pub const LEAST: Duration = Duration::from_secs(5);
 
-/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultKind {
@@ -38,7 +37,6 @@ pub enum FaultKind {
     Kill,
 }
 
-/// A fault on the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
     pub kind: FaultKind,
@@ -64,26 +62,17 @@ pub struct Faults {
     every_ns: i64,
     /// The stage whose turn it is and whose process was not found.
     sought: Option<StageId>,
-    stopped: Option<Stopped>,
+    /// The process group that is stopped, its fault, and the time for continuing it.
+    stopped: Option<(Pid, (usize, StageId), i64)>,
     done: Vec<Fault>,
     /// Faults by their index in `done` that no pose has followed, with the times of their ends.
     open: Vec<(usize, StageId, i64)>,
 }
 
-#[derive(Debug)]
-struct Stopped {
-    group: Pid,
-    fault: usize,
-    stage: StageId,
-    until_ns: i64,
-}
-
 impl Faults {
-    /// Faults of these stages in `duration` from `began_ns` on.
+    /// Faults of these stages in `duration` from `began_ns` on, in the order of a seed.
     pub fn new(
-        kind: FaultKind,
-        stages: Vec<StageId>,
-        seed: u64,
+        (kind, stages, seed): (FaultKind, Vec<StageId>, u64),
         began_ns: i64,
         duration: Duration,
     ) -> Self {
@@ -108,11 +97,11 @@ impl Faults {
     /// Begins and ends faults that are due.
     pub fn act(&mut self, processes: &mut Sampler) {
         let now_ns = clock::now_ns();
-        if let Some(stopped) = self.stopped.take_if(|stopped| now_ns >= stopped.until_ns) {
+        let is_due = |(_, _, until_ns): &mut (Pid, (usize, StageId), i64)| now_ns >= *until_ns;
+        if let Some((group, (fault, stage), _)) = self.stopped.take_if(is_due) {
             // That it has been killed meanwhile is no error.
-            let _ = kill_process_group(stopped.group, Signal::CONT);
-            self.open
-                .push((stopped.fault, stopped.stage, clock::now_ns()));
+            let _ = kill_process_group(group, Signal::CONT);
+            self.open.push((fault, stage, clock::now_ns()));
         }
         let has_time = now_ns + nanoseconds(STOP + RECOVERY) < self.ends_ns;
         if now_ns < self.next_ns || self.stopped.is_some() || !has_time {
@@ -158,32 +147,21 @@ impl Faults {
             at_s: (now_ns - self.began_ns) as f64 * 1e-9,
             recovery_ms: None,
         });
+        let until_ns = now_ns + nanoseconds(STOP);
         match self.kind {
             FaultKind::Kill => self.open.push((fault, stage, now_ns)),
-            FaultKind::Stop => {
-                self.stopped = Some(Stopped {
-                    group,
-                    fault,
-                    stage,
-                    until_ns: now_ns + nanoseconds(STOP),
-                });
-            }
+            FaultKind::Stop => self.stopped = Some((group, (fault, stage), until_ns)),
         }
         true
     }
 
     /// Returns the reason why the measurement lacks faults of some stages.
-    pub fn omitted(&self) -> Option<String> {
-        match self.sought {
-            Some(stage) => Some(format!(
-                "the process of {} was not found, so nothing was done to it",
-                stage.name()
-            )),
-            None if self.done.is_empty() => {
-                Some("nothing was done to any stage: raise --duration".to_owned())
-            }
-            None => None,
-        }
+    fn omitted(&self) -> Option<String> {
+        let sought = self.sought.map(StageId::name);
+        let not_found = sought
+            .map(|name| format!("the process of {name} was not found, so nothing was done to it"));
+        let nothing = || "nothing was done to any stage: raise --duration".to_owned();
+        not_found.or_else(|| self.done.is_empty().then(nothing))
     }
 
     /// Notes which faults the run has recovered from with this pose.
@@ -205,16 +183,17 @@ impl Faults {
         self.stopped.is_some() || !self.open.is_empty()
     }
 
-    /// Returns all faults. A stopped stage is continued first.
-    pub fn finish(mut self) -> Vec<Fault> {
-        std::mem::take(&mut self.done)
+    /// Returns all faults, and the reason why some are missing. A stopped stage is continued first.
+    pub fn finish(mut self) -> (Vec<Fault>, Option<String>) {
+        let omitted = self.omitted();
+        (std::mem::take(&mut self.done), omitted)
     }
 }
 
 impl Drop for Faults {
     fn drop(&mut self) {
-        if let Some(stopped) = self.stopped.take() {
-            let _ = kill_process_group(stopped.group, Signal::CONT);
+        if let Some((group, ..)) = self.stopped.take() {
+            let _ = kill_process_group(group, Signal::CONT);
         }
     }
 }
@@ -229,7 +208,7 @@ mod tests {
 
     fn faults(kind: FaultKind) -> Faults {
         let stages = vec![StageId::Masking, StageId::Refinement];
-        Faults::new(kind, stages, 7, 0, Duration::from_secs(60))
+        Faults::new((kind, stages, 7), 0, Duration::from_secs(60))
     }
 
     #[test]
@@ -251,11 +230,8 @@ mod tests {
         faults.sought = Some(StageId::Masking);
         let not_found = faults.omitted().unwrap_or_default();
         assert!(not_found.contains("masking was not found"), "{not_found}");
-    }
-
-    #[test]
-    fn the_shortest_measurement_has_time_for_a_fault() {
-        let begun = Faults::new(FaultKind::Stop, vec![StageId::Masking], 0, 0, LEAST);
+        // The shortest measurement has time for a fault.
+        let begun = Faults::new((FaultKind::Stop, vec![StageId::Masking], 0), 0, LEAST);
         assert!(begun.next_ns + nanoseconds(STOP + RECOVERY) < begun.ends_ns);
     }
 
@@ -280,6 +256,6 @@ mod tests {
         pose_at(&mut pose, 1_040_000_000);
         faults.pose(&pose);
         assert!(!faults.are_open());
-        assert_eq!(faults.finish()[0].recovery_ms, Some(45.0));
+        assert_eq!(faults.finish().0[0].recovery_ms, Some(45.0));
     }
 }

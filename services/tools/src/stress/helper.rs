@@ -11,10 +11,11 @@ use std::{
 };
 
 use gyre_stage::run::end_with;
+use gyre_terminal::Failure;
 use rustix::process::Signal;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 
-use crate::stress::{StressError, load};
+use crate::stress::load::{self, Taken};
 
 /// The command of `gyre` that calls [`help`].
 pub const COMMAND: &str = "stress-helper";
@@ -34,10 +35,10 @@ pub enum Work {
 }
 
 /// Does the work of a helper: its arguments are the process that has started it, and the work.
-pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
-    let usage = || StressError::Usage(format!("`gyre {COMMAND}` is what `gyre stress` starts"));
+pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
+    let usage = || format!("`gyre {COMMAND}` is what `gyre stress` starts");
     let [parent, work] = arguments else {
-        return Err(usage());
+        return Err(usage().into());
     };
     let parent = parent.parse().map_err(|_| usage())?;
     let work: Work = serde_json::from_str(work).map_err(|_| usage())?;
@@ -46,19 +47,31 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
         Work::Run(_) => Signal::TERM,
         _ => Signal::KILL,
     };
-    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
-    if !end_with(parent, signal).map_err(refused)? {
-        return Err(StressError::Interrupted);
+    if !end_with(parent, signal)? {
+        return Err("interrupted".into());
     }
     match work {
-        Work::Run(words) => Err(StressError::Start {
-            program: program.display().to_string(),
-            source: Command::new(program).args(words).exec(),
-        }),
+        Work::Run(words) => {
+            let error = Command::new(program).args(words).exec();
+            Err(format!("cannot start `{}`: {error}", program.display()).into())
+        }
         Work::Spin => load::spin(),
         Work::Memory(share) => load::churn(share),
         Work::Observe(out) => load::observe(&out),
     }
+}
+
+/// Starts a helper whose output goes to `output` and `errors`.
+pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
+    let spawned = Command::new(program)
+        .arg(COMMAND)
+        .arg(std::process::id().to_string())
+        .arg(serde_json::to_string(work)?)
+        .stdin(Stdio::null())
+        .stdout(output)
+        .stderr(errors)
+        .spawn();
+    Ok(spawned.map_err(|error| format!("cannot start `{}`: {error}", program.display()))?)
 }
 
 /// A helper process. It is killed when this is dropped.
@@ -66,30 +79,24 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
 pub struct Helper {
     work: Work,
     process: Child,
-    output: BufReader<ChildStdout>,
+    output: Option<BufReader<ChildStdout>>,
 }
 
 impl Helper {
-    /// Starts a helper.
-    pub fn start(program: &Path, work: Work) -> Result<Self, StressError> {
-        let mut command = command(program, &work)?;
-        command.stdin(Stdio::null()).stdout(Stdio::piped());
-        let started = command.spawn().map_err(|source| StressError::Start {
-            program: program.display().to_string(),
-            source,
-        });
-        let mut process = started?;
-        let output = process
-            .stdout
-            .take()
-            .ok_or_else(|| failed(&work, "has no output"))?;
+    /// Starts a helper, and waits until it works.
+    pub fn start(program: &Path, work: Work) -> Result<Self, Failure> {
+        let mut process = spawn(program, &work, Stdio::piped(), Stdio::inherit())?;
+        let output = process.stdout.take().map(BufReader::new);
         let mut helper = Self {
-            output: BufReader::new(output),
+            output,
             work,
             process,
         };
-        helper.await_line(load::READY)?;
-        Ok(helper)
+        let line = helper.read_line()?;
+        match line == load::READY {
+            true => Ok(helper),
+            false => Err(helper.failed(&format!("says `{line}`, not `{}`", load::READY))),
+        }
     }
 
     /// Returns a sentence about a helper that has ended although it should still work.
@@ -98,37 +105,27 @@ impl Helper {
         Some(format!("`{:?}` has ended: {status}", self.work))
     }
 
-    fn read_line(&mut self) -> Result<String, StressError> {
+    fn read_line(&mut self) -> Result<String, Failure> {
         let mut line = String::new();
-        match self.output.read_line(&mut line) {
-            Ok(read) if read > 0 => Ok(line.trim_end().to_owned()),
+        let output = self.output.as_mut();
+        match output.map(|output| output.read_line(&mut line)) {
+            Some(Ok(1..)) => Ok(line.trim_end().to_owned()),
             _ => Err(self.failed("has ended; what it printed says why")),
         }
     }
 
-    /// Reads a result, a line of JSON.
-    pub fn read_result<T: DeserializeOwned>(&mut self) -> Result<T, StressError> {
-        let line = self.read_line()?;
-        serde_json::from_str(&line).map_err(|error| self.failed(&format!("says `{line}`: {error}")))
-    }
-
-    fn await_line(&mut self, expected: &str) -> Result<(), StressError> {
-        let line = self.read_line()?;
-        match line == expected {
-            true => Ok(()),
-            false => Err(self.failed(&format!("says `{line}`, not `{expected}`"))),
+    /// Reads the memory that it has taken; `None` if its work is another one.
+    pub fn taken(&mut self) -> Result<Option<Taken>, Failure> {
+        if !matches!(self.work, Work::Memory(_)) {
+            return Ok(None);
         }
+        let line = self.read_line()?;
+        let taken = serde_json::from_str(&line);
+        taken.map_err(|error| self.failed(&format!("says `{line}`: {error}")))
     }
 
-    fn failed(&self, reason: &str) -> StressError {
-        failed(&self.work, reason)
-    }
-}
-
-fn failed(work: &Work, reason: &str) -> StressError {
-    StressError::Helper {
-        helper: format!("{work:?}"),
-        reason: reason.to_owned(),
+    fn failed(&self, reason: &str) -> Failure {
+        format!("the helper process `{:?}` {reason}", self.work).into()
     }
 }
 
@@ -137,19 +134,4 @@ impl Drop for Helper {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
-}
-
-/// Returns the command of a helper that is a child of this process.
-pub(crate) fn command(program: &Path, work: &Work) -> Result<Command, StressError> {
-    let work = json(work)?;
-    let mut command = Command::new(program);
-    command
-        .arg(COMMAND)
-        .arg(std::process::id().to_string())
-        .arg(work);
-    Ok(command)
-}
-
-fn json(value: &impl Serialize) -> Result<String, StressError> {
-    serde_json::to_string(value).map_err(|error| StressError::Usage(error.to_string()))
 }

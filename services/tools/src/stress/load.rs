@@ -16,9 +16,8 @@ use gyre_stage::{
     observer::{Next, ObservedRun},
 };
 use gyre_supervise::memory::Room;
+use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
-
-use crate::stress::StressError;
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";
@@ -37,20 +36,17 @@ const CACHE_LINE: usize = 64;
 /// Memory that the helper `memory` has taken when the measurement begins.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Taken {
-    /// Memory that it has taken, MB.
     pub taken_mb: f64,
-    /// Memory that was available before, MB.
     pub available_mb: f64,
 }
 
 impl Taken {
     /// Returns the reason why it is no load.
     pub(crate) fn omitted(&self) -> Option<String> {
+        let (available_mb, left_mb) = (self.available_mb, LEFT as f64 * 1e-6);
         (self.taken_mb == 0.0).then(|| {
             format!(
-                "no memory was taken: {:.0} MB are available, and {:.0} MB are always left",
-                self.available_mb,
-                LEFT as f64 * 1e-6
+                "no memory was taken: {available_mb:.0} MB are available, and {left_mb:.0} MB are always left"
             )
         })
     }
@@ -58,26 +54,20 @@ impl Taken {
 
 /// Computes without end.
 pub(super) fn spin() -> ! {
-    say_ready();
+    say(READY);
     let mut number = 1_u64;
     loop {
-        number = black_box(
-            number
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1),
-        );
+        number = black_box(number.wrapping_mul(6_364_136_223_846_793_005));
     }
 }
 
 /// Allocates memory up to this share of the available memory, then frees and allocates pieces of it
 /// without end.
-pub(super) fn churn(share: f64) -> Result<(), StressError> {
+pub(super) fn churn(share: f64) -> Result<(), Failure> {
     // If memory runs out all the same, this process is the one to end.
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
     let least = || Room::now().least();
-    let available = least().ok_or_else(|| {
-        StressError::Usage("the memory that is available is not known".to_owned())
-    })?;
+    let available = least().ok_or("the memory that is available is not known")?;
     let most = (available as f64 * share.clamp(0.0, 0.95)) as u64;
     let mut pieces: Vec<Vec<u8>> = Vec::new();
     let has_room = || least().is_some_and(|left| left > LEFT + PIECE as u64);
@@ -85,11 +75,12 @@ pub(super) fn churn(share: f64) -> Result<(), StressError> {
     while ((pieces.len() * PIECE) as u64) < most && has_room() && began.elapsed() < TAKING {
         pieces.push(piece());
     }
-    say_ready();
-    say_result(&Taken {
+    say(READY);
+    let taken = Taken {
         taken_mb: (pieces.len() * PIECE) as f64 * 1e-6,
         available_mb: available as f64 * 1e-6,
-    })?;
+    };
+    say(&serde_json::to_string(&taken)?);
     loop {
         for taken in &mut pieces {
             *taken = Vec::new();
@@ -117,8 +108,9 @@ fn piece() -> Vec<u8> {
 }
 
 /// Reads all topics of a run until it ends, a byte of each cache line.
-pub(super) fn observe(out: &Path) -> Result<(), StressError> {
-    let root = gyre_stage::run::root_of(&out.canonicalize().map_err(StressError::file(out))?);
+pub(super) fn observe(out: &Path) -> Result<(), Failure> {
+    let unusable = |error| format!("cannot use {}: {error}", out.display());
+    let root = gyre_stage::run::root_of(&out.canonicalize().map_err(unusable)?);
     let followers = [
         follow::<Scan>,
         follow::<Masked>,
@@ -135,13 +127,10 @@ pub(super) fn observe(out: &Path) -> Result<(), StressError> {
     drop(attached);
     // A thread that cannot attach reports this when it is joined.
     if attachments.iter().count() == threads.len() {
-        say_ready();
+        say(READY);
     }
     for thread in threads {
-        match thread.join() {
-            Ok(ended) => ended?,
-            Err(_) => return Err(StressError::Usage("an observer panicked".to_owned())),
-        }
+        thread.join().map_err(|_| "an observer panicked")??;
     }
     Ok(())
 }
@@ -153,32 +142,18 @@ fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageErro
     drop(attached);
     loop {
         match observer.next(Duration::MAX)? {
-            Next::Message(message, _) => drop(black_box(touched(message.values()))),
+            Next::Message(message, _) => {
+                let bytes: &[u8] = message.values();
+                let touched = bytes
+                    .iter()
+                    .step_by(CACHE_LINE)
+                    .map(|byte| u64::from(*byte));
+                black_box(touched.sum::<u64>());
+            }
             Next::Idle => {}
             Next::Ended => return Ok(()),
         }
     }
-}
-
-/// Reads a byte of each cache line.
-fn touched(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .step_by(CACHE_LINE)
-        .map(|byte| u64::from(*byte))
-        .sum()
-}
-
-/// Prints that the work has begun.
-fn say_ready() {
-    say(READY);
-}
-
-/// Prints a result for the process that has started this one.
-fn say_result(result: &impl Serialize) -> Result<(), StressError> {
-    let text = serde_json::to_string(result);
-    say(&text.map_err(|error| StressError::Usage(error.to_string()))?);
-    Ok(())
 }
 
 /// Prints a line for the process that has started this one. That it has ended is noticed by its

@@ -3,29 +3,27 @@
 mod running;
 
 use std::{
-    collections::BTreeMap,
     path::Path,
     sync::{Arc, Weak},
     thread,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, Pose, PoseHeader, StageId, WitnessCounts, flag};
+use gyre_messages::{Footprint, Pose, PoseHeader, StageId};
 use gyre_run::{PlayedFault, Scenario};
 use gyre_stage::{
-    clock,
+    StageError, clock,
     observer::{Next, Observer},
 };
-use serde::Deserialize;
+use gyre_terminal::Failure;
 
 use crate::stress::{
-    StressError,
+    TestedPipeline,
     fault::{FaultKind, Faults},
     helper::{Helper, Work},
     processes::Sampler,
     record::Recorder,
     report::Figures,
-    tested::TestedPipeline,
     witness_fault::{PlayedClock, WitnessFaults},
 };
 
@@ -41,11 +39,8 @@ const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub scenario: Scenario,
-    /// The name of its folder.
     pub name: String,
-    /// Scans a second.
     pub rate_hz: f64,
-    /// Time that is measured.
     pub duration: Duration,
     /// Overrides of the configuration, `section.key=value`.
     pub set: Vec<String>,
@@ -53,16 +48,8 @@ pub struct Setup {
     pub burst: u64,
     /// Helpers that load the machine while it is measured.
     pub loads: Vec<Work>,
-    /// Share of the available memory that a helper takes.
-    pub memory_share: Option<f64>,
-    /// Programs that read all topics.
-    pub observers: usize,
-    /// The fault of these stages.
-    pub faults: Option<(FaultKind, Vec<StageId>)>,
-    /// The faults of the source in its played scans.
+    pub faults: Option<(FaultKind, Vec<StageId>, u64)>,
     pub played: Vec<PlayedFault>,
-    /// For the choice of faults.
-    pub seed: u64,
 }
 
 impl Setup {
@@ -76,16 +63,12 @@ impl Setup {
             set: Vec::new(),
             burst: 1,
             loads: Vec::new(),
-            memory_share: None,
-            observers: 0,
             faults: None,
             played: Vec::new(),
-            seed: 0,
         }
     }
 }
 
-/// A measured run.
 #[derive(Clone, Debug)]
 pub struct Measured {
     pub figures: Figures,
@@ -95,23 +78,6 @@ pub struct Measured {
     pub died: Option<String>,
 }
 
-/// The part of `summary.json` that is read.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Summary {
-    /// Restarts by stage.
-    pub restarts: BTreeMap<String, usize>,
-    pub stages: BTreeMap<String, Counters>,
-}
-
-/// The counters of a stage that are of interest here.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Counters {
-    /// Wake-ups that the transport lost and that were caught late.
-    pub wakes_caught_late: u64,
-}
-
 /// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket:
 /// the measurement begins when each has given up its share of it, after the warm-up or by a
 /// failure.
@@ -119,48 +85,59 @@ pub fn measure(
     tested: &TestedPipeline,
     setup: &Setup,
     ticket: Arc<()>,
-) -> Result<Measured, StressError> {
+) -> Result<Measured, Failure> {
     let held = Arc::downgrade(&ticket);
     let mut run = Running::start(tested, setup)?;
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let (mut loads, taken) = run.load(tested)?;
+    let (mut loads, mut taken) = (Vec::new(), None);
+    for work in &setup.loads {
+        let mut helper = Helper::start(&tested.program, work.clone())?;
+        taken = helper.taken()?.or(taken);
+        loads.push(helper);
+    }
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;
-    let mut session = Session::begin((tested, setup), run.pid(), run.out(), &newest);
+    let mut session = Session::begin((tested, setup), run.pid(), &run.out, &newest);
     let has_ended = session.measure(&mut poses, || run.has_ended())?;
     let ended_load = loads.iter_mut().find_map(Helper::has_died);
     drop(loads);
     let processes = session.processes.costs();
+    let motions = session.recorder.motions;
     let latency = session.recorder.finish(session.period_ns, clock::now_ns());
-    let omitted = session.faults.as_ref().and_then(Faults::omitted);
-    let faults = session.faults.map(Faults::finish).unwrap_or_default();
-    let witness = session.witness.as_ref();
-    let omitted = omitted.or_else(|| witness.and_then(WitnessFaults::omitted));
-    let witness_faults = session.witness.map(WitnessFaults::finish);
+    let faults = session.faults.map(Faults::finish);
+    let (faults, omitted) = faults.unwrap_or_default();
+    let played = session.witness.map(WitnessFaults::finish);
+    let (witness_faults, unplayed) = played.unwrap_or_default();
     let manifest = observed.manifest();
     let shared_bytes = Footprint::new(&manifest.window, &manifest.limits).total() as u64;
     drop(poses);
     drop(observed);
     let died = has_ended.then(|| run.last_words());
     let summary = run.end();
-    let late = summary.stages.into_iter();
-    let late = late.map(|(stage, counters)| (stage, counters.wakes_caught_late));
+    let stages = summary["stages"].as_object().into_iter().flatten();
+    // Wake-ups that the transport lost and that were caught late.
+    let late = stages.filter_map(|(stage, counters)| {
+        let late = counters["wakes_caught_late"].as_u64()?;
+        (late > 0).then(|| (stage.clone(), late))
+    });
+    let wakes_caught_late = late.collect();
+    let ended_load =
+        ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
         omitted: omitted
-            .or_else(|| taken.and_then(|taken| taken.omitted()))
-            .or_else(|| {
-                ended_load.map(|ended| format!("the load was not there all the time: {ended}"))
-            })
+            .or(unplayed)
+            .or_else(|| taken?.omitted())
+            .or(ended_load)
             .or_else(|| latency.counts.omitted()),
         figures: Figures {
             latency,
             faults,
-            witness_faults: witness_faults.unwrap_or_default(),
-            motions: session.motions,
-            restarts: summary.restarts,
-            wakes_caught_late: late.filter(|(_, late)| *late > 0).collect(),
+            witness_faults,
+            motions,
+            restarts: serde_json::from_value(summary["restarts"].clone()).unwrap_or_default(),
+            wakes_caught_late,
             processes,
             shared_bytes,
             taken,
@@ -174,7 +151,7 @@ fn await_others(
     held: &Weak<()>,
     poses: &mut Observer<'_, Pose>,
     newest: &mut PoseHeader,
-) -> Result<(), StressError> {
+) -> Result<(), StageError> {
     loop {
         if drain(poses, TICK, &mut |pose| *newest = *pose)? {
             // It returns at once when the run has ended.
@@ -189,10 +166,9 @@ fn await_others(
 /// Takes the poses that come within `limit`; true if the run has ended.
 fn drain(
     poses: &mut Observer<'_, Pose>,
-    limit: Duration,
+    mut limit: Duration,
     take: &mut dyn FnMut(&PoseHeader),
-) -> Result<bool, StressError> {
-    let mut limit = limit;
+) -> Result<bool, StageError> {
     loop {
         match poses.next(limit)? {
             Next::Message(pose, _) => take(pose.header()),
@@ -209,13 +185,7 @@ struct Session {
     processes: Sampler,
     faults: Option<Faults>,
     witness: Option<WitnessFaults>,
-    /// The basis of the measured motions in the first turn of the recording: where the recording
-    /// starts again, the vehicle jumps.
-    motions: WitnessCounts,
-    turn_end: u64,
-    newest: u64,
     period_ns: i64,
-    began_ns: i64,
     ends_ns: i64,
     sampled: Instant,
 }
@@ -230,30 +200,23 @@ impl Session {
     ) -> Self {
         let began_ns = clock::now_ns();
         let ends_ns = began_ns + setup.duration.as_nanos() as i64;
-        let faults = setup
-            .faults
-            .clone()
-            .map(|(kind, stages)| Faults::new(kind, stages, setup.seed, began_ns, setup.duration));
+        let (faults, turn_end) = (setup.faults.clone(), tested.turn.end as u64);
         let clock = tested.first_ns.map(|first_ns| PlayedClock {
             first_ns,
             period_ns: tested.period.as_nanos() as i64,
             rate: tested.relative_rate(setup.rate_hz),
-            end: tested.turn.end as u64,
+            end: turn_end,
         });
         let clock = clock.filter(|_| !setup.played.is_empty());
-        let witness = clock
-            .map(|clock| WitnessFaults::new(setup.played.clone(), tested.others, clock, began_ns));
-        let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst);
+        let witness =
+            |clock| WitnessFaults::new(setup.played.clone(), tested.others, clock, began_ns);
+        let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst, turn_end);
         recorder.add(newest);
         Self {
             recorder,
             processes: Sampler::new(supervisor, out),
-            faults,
-            witness,
-            motions: WitnessCounts::default(),
-            turn_end: tested.turn.end as u64,
-            newest: newest.item.seq,
-            began_ns,
+            faults: faults.map(|faults| Faults::new(faults, began_ns, setup.duration)),
+            witness: clock.map(witness),
             period_ns: (1e9 / setup.rate_hz) as i64,
             ends_ns,
             sampled: Instant::now(),
@@ -265,7 +228,7 @@ impl Session {
         &mut self,
         poses: &mut Observer<'_, Pose>,
         mut has_ended: impl FnMut() -> bool,
-    ) -> Result<bool, StressError> {
+    ) -> Result<bool, StageError> {
         while !self.is_over() {
             let is_last = drain(poses, TICK, &mut |pose| self.add(pose))?;
             self.poll();
@@ -285,18 +248,6 @@ impl Session {
         if let Some(faults) = &mut self.witness {
             faults.pose(pose);
         }
-        self.count(pose);
-    }
-
-    /// Counts the basis of a motion.
-    fn count(&mut self, pose: &PoseHeader) {
-        let item = &pose.item;
-        let is_new = item.seq > self.newest && !item.is(flag::BREAK);
-        self.newest = self.newest.max(item.seq);
-        let is_measured = (self.began_ns..self.ends_ns).contains(&item.due_ns);
-        if is_new && is_measured && item.scan < self.turn_end {
-            self.motions.add(&pose.motion.refinement);
-        }
     }
 
     fn poll(&mut self) {
@@ -315,10 +266,9 @@ impl Session {
         if now_ns < self.ends_ns {
             return false;
         }
-        let has_all = !self.recorder.owes(self.period_ns);
-        let has_recovered = self.faults.as_ref().is_none_or(|faults| !faults.are_open());
-        let witness = self.witness.as_ref();
-        let has_recovered = has_recovered && witness.is_none_or(|faults| !faults.are_open());
-        (has_all && has_recovered) || now_ns > self.ends_ns + GRACE.as_nanos() as i64
+        let faults = self.faults.as_ref().is_some_and(Faults::are_open);
+        let witness = self.witness.as_ref().is_some_and(WitnessFaults::are_open);
+        let is_owed = self.recorder.owes(self.period_ns) || faults || witness;
+        !is_owed || now_ns > self.ends_ns + GRACE.as_nanos() as i64
     }
 }

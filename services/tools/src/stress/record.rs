@@ -8,7 +8,7 @@ mod distribution;
 
 use std::ops::Range;
 
-use gyre_messages::{Item, PoseHeader, StageId};
+use gyre_messages::{Item, PoseHeader, StageId, WitnessCounts, flag};
 use gyre_run::latency::{Durations, LatencyMeter};
 use serde::Serialize;
 
@@ -20,9 +20,7 @@ const MAX_GAP: u64 = 1 << 20;
 /// Counts of scans within the time that is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Scans that were due.
     pub due: u64,
-    /// Scans with a pose.
     pub posed: u64,
     /// Scans without a pose, including `never`.
     pub dropped: u64,
@@ -36,27 +34,13 @@ pub struct Counts {
 impl Counts {
     /// Returns the reason why the distributions are incomplete: poses were not seen.
     pub fn omitted(&self) -> Option<String> {
-        (self.unseen > 0).then(|| {
-            format!(
-                "{} poses were not seen by the process that measures: the machine was too busy for it",
-                self.unseen
-            )
+        let unseen = self.unseen;
+        (unseen > 0).then(|| {
+            format!("{unseen} poses were not seen by the process that measures: the machine was too busy for it")
         })
     }
 }
 
-/// A scan on the timeline.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Sample {
-    /// The time when the scan was due, s since the measurement began.
-    pub due_s: f64,
-    /// Time from then to its pose, or to the pose that replaced it, ms.
-    pub latency_ms: f64,
-    /// True without a pose of its own.
-    pub dropped: bool,
-}
-
-/// The hop of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hop {
     pub stage: &'static str,
@@ -64,14 +48,11 @@ pub struct Hop {
     pub transport: Option<Distribution>,
     /// From the reception to the start of the work.
     pub wait: Distribution,
-    /// Duration of the work.
     pub work: Distribution,
 }
 
-/// The latency of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLatency {
-    /// Counts of scans.
     pub counts: Counts,
     /// From the time when a scan was due to its pose; a dropped scan counts until the pose that
     /// replaced it.
@@ -80,15 +61,11 @@ pub struct RunLatency {
     pub posed: Distribution,
     /// The figure of a closed loop: from the publication of a scan to its pose.
     pub closed_loop: Distribution,
-    /// Stage by stage.
     pub hops: Vec<Hop>,
-    /// The scans in the order of their due times; written as CSV.
-    #[serde(skip)]
-    pub timeline: Vec<Sample>,
 }
 
 /// Records poses whose scans were due within a time.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Recorder {
     /// `CLOCK_MONOTONIC`, ns.
     window: Range<i64>,
@@ -100,23 +77,22 @@ pub struct Recorder {
     all: Durations,
     posed: Durations,
     closed_loop: Durations,
-    timeline: Vec<Sample>,
+    /// The basis of the motions in the first turn of the recording: where the recording starts
+    /// again, the vehicle jumps.
+    pub motions: WitnessCounts,
+    /// The end of that turn: the number of the first scan that is not in it.
+    turn_end: u64,
 }
 
 impl Recorder {
     /// Records the scans that are due within `window`, `CLOCK_MONOTONIC`, ns. `burst` scans become
     /// due at once.
-    pub fn new(window: Range<i64>, burst: u64) -> Self {
+    pub fn new(window: Range<i64>, burst: u64, turn_end: u64) -> Self {
         Self {
             window,
-            burst: burst.max(1),
-            before: None,
-            counts: Counts::default(),
-            meter: LatencyMeter::default(),
-            all: Durations::default(),
-            posed: Durations::default(),
-            closed_loop: Durations::default(),
-            timeline: Vec::new(),
+            burst,
+            turn_end,
+            ..Self::default()
         }
     }
 
@@ -135,8 +111,11 @@ impl Recorder {
             return;
         }
         self.counts.posed += 1;
-        self.sample(item.due_ns, posed_ns, false);
+        self.sample(item.due_ns, posed_ns);
         self.meter.add(pose);
+        if !item.is(flag::BREAK) && item.scan < self.turn_end {
+            self.motions.add(&pose.motion.refinement);
+        }
         self.posed.add(posed_ns - item.due_ns);
         let published_ns = item.hops[StageId::RadarReplay as usize].published_ns;
         self.closed_loop.add(posed_ns - published_ns);
@@ -156,7 +135,7 @@ impl Recorder {
             let due_ns = self.due_between(before, item, number);
             if self.window.contains(&due_ns) {
                 self.counts.dropped += 1;
-                self.sample(due_ns, posed_ns, true);
+                self.sample(due_ns, posed_ns);
             }
         }
     }
@@ -169,14 +148,9 @@ impl Recorder {
         before.due_ns + ((item.due_ns - before.due_ns) as f64 * share) as i64
     }
 
-    fn sample(&mut self, due_ns: i64, until_ns: i64, dropped: bool) {
+    fn sample(&mut self, due_ns: i64, until_ns: i64) {
         self.counts.due += 1;
         self.all.add(until_ns - due_ns);
-        self.timeline.push(Sample {
-            due_s: (due_ns - self.window.start) as f64 * 1e-9,
-            latency_ms: (until_ns - due_ns) as f64 * 1e-6,
-            dropped,
-        });
     }
 
     /// Returns whether a scan that was due in the time, one each `period_ns`, may still get its
@@ -190,15 +164,14 @@ impl Recorder {
     /// has replaced count until now.
     pub fn finish(mut self, period_ns: i64, now_ns: i64) -> RunLatency {
         let period_ns = period_ns.max(1);
-        let after = self
-            .before
-            .map_or(self.window.start - period_ns, |item| item.due_ns);
+        let before = self.before.map(|item| item.due_ns);
+        let after = before.unwrap_or(self.window.start - period_ns);
         let mut due_ns = after.saturating_add(period_ns);
         while due_ns < self.window.end.min(now_ns) {
             if due_ns >= self.window.start {
                 self.counts.dropped += 1;
                 self.counts.never += 1;
-                self.sample(due_ns, now_ns, true);
+                self.sample(due_ns, now_ns);
             }
             due_ns += period_ns;
         }
@@ -214,7 +187,6 @@ impl Recorder {
             posed: Distribution::of(&self.posed),
             closed_loop: Distribution::of(&self.closed_loop),
             hops: self.meter.stages().map(hop).collect(),
-            timeline: self.timeline,
         }
     }
 }
@@ -227,17 +199,10 @@ mod tests {
 
     /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose
     /// 10 ms later.
-    fn pose(seq: u64, published: u64, due_ms: i64, late_ms: i64) -> PoseHeader {
-        let item = Item {
-            seq,
-            published,
-            due_ns: due_ms * MS,
-            ..Item::default()
-        };
-        let mut pose = PoseHeader {
-            item,
-            ..PoseHeader::default()
-        };
+    fn pose([seq, published]: [u64; 2], due_ms: i64, late_ms: i64) -> PoseHeader {
+        let mut pose = PoseHeader::default();
+        (pose.item.seq, pose.item.published) = (seq, published);
+        pose.item.due_ns = due_ms * MS;
         let published_ns = (due_ms + late_ms) * MS;
         pose.item.hop_mut(StageId::RadarReplay).published_ns = published_ns;
         let sink = pose.item.hop_mut(StageId::PoseIntegration);
@@ -248,9 +213,15 @@ mod tests {
     }
 
     fn recorded(poses: &[PoseHeader], burst: u64, end_ms: i64) -> RunLatency {
-        let mut recorder = Recorder::new(0..end_ms * MS, burst);
+        let mut recorder = Recorder::new(0..end_ms * MS, burst, u64::MAX);
         poses.iter().for_each(|pose| recorder.add(pose));
         recorder.finish(250 * MS, end_ms * MS)
+    }
+
+    /// The counts: due, posed, dropped, never and unseen.
+    fn counts(recorded: &RunLatency) -> [u64; 5] {
+        let it = recorded.counts;
+        [it.due, it.posed, it.dropped, it.never, it.unseen]
     }
 
     fn near(a: Option<f64>, b: f64) -> bool {
@@ -260,37 +231,20 @@ mod tests {
     #[test]
     fn a_source_that_stood_still_shows_although_its_service_time_does_not() {
         // The source stops for a second: scan 2 is published late, scans 3 to 5 are dropped.
-        let poses = [
-            pose(0, 0, 0, 0),
-            pose(1, 1, 250, 0),
-            pose(2, 2, 500, 1000),
-            pose(3, 6, 1500, 10),
-        ];
-        let recorded = recorded(&poses, 1, 1600);
+        let (on_time, late) = ([pose([0, 0], 0, 0), pose([1, 1], 250, 0)], 1000);
+        let after = [pose([2, 2], 500, late), pose([3, 6], 1500, 10)];
+        let recorded = recorded(&[on_time, after].concat(), 1, 1600);
         assert!(near(recorded.sensor_to_pose.max_ms, 1010.0), "{recorded:?}");
         assert!(near(recorded.closed_loop.max_ms, 10.0));
-        assert_eq!((recorded.counts.due, recorded.counts.dropped), (7, 3));
+        assert_eq!(counts(&recorded), [7, 4, 3, 0, 0]);
     }
 
     #[test]
     fn a_dropped_scan_counts_until_the_pose_that_replaces_it() {
-        let poses = [pose(0, 0, 0, 0), pose(1, 4, 1000, 0)];
-        let recorded = recorded(&poses, 1, 1100);
-        let of: Vec<_> = recorded
-            .timeline
-            .iter()
-            .map(|it| (it.due_s, it.latency_ms))
-            .collect();
-        assert_eq!(
-            of,
-            [
-                (0.0, 10.0),
-                (0.25, 760.0),
-                (0.5, 510.0),
-                (0.75, 260.0),
-                (1.0, 10.0)
-            ]
-        );
+        let recorded = recorded(&[pose([0, 0], 0, 0), pose([1, 4], 1000, 0)], 1, 1100);
+        assert_eq!(counts(&recorded), [5, 2, 3, 0, 0]);
+        // 10, 10, 260, 510 and 760 ms.
+        assert!(near(recorded.sensor_to_pose.p50_ms, 260.0));
         assert!(near(recorded.sensor_to_pose.max_ms, 760.0));
         assert!(near(recorded.posed.max_ms, 10.0));
         assert_eq!(recorded.posed.samples, 2);
@@ -299,45 +253,21 @@ mod tests {
     #[test]
     fn scans_of_a_burst_are_due_at_once() {
         // Two bursts of three; of the second one the last alone has a pose.
-        let poses = [pose(0, 2, 0, 0), pose(1, 5, 750, 0)];
-        let recorded = recorded(&poses, 3, 800);
+        let recorded = recorded(&[pose([0, 2], 0, 0), pose([1, 5], 750, 0)], 3, 800);
         assert_eq!(recorded.counts.dropped, 2);
-        assert!(
-            recorded.timeline[1..]
-                .iter()
-                .all(|it| it.latency_ms == 10.0)
-        );
+        assert!(near(recorded.sensor_to_pose.max_ms, 10.0));
     }
 
     #[test]
-    fn scans_without_any_later_pose_count_until_the_end() {
-        let recorded = recorded(&[pose(0, 0, 0, 0)], 1, 1000);
-        assert_eq!((recorded.counts.due, recorded.counts.never), (4, 3));
-        assert!(near(recorded.sensor_to_pose.max_ms, 750.0));
-    }
-
-    #[test]
-    fn poses_outside_the_time_or_sent_again_do_not_count() {
-        let poses = [
-            pose(0, 0, -250, 0),
-            pose(1, 1, 0, 0),
-            pose(1, 1, 0, 0),
-            pose(2, 2, 250, 0),
-        ];
-        let recorded = recorded(&poses, 1, 200);
-        assert_eq!((recorded.counts.due, recorded.counts.posed), (1, 1));
-    }
-
-    #[test]
-    fn a_pose_that_was_missed_is_no_dropped_scan() {
-        let recorded = recorded(&[pose(0, 0, 0, 0), pose(3, 4, 1000, 0)], 1, 1100);
-        let Counts {
-            due,
-            posed,
-            dropped,
-            unseen,
-            ..
-        } = recorded.counts;
-        assert_eq!((due, posed, dropped, unseen), (3, 2, 1, 2));
+    fn scans_count_once_within_the_time_and_until_its_end_without_a_later_pose() {
+        let alone = recorded(&[pose([0, 0], 0, 0)], 1, 1000);
+        assert_eq!(counts(&alone), [4, 1, 3, 3, 0]);
+        assert!(near(alone.sensor_to_pose.max_ms, 750.0));
+        let again = pose([1, 1], 0, 0);
+        let poses = [pose([0, 0], -250, 0), again, again, pose([2, 2], 250, 0)];
+        assert_eq!(counts(&recorded(&poses, 1, 200))[..2], [1, 1]);
+        // A pose that was missed is no dropped scan.
+        let missed = recorded(&[pose([0, 0], 0, 0), pose([3, 4], 1000, 0)], 1, 1100);
+        assert_eq!(counts(&missed), [3, 2, 1, 0, 2]);
     }
 }

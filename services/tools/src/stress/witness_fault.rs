@@ -4,13 +4,12 @@ use gyre_messages::{Basis, PoseHeader, RefinementRecord, StageId, WitnessCounts,
 use gyre_run::{PlayedFault, PlayedFaultKind, Scenario};
 use serde::Serialize;
 
-use crate::stress::tested::{Others, TestedPipeline};
+use crate::stress::{Others, TestedPipeline};
 
 /// The begin of the first fault, s after the stamp of the first scan: twice the warm-up.
 const FROM_S: f64 = 4.0;
 /// Duration of a fault of gyro and wheels, s.
 const FOR_S: f64 = 3.0;
-/// Durations for which the radar is blind, s.
 const BLIND_S: [f64; 3] = [2.0, 5.0, 10.0];
 /// The time after a fault for the recovery of the run, s.
 const AFTER_S: f64 = 4.0;
@@ -26,17 +25,16 @@ pub fn faults(scenario: Scenario) -> Vec<PlayedFault> {
         Scenario::RadarBlind => (PlayedFaultKind::RadarBlind, &BLIND_S[..]),
         _ => return Vec::new(),
     };
-    let mut from_s = FROM_S;
-    let fault = |for_s: &f64| {
-        let fault = PlayedFault {
+    let (mut from_s, mut faults) = (FROM_S, Vec::new());
+    for &for_s in durations {
+        faults.push(PlayedFault {
             kind,
             from_s,
-            for_s: *for_s,
-        };
-        from_s = fault.ends_s() + AFTER_S;
-        fault
-    };
-    durations.iter().map(fault).collect()
+            for_s,
+        });
+        from_s += for_s + AFTER_S;
+    }
+    faults
 }
 
 /// Returns how much of the recording these faults and the recovery from them take, s.
@@ -49,15 +47,13 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
     let faults = faults(scenario);
     let kind = faults.first()?.kind;
     let others = &tested.others;
-    let lacking = match kind {
-        PlayedFaultKind::GyroOut if !others.gyro => Some("a gyro, and gyro.kind is none"),
-        PlayedFaultKind::WheelsSlip if !others.wheels => Some("wheels, and wheels.kind is none"),
-        _ if !others.gyro && !others.wheels => {
-            Some("a gyro or wheels, and gyro.kind and wheels.kind are none")
-        }
-        _ => None,
+    let lacking = match (others.gyro, others.wheels) {
+        (false, _) if kind == PlayedFaultKind::GyroOut => "a gyro, and gyro.kind is none",
+        (_, false) if kind == PlayedFaultKind::WheelsSlip => "wheels, and wheels.kind is none",
+        (false, false) => "a gyro or wheels, and gyro.kind and wheels.kind are none",
+        _ => "",
     };
-    if let Some(lacking) = lacking {
+    if !lacking.is_empty() {
         return Some(format!(
             "{scenario} needs {lacking}: play a recording with its logs beside the scans and set gyro.kind=auto or wheels.kind=auto, or a simulation with simulation.gyro.profile and simulation.wheels.rate_hz"
         ));
@@ -76,23 +72,19 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
 }
 
 /// A fault of gyro, wheels or radar, and how the motions reported it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WitnessFault {
     pub kind: PlayedFaultKind,
     /// The start of the fault, s since the measurement began.
     pub at_s: f64,
-    /// The duration, s.
     pub for_s: f64,
-    /// Motions while it lasted.
     pub motions: u64,
     /// The number of these motions that report the fault.
     pub noticed: u64,
-    /// The basis of these motions.
     pub counts: WitnessCounts,
     /// Time from its end to the first pose of a motion that is as before it, ms; `None`: there was
     /// no such pose before the next fault.
     pub recovery_ms: Option<f64>,
-    /// Way of the vehicle meanwhile, m.
     way_m: f64,
 }
 
@@ -100,38 +92,29 @@ impl WitnessFault {
     fn new(fault: &PlayedFault) -> Self {
         Self {
             kind: fault.kind,
-            at_s: 0.0,
             for_s: fault.for_s,
-            motions: 0,
-            noticed: 0,
-            counts: WitnessCounts::default(),
-            recovery_ms: None,
-            way_m: 0.0,
+            ..Self::default()
         }
     }
 
-    /// Returns the fault in words.
-    pub fn name(&self) -> String {
-        let what = match self.kind {
+    /// Returns the reason why the run has not got over it.
+    pub fn problem(&self) -> Option<String> {
+        let (for_s, motions) = (self.for_s, self.motions);
+        let name = match self.kind {
             PlayedFaultKind::GyroOut => "gyro out",
             PlayedFaultKind::WheelsSlip => "wheels slip",
             PlayedFaultKind::ClockJump => "clock jumps",
             PlayedFaultKind::RadarBlind => "radar blind",
         };
-        format!("{what}, {} s", self.for_s)
-    }
-
-    /// Returns the reason why the run has not got over it.
-    pub fn problem(&self) -> Option<String> {
-        let name = self.name();
-        if self.noticed == 0 {
-            return Some(format!(
-                "nothing has noticed the fault ({name}) in {} motions",
-                self.motions
-            ));
+        match self.recovery_ms {
+            _ if self.noticed == 0 => Some(format!(
+                "nothing has noticed the fault ({name}, {for_s} s) in {motions} motions"
+            )),
+            None => Some(format!(
+                "no motion after the fault ({name}, {for_s} s) was as before it"
+            )),
+            Some(_) => None,
         }
-        let is_over = self.recovery_ms.is_some();
-        (!is_over).then(|| format!("no motion after the fault ({name}) was as before it"))
     }
 }
 
@@ -206,10 +189,9 @@ impl WitnessFaults {
         self.newest = Some(item.seq);
         let (time_s, motion) = (self.clock.time_s(pose), &pose.motion.refinement);
         let others = self.others;
-        if self.faults.first().is_some_and(|it| time_s < it.from_s) {
-            let is_normal = is_normal(self.faults[0].kind, others, motion);
+        if let Some(first) = self.faults.first().filter(|it| time_s < it.from_s) {
             self.before[0] += 1;
-            self.before[1] += u64::from(is_normal);
+            self.before[1] += u64::from(is_normal(first.kind, others, motion));
         }
         // The motion to the first scan after a fault begins within it.
         let period_s = 1e-9 * self.clock.period_ns as f64;
@@ -239,40 +221,31 @@ impl WitnessFaults {
         self.found.iter().any(|fault| fault.recovery_ms.is_none())
     }
 
-    /// Returns the reason why the faults are no result about the pipeline.
-    pub fn omitted(&self) -> Option<String> {
-        match self.before {
-            [0, _] => Some(
-                "the fault came before the measurement had begun: stop other programs".to_owned(),
-            ),
+    /// Returns all faults, and the reason why they are no result about the pipeline.
+    pub fn finish(self) -> (Vec<WitnessFault>, Option<String>) {
+        let stood = |fault: &WitnessFault| {
+            fault.kind == PlayedFaultKind::WheelsSlip && fault.way_m < LEAST_WAY_M
+        };
+        let omitted = match self.before {
+            [0, _] => Some("the fault came before the measurement had begun: stop other programs"),
             [_, 0] => Some(
-                "no motion before the fault was by all that it concerns, so its end cannot be told: see the end of a plain run"
-                    .to_owned(),
+                "no motion before the fault was by all that it concerns, so its end cannot be told: see the end of a plain run",
             ),
-            _ => {
-                let stood = |fault: &WitnessFault| {
-                    fault.kind == PlayedFaultKind::WheelsSlip && fault.way_m < LEAST_WAY_M
-                };
-                self.found.iter().any(stood).then(|| {
-                    "the vehicle stood while its wheels were to slip: play another part of the drive with source.first"
-                        .to_owned()
-                })
-            }
-        }
-    }
-
-    /// Returns all faults.
-    pub fn finish(self) -> Vec<WitnessFault> {
-        self.found
+            _ if self.found.iter().any(stood) => Some(
+                "the vehicle stood while its wheels were to slip: play another part of the drive with source.first",
+            ),
+            _ => None,
+        };
+        (self.found, omitted.map(str::to_owned))
     }
 }
 
+/// Returns whether a motion is by the gyro and by the wheels, as far as the run uses them.
 fn agrees(others: Others, motion: &RefinementRecord) -> [bool; 2] {
     let gyro = !others.gyro || motion.uses_gyro();
     [gyro, !others.wheels || motion.wheels == wheels::USED]
 }
 
-/// Returns whether a motion is as without a fault of this kind.
 fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
     let [gyro, by_wheels] = agrees(others, motion);
     match kind {
@@ -285,15 +258,12 @@ fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -
     }
 }
 
-/// Returns whether a motion reports a fault of this kind.
 fn is_noticed(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
+    let [gyro, by_wheels] = agrees(others, motion);
     match kind {
         PlayedFaultKind::GyroOut => !motion.uses_gyro(),
         PlayedFaultKind::WheelsSlip => motion.wheels == wheels::SLIP,
-        PlayedFaultKind::ClockJump => {
-            let [gyro, by_wheels] = agrees(others, motion);
-            (!others.gyro || !gyro) && (!others.wheels || !by_wheels)
-        }
+        PlayedFaultKind::ClockJump => (!others.gyro || !gyro) && (!others.wheels || !by_wheels),
         PlayedFaultKind::RadarBlind => motion.basis().is_degraded(),
     }
 }

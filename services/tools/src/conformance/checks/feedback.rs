@@ -1,17 +1,17 @@
 //! Masking: the motion of item `seq - lag` comes from `motion`, or after a restart from `pose`. The
 //! stage waits for it, and for no later one, or no scan would be admitted any more.
 
-use gyre_messages::{Masked, Message, Scan};
+use gyre_messages::{Masked, Message, Motion, Scan};
+use gyre_terminal::Failure;
 
-use super::{Examination, stream::starts};
+use super::Examination;
 use crate::conformance::{
-    ProgramError,
     rule::Rule,
     session::{Pace, Session},
 };
 
 impl Examination<'_> {
-    pub(super) fn feedback(&mut self) -> Result<(), ProgramError> {
+    pub(super) fn feedback(&mut self) -> Result<(), Failure> {
         if self.context.test.candidate.manifest.window.lag == 0 {
             return Ok(());
         }
@@ -28,19 +28,15 @@ impl Examination<'_> {
 
     /// A window of scans before the first pose: all motions come from the search, one after the
     /// other.
-    fn motions_of_the_search(&mut self) -> Result<(), ProgramError> {
-        let compensates = self.compensates();
-        let mut session = Session::open(self.context, "motions", &mut self.findings)?;
-        session.pace = Pace::Hold;
-        starts(&mut session)?;
-        session.harness.connect()?;
+    fn motions_of_the_search(&mut self) -> Result<(), Failure> {
+        let (compensates, end) = (self.compensates(), self.context.reference.end());
+        let (mut session, _) = self.begin("motions", Pace::Hold, u64::MAX)?;
         session.findings.checked(Rule::WaitsForMotion);
         let (demands, window) = (session.demands(), session.harness.rig.manifest().window);
-        let lag = window.lag as u64;
-        let scans = (window.scans as u64).min(self.context.reference.end());
+        let (lag, scans) = (window.lag as u64, (window.scans as u64).min(end));
         (0..scans).try_for_each(|seq| session.send_inputs(seq))?;
         for motion in 0..scans.saturating_sub(lag) {
-            session.send_motion(motion)?;
+            session.feed(&[Motion::TOPIC], motion)?;
             let answered = motion + lag;
             let waited = session.wait(demands.item_timeout, |session| session.has(answered))?;
             session.findings.require(Rule::WaitsForMotion, waited.is_done(), || {
@@ -55,20 +51,19 @@ impl Examination<'_> {
                 format!("it sent item {} before the motion of item {} was there: the result depends on which is faster", answered + 1, motion + 1)
             });
         }
-        let all = 0..session.outputs.len();
         let when = "when all motions come from `motion`";
-        session.compare(&self.first_results, all, Rule::WaitsForMotion, when)
+        Ok(session.compare(0.., Rule::WaitsForMotion, when)?)
     }
 
     /// A start in the middle of the stream: the motions up to the newest pose come with the poses
     /// alone.
-    fn motions_of_poses(&mut self) -> Result<(), ProgramError> {
+    fn motions_of_poses(&mut self) -> Result<(), Failure> {
         let reference = self.context.reference;
         let mut session = Session::open(self.context, "poses", &mut self.findings)?;
         let (window, newest) = (session.harness.rig.manifest().window, reference.end() / 2);
         session.restart_inputs(newest)?;
         session.pace = Pace::Hold;
-        starts(&mut session)?;
+        session.starts()?;
         session.harness.connect()?;
         let last = (newest + window.lag as u64).min(newest + window.scans as u64);
         let first = (newest + 1).saturating_sub(window.look_back as u64);
@@ -79,8 +74,7 @@ impl Examination<'_> {
         session.findings.require(Rule::WaitsForMotion, waited.is_done(), || {
             format!("after a restart it has the motions up to item {newest} from `pose`, and sends nothing about item {last}")
         });
-        let all = 0..session.outputs.len();
         let when = "when the motions come with the poses, as after a restart";
-        session.compare(&self.first_results, all, Rule::WaitsForMotion, when)
+        Ok(session.compare(0.., Rule::WaitsForMotion, when)?)
     }
 }

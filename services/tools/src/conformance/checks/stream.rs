@@ -4,10 +4,11 @@
 use std::time::Instant;
 
 use gyre_messages::{StageId, flag};
+use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{
-    ProgramError,
+    Interrupted,
     reference::POLL_PERIOD,
     rule::Rule,
     session::{Pace, Session, Waited},
@@ -15,17 +16,17 @@ use crate::conformance::{
 
 impl Examination<'_> {
     /// Returns whether the program has worked on items, so that more can be tested.
-    pub(super) fn stream(&mut self) -> Result<bool, ProgramError> {
+    pub(super) fn stream(&mut self) -> Result<bool, Failure> {
         let mut session = Session::open(self.context, "stream", &mut self.findings)?;
         let before = session.harness.rig.services();
         session.admit()?;
-        if !starts(&mut session)? {
+        if !session.starts()? {
             return Ok(false);
         }
-        joins(&mut session)?;
-        let has_ended = reaches_the_end(&mut session)?;
+        session.joins()?;
+        let has_ended = session.reaches_the_end()?;
         // It may have subscribed to a feedback since.
-        asks_for_history(&mut session)?;
+        session.asks_for_history()?;
         let services = session.harness.rig.services();
         let created = services.difference(&before).count();
         session
@@ -34,28 +35,33 @@ impl Examination<'_> {
                 format!("it has created {created} services of its own")
             });
         if has_ended {
-            waits_after_the_end(&mut session)?;
+            session.waits_after_the_end()?;
         }
-        gives_history(&mut session)?;
-        begins_with_newest(&mut session);
-        stops(&mut session, "after the end of the stream")?;
-        self.first_results = session.results()?;
+        session.gives_history()?;
+        if session.stage() == StageId::PoseIntegration {
+            let first = session.outputs.first();
+            let is_start = first.is_some_and(|first| first.item().is(flag::BASE | flag::SYNC));
+            session.findings.require(Rule::BeginsWithNewest, is_start, || {
+                "without a journal it has to begin with a pose that has the flags BASE and SYNC: the source and masking wait for it".to_owned()
+            });
+        }
+        session.stops("after the end of the stream")?;
+        let results = session.results()?;
         self.outputs = std::mem::take(&mut session.outputs);
-        Ok(self.first_results.len() > 1)
+        session.findings.first_results = results;
+        Ok(session.findings.first_results.len() > 1)
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
-    pub(super) fn window(&mut self) -> Result<(), ProgramError> {
-        let mut session = Session::open(self.context, "window", &mut self.findings)?;
-        session.pace = Pace::Hold;
-        starts(&mut session)?;
+    pub(super) fn window(&mut self) -> Result<(), Failure> {
+        let end = self.context.reference.end() as usize;
+        let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
         let (demands, scans) = (
             session.demands(),
             session.harness.rig.manifest().window.scans,
         );
-        let window = scans.min(self.context.reference.end() as usize);
-        let has_sent = |session: &Session<'_>| session.outputs.len() >= window;
-        session.wait(demands.item_timeout, has_sent)?;
+        let window = scans.min(end);
+        session.wait(demands.item_timeout, |it| it.outputs.len() >= window)?;
         session.rest(demands.quiet)?;
         let sent = session.outputs.len();
         session
@@ -67,141 +73,121 @@ impl Examination<'_> {
     }
 }
 
-/// Starts the program, and requires that it opens its topic.
-pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ProgramError> {
-    let topic = session.output_topic();
-    let waited = session.start(&session.test.candidate.command)?;
-    let is_open = waited.is_done();
-    session
-        .findings
-        .require(Rule::StartsInTime, is_open, || match &waited {
-            Waited::Died(death) => format!("it has not opened `{topic}`: {death}"),
-            _ => format!("it has not opened `{topic}` within the start timeout"),
-        });
-    Ok(is_open)
-}
-
-/// Requires that it subscribes to its inputs, and the handshake of each.
-fn joins(session: &mut Session<'_>) -> Result<(), ProgramError> {
-    session.findings.checked(Rule::AsksForHistory);
-    session.wait(session.demands().item_timeout, |session| {
-        session.not_read().is_empty()
-    })?;
-    for topic in session.not_read() {
-        let sentence = format!("it has not subscribed to `{topic}`");
-        session.findings.broken(Rule::AsksForHistory, sentence);
+impl Session<'_> {
+    /// Starts the program, and requires that it opens its topic.
+    pub(super) fn starts(&mut self) -> Result<bool, Failure> {
+        let topic = self.output_topic();
+        let waited = self.start(&self.test.candidate.command)?;
+        let is_open = waited.is_done();
+        self.findings
+            .require(Rule::StartsInTime, is_open, || match &waited {
+                Waited::Died(death) => format!("it has not opened `{topic}`: {death}"),
+                _ => format!("it has not opened `{topic}` within the start timeout"),
+            });
+        Ok(is_open)
     }
-    asks_for_history(session)?;
-    Ok(session.harness.connect()?)
-}
 
-/// Requires that it notifies the publisher of each topic that it has subscribed to.
-fn asks_for_history(session: &mut Session<'_>) -> Result<(), ProgramError> {
-    let waited = session.wait(session.demands().item_timeout, |session| {
-        session.not_notified().is_empty()
-    })?;
-    if !waited.is_done() {
-        for topic in session.not_notified() {
+    /// Requires that it subscribes to its inputs, and the handshake of each.
+    fn joins(&mut self) -> Result<(), Failure> {
+        let limit = self.demands().item_timeout;
+        self.findings.checked(Rule::AsksForHistory);
+        self.wait(limit, |session| session.not_read().is_empty())?;
+        for topic in self.not_read() {
+            let sentence = format!("it has not subscribed to `{topic}`");
+            self.findings.broken(Rule::AsksForHistory, sentence);
+        }
+        self.asks_for_history()?;
+        Ok(self.harness.connect()?)
+    }
+
+    /// Requires that it notifies the publisher of each topic that it has subscribed to.
+    fn asks_for_history(&mut self) -> Result<(), Failure> {
+        let limit = self.demands().item_timeout;
+        self.wait(limit, |session| session.not_notified().is_empty())?;
+        for topic in self.not_notified() {
             let sentence = format!(
                 "it has subscribed to `{topic}` without notifying `{topic}_handshake`: it would wait for the history until the next item"
             );
-            session.findings.broken(Rule::AsksForHistory, sentence);
+            self.findings.broken(Rule::AsksForHistory, sentence);
         }
+        Ok(())
     }
-    Ok(())
-}
 
-/// Requires an item for each, and the end.
-fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ProgramError> {
-    let end = session.reference.end();
-    session.findings.checked(Rule::OneForOne);
-    session.findings.checked(Rule::PassesEnd);
-    let waited = session.reach(end)?;
-    let missing: Vec<u64> = (0..end).filter(|seq| !session.has(*seq)).collect();
-    if let Some(first) = missing.first() {
-        let count = missing.len();
-        let why = match waited.is_done() {
-            true => String::new(),
-            false => format!(": {waited}"),
-        };
-        let sentence =
-            format!("it sent nothing about item {first} ({count} of {end} are missing){why}");
-        session.findings.broken(Rule::OneForOne, sentence);
-    }
-    let has_end = session.about(end).any(|last| last.item().is(flag::END));
-    let has_all_but_end = session.newest().map(|newest| newest + 1) >= Some(end);
-    if !has_end && has_all_but_end {
-        let sentence = format!("it has not passed on item {end}, the end of the stream: {waited}");
-        session.findings.broken(Rule::PassesEnd, sentence);
-    }
-    Ok(has_end)
-}
-
-fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ProgramError> {
-    let sent = session.outputs.len();
-    let lives = session.rest(session.demands().quiet)?;
-    session.findings.require(Rule::PassesEnd, lives, || {
-        "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
-            .to_owned()
-    });
-    let more = session.outputs.len() - sent;
-    session.findings.require(Rule::PassesEnd, more == 0, || {
-        format!("it sent {more} more items after the end of the stream")
-    });
-    Ok(())
-}
-
-/// Requires that a reader which comes now receives the newest items.
-fn gives_history(session: &mut Session<'_>) -> Result<(), ProgramError> {
-    let topic = session.output_topic();
-    let history = session.harness.topics.sizes.history;
-    let wanted = history.min(session.outputs.len());
-    let late = session.harness.rig.tap(topic)?;
-    let mut received = 0;
-    let since = Instant::now();
-    while received < wanted && since.elapsed() < session.demands().item_timeout {
-        while late.receive().is_ok_and(|message| message.is_some()) {
-            received += 1;
+    fn reaches_the_end(&mut self) -> Result<bool, Failure> {
+        let end = self.reference.end();
+        self.findings.checked(Rule::OneForOne);
+        self.findings.checked(Rule::PassesEnd);
+        let waited = self.reach(end)?;
+        let missing: Vec<u64> = (0..end).filter(|seq| !self.has(*seq)).collect();
+        if let Some(first) = missing.first() {
+            let count = missing.len();
+            let why = match waited.is_done() {
+                true => String::new(),
+                false => format!(": {waited}"),
+            };
+            let sentence =
+                format!("it sent nothing about item {first} ({count} of {end} are missing){why}");
+            self.findings.broken(Rule::OneForOne, sentence);
         }
-        let rig = &session.harness.rig;
-        if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
-            return Err(ProgramError::Interrupted);
+        let has_end = self.about(end).any(|last| last.item().is(flag::END));
+        let has_all_but_end = self.newest.map(|newest| newest + 1) >= Some(end);
+        if !has_end && has_all_but_end {
+            let sentence =
+                format!("it has not passed on item {end}, the end of the stream: {waited}");
+            self.findings.broken(Rule::PassesEnd, sentence);
         }
+        Ok(has_end)
     }
-    session
-        .findings
-        .require(Rule::GivesHistory, received >= wanted, || {
+
+    fn waits_after_the_end(&mut self) -> Result<(), Failure> {
+        let sent = self.outputs.len();
+        let lives = self.rest(self.demands().quiet)?;
+        self.findings.require(Rule::PassesEnd, lives, || {
+            "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
+                .to_owned()
+        });
+        let more = self.outputs.len() - sent;
+        self.findings.require(Rule::PassesEnd, more == 0, || {
+            format!("it sent {more} more items after the end of the stream")
+        });
+        Ok(())
+    }
+
+    /// Requires that a reader which comes now receives the newest items.
+    fn gives_history(&mut self) -> Result<(), Failure> {
+        let (topic, rig) = (self.output_topic(), &self.harness.rig);
+        let history = self.harness.topics.history(&rig.manifest().window);
+        let wanted = history.min(self.outputs.len());
+        let late = rig.tap(topic)?;
+        let (mut received, since) = (0, Instant::now());
+        while received < wanted && since.elapsed() < self.test.demands.item_timeout {
+            while late.receive().is_ok_and(|message| message.is_some()) {
+                received += 1;
+            }
+            if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
+                return Err(Interrupted.into());
+            }
+        }
+        self.findings.require(Rule::GivesHistory, received >= wanted, || {
             format!("a late reader that notified `{topic}_handshake` received {received} of the last {wanted} items: call update_connections, then notify `{topic}_data`")
         });
-    Ok(())
-}
-
-fn begins_with_newest(session: &mut Session<'_>) {
-    if session.stage() != StageId::PoseIntegration {
-        return;
+        Ok(())
     }
-    let first = session.outputs.first();
-    let is_start = first.is_some_and(|first| first.item().is(flag::BASE | flag::SYNC));
-    session
-        .findings
-        .require(Rule::BeginsWithNewest, is_start, || {
-            "without a journal it has to begin with a pose that has the flags BASE and SYNC: the source and masking wait for it".to_owned()
-        });
-}
 
-/// Sends SIGTERM, and requires the exit code 0.
-pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), ProgramError> {
-    let limit = session.demands().stop_timeout;
-    session.findings.checked(Rule::StopsOnRequest);
-    match session.stop()? {
-        None => session.findings.broken(
-            Rule::StopsOnRequest,
-            format!("it has not exited within {limit:.0?} of SIGTERM {when}"),
-        ),
-        Some(death) if death.code != Some(0) => session
-            .findings
-            .broken(Rule::StopsOnRequest, format!("SIGTERM {when}: {death}")),
-        Some(_) => {}
+    /// Sends SIGTERM, and requires the exit code 0.
+    pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
+        let limit = self.demands().stop_timeout;
+        let breach = match self.stop()? {
+            None => Some(format!(
+                "it has not exited within {limit:.0?} of SIGTERM {when}"
+            )),
+            Some(death) if death.code != Some(0) => Some(format!("SIGTERM {when}: {death}")),
+            Some(_) => None,
+        };
+        self.findings.checked(Rule::StopsOnRequest);
+        if let Some(breach) = breach {
+            self.findings.broken(Rule::StopsOnRequest, breach);
+        }
+        Ok(())
     }
-    Ok(())
 }

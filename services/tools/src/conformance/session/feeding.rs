@@ -1,32 +1,27 @@
 //! The messages that are fed to a process: its inputs as they are admitted, and the feedback of the
 //! rest of the run to its answers.
 
-use gyre_messages::{Message, Motion, Pose, flag};
-use gyre_stage::clock;
+use gyre_messages::{Message, Pose, flag};
+use gyre_stage::{StageError, clock};
 
 use super::{Pace, Session};
-use crate::conformance::{ProgramError, topics::Direction};
 
 impl Session<'_> {
     /// Sends the feedback of the rest of the run to an item.
-    pub(super) fn answered(&mut self, seq: u64) -> Result<(), ProgramError> {
+    pub(super) fn answered(&mut self, seq: u64) -> Result<(), StageError> {
         if self.newest.is_some_and(|newest| seq <= newest) || self.pace == Pace::Hold {
             return Ok(());
         }
         let first = self.newest.map_or(0, |newest| newest + 1);
         self.newest = Some(seq);
         for seq in first..=seq.min(self.reference.end()) {
-            for topic in self.harness.topics.leading(Direction::Feedback) {
-                if let Some(message) = self.reference.get(topic, seq) {
-                    self.harness.feed(topic, message)?;
-                }
-            }
+            self.feed(&self.harness.topics.feedback, seq)?;
         }
         Ok(())
     }
 
     /// Sends the inputs that are admitted now.
-    pub(crate) fn admit(&mut self) -> Result<(), ProgramError> {
+    pub(crate) fn admit(&mut self) -> Result<(), StageError> {
         let last = self.reference.end().min(self.until.saturating_sub(1));
         while self.next <= last && self.is_admitted(self.next) {
             self.send_inputs(self.next)?;
@@ -43,23 +38,29 @@ impl Session<'_> {
     }
 
     /// Sends an item on all topics that lead forward.
-    pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), ProgramError> {
+    pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), StageError> {
         if self.harness.topics.copied().is_some() {
             self.sent_ns.entry(seq).or_insert_with(clock::now_ns);
         }
-        for topic in self.harness.topics.leading(Direction::Forward) {
+        self.feed(&self.harness.topics.forward, seq)?;
+        self.next = seq + 1;
+        Ok(())
+    }
+
+    /// Sends the messages of these topics about an item.
+    pub(crate) fn feed(&self, topics: &[&'static str], seq: u64) -> Result<(), StageError> {
+        for topic in topics {
             if let Some(message) = self.reference.get(topic, seq) {
                 self.harness.feed(topic, message)?;
             }
         }
-        self.next = seq + 1;
         Ok(())
     }
 
     /// Publishes the inputs again as after a restart of all stages: the last poses, and of the
     /// items so far only those that a restarted stage may need. Those after them follow as they are
     /// admitted.
-    pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), ProgramError> {
+    pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), StageError> {
         self.harness.open_feeds()?;
         self.republish_poses(newest_pose)?;
         let look_back = self.harness.rig.manifest().window.look_back as u64;
@@ -69,7 +70,7 @@ impl Session<'_> {
     }
 
     /// Publishes the last poses as the sink does when it starts.
-    fn republish_poses(&mut self, newest: u64) -> Result<(), ProgramError> {
+    fn republish_poses(&mut self, newest: u64) -> Result<(), StageError> {
         let history = Pose::sizes(&self.harness.rig.manifest().window).history as u64;
         for seq in (newest + 1).saturating_sub(history)..=newest {
             let Some(pose) = self.reference.get(Pose::TOPIC, seq) else {
@@ -82,13 +83,5 @@ impl Session<'_> {
             self.harness.feed(Pose::TOPIC, &pose.about(&item))?;
         }
         Ok(())
-    }
-
-    /// Sends the motion of an item as the search does.
-    pub(crate) fn send_motion(&self, seq: u64) -> Result<(), ProgramError> {
-        match self.reference.get(Motion::TOPIC, seq) {
-            Some(motion) => Ok(self.harness.feed(Motion::TOPIC, motion)?),
-            None => Ok(()),
-        }
     }
 }

@@ -10,10 +10,10 @@ use std::{
 use gyre_journal::checkpoint;
 use gyre_messages::StageId;
 use gyre_stage::{StageError, wake::Signals};
-use gyre_supervise::rig::Rig;
+use gyre_supervise::SuperviseError;
 
 use crate::conformance::{
-    Candidate, ProgramError,
+    Candidate, at,
     harness::{Harness, Sent},
 };
 
@@ -24,31 +24,34 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time between two polls of a process that is to exit.
 const POLL_PERIOD: Duration = Duration::from_millis(5);
 
-/// The program of the shadow, and the places of its files.
 pub(crate) struct ShadowProgram {
     /// The program; its manifest is the manifest of the observed run, without its live mode.
     pub candidate: Candidate,
     /// The place for the files of all lives.
     pub folder: PathBuf,
-    /// The file for the output of the program.
     pub output: Option<PathBuf>,
 }
 
 /// A process in a run of its own.
 pub(crate) struct Life<'a> {
     pub harness: Harness<'a>,
-    began: Instant,
-    is_open: bool,
+    pub began: Instant,
+    pub is_open: bool,
 }
 
 impl<'a> Life<'a> {
-    /// Starts the program in a run of its own.
-    pub(crate) fn begin(
-        program: &ShadowProgram,
-        signals: &'a Signals,
-    ) -> Result<Self, ProgramError> {
-        let candidate = &program.candidate;
-        let mut harness = Harness::open(program.rig(signals)?, candidate.stage)?;
+    /// Starts the program in a run of its own, with a copy of the state of the observed run's
+    /// refinement.
+    pub fn begin(program: &ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
+        let (candidate, out) = (&program.candidate, program.folder.join("out"));
+        if out.exists() {
+            fs::remove_dir_all(&out).map_err(at(&out))?;
+        }
+        if candidate.stage == StageId::Refinement {
+            copy_state(&candidate.manifest.out, &out)?;
+        }
+        let rig = candidate.rig(out, signals, true)?;
+        let mut harness = Harness::open(rig, candidate.stage)?;
         harness.start(&candidate.command, &candidate.scheduling)?;
         Ok(Self {
             harness,
@@ -67,16 +70,6 @@ impl<'a> Life<'a> {
         Ok(self.is_open)
     }
 
-    pub(crate) fn is_open(&self) -> bool {
-        self.is_open
-    }
-
-    /// Returns the time since its start.
-    pub(crate) fn age(&self) -> Duration {
-        self.began.elapsed()
-    }
-
-    /// Takes some of its messages.
     pub(crate) fn take(&self) -> Result<Vec<Sent>, StageError> {
         let received = std::iter::from_fn(|| self.harness.receive().transpose());
         received.take(AT_ONCE).collect()
@@ -95,20 +88,8 @@ impl<'a> Life<'a> {
 }
 
 impl ShadowProgram {
-    /// Creates a run of its own, with a copy of the state of the observed run's refinement.
-    fn rig<'a>(&self, signals: &'a Signals) -> Result<Rig<'a>, ProgramError> {
-        let out = self.folder.join("out");
-        if out.exists() {
-            fs::remove_dir_all(&out).map_err(ProgramError::file(&out))?;
-        }
-        if self.candidate.stage == StageId::Refinement {
-            self.copy_state(&out)?;
-        }
-        self.candidate.rig(out, signals, true)
-    }
-
     /// Appends the output of a life of the program to the file for it.
-    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), ProgramError> {
+    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), StageError> {
         let Some(path) = &self.output else {
             return Ok(());
         };
@@ -117,22 +98,19 @@ impl ShadowProgram {
             let file = fs::OpenOptions::new().create(true).append(true).open(path);
             file?.write_all(&printed)
         });
-        appended.map_err(ProgramError::file(path))
+        appended.map_err(at(path))
     }
+}
 
-    /// Copies the state of the run's refinement: a refinement that is restarted or swapped in
-    /// starts with the same state.
-    fn copy_state(&self, out: &Path) -> Result<(), ProgramError> {
-        let from = checkpoint::path(&self.candidate.manifest.out);
-        let to = checkpoint::path(out);
-        let created = gyre_storage::create_folder(to.parent().unwrap_or(out));
-        let copied = created.map_err(|error| error.source);
-        match copied.and_then(|()| fs::copy(&from, to)) {
-            // A replaced refinement need not have one.
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(ProgramError::file(&from)(error))
-            }
-            _ => Ok(()),
-        }
+/// Copies the state of a run's refinement: a refinement that is restarted or swapped in starts with
+/// the same state.
+fn copy_state(run: &Path, out: &Path) -> Result<(), StageError> {
+    let (from, to) = (checkpoint::path(run), checkpoint::path(out));
+    let created = gyre_storage::create_folder(to.parent().unwrap_or(out));
+    let copied = created.map_err(|error| error.source);
+    match copied.and_then(|()| fs::copy(&from, to)) {
+        // A replaced refinement need not have one.
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(at(&from)(error)),
+        _ => Ok(()),
     }
 }

@@ -9,7 +9,7 @@ use gyre_stage::{
 };
 use gyre_supervise::rig::Recorded;
 
-use crate::conformance::topics::{Direction, StageTopics};
+use crate::conformance::topics::StageTopics;
 
 /// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
 /// mode most scans never become an item.
@@ -20,7 +20,6 @@ const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 pub(crate) struct Observed {
     /// The inputs that lead down the stream, by topic.
     pub inputs: Vec<(&'static str, Recorded)>,
-    /// The output of the stage of the run.
     pub output: Recorded,
     /// For masking: the feedback to the items before, without a gap, as far back as it may need.
     pub before: Vec<Feedback>,
@@ -28,12 +27,10 @@ pub(crate) struct Observed {
     pub can_open: bool,
 }
 
-/// The feedback to an earlier item.
 #[derive(Clone, Debug)]
 pub(crate) struct Feedback {
     pub seq: u64,
     breaks: bool,
-    /// The motion as searched.
     pub motion: Recorded,
     pub pose: Recorded,
 }
@@ -77,17 +74,15 @@ pub(crate) struct Observation<'run> {
 }
 
 impl<'run> Observation<'run> {
-    /// Observes the topics of a stage.
     pub(crate) fn of(
         run: &'run ObservedRun,
         stage: StageId,
         stage_topics: &StageTopics,
     ) -> Result<Self, StageError> {
-        let inputs = stage_topics.leading(Direction::Forward);
-        let mut topics: Vec<_> = inputs.chain([stage_topics.output]).collect();
-        let forward = topics.len() - 1;
+        let mut topics = stage_topics.forward.clone();
+        topics.push(stage_topics.output);
         if stage == StageId::Masking {
-            topics.extend(stage_topics.leading(Direction::Feedback));
+            topics.extend(&stage_topics.feedback);
         }
         let mut observers = Vec::new();
         for topic in &topics {
@@ -97,7 +92,7 @@ impl<'run> Observation<'run> {
             run,
             observers,
             topics,
-            forward,
+            forward: stage_topics.forward.len(),
             lag: run.manifest().window.lag as u64,
             incomplete: BTreeMap::new(),
             incomplete_bytes: 0,
@@ -127,7 +122,6 @@ impl<'run> Observation<'run> {
         Ok(complete)
     }
 
-    /// Returns the listeners that the publishers notify.
     pub(crate) fn listeners(&self) -> impl Iterator<Item = &Listener> {
         self.observers.iter().map(|it| it.listener())
     }

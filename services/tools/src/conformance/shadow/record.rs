@@ -6,10 +6,11 @@ use gyre_messages::{Item, StageId};
 use gyre_run::latency::Durations;
 use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
+use gyre_terminal::Failure;
 use serde::Serialize;
 
 use crate::conformance::{
-    ProgramError,
+    at,
     item::work_ns,
     result::{Differences, result_bytes},
 };
@@ -39,15 +40,12 @@ pub struct Counts {
     pub left: u64,
     /// Items that were not seen whole.
     pub missed: u64,
-    /// Gaps of missed items.
     pub gaps: u64,
-    /// Starts of the shadow.
     pub starts: u64,
     /// Ends of the shadow that were not asked for.
     pub deaths: u64,
     /// The number of kills because the program did not start or answer in time.
     pub hangs: u64,
-    /// Breaches of the contract of a stage.
     pub breaches: u64,
 }
 
@@ -58,7 +56,6 @@ pub(crate) struct Times {
     pub real: Durations,
 }
 
-/// All that is recorded.
 pub(crate) struct Record {
     stage: StageId,
     topic: &'static str,
@@ -71,16 +68,6 @@ pub(crate) struct Record {
     pub ends: Vec<String>,
 }
 
-/// A pair of results for an item.
-pub(crate) struct Pair<'a> {
-    /// Of the run.
-    pub real: &'a Recorded,
-    /// Of the shadow, about the same item.
-    pub shadow: &'a Recorded,
-    /// From the shadow's input to its output, ns; `None` if it had more than this item to work on.
-    pub answer_ns: Option<i64>,
-}
-
 /// A row of `shadow.csv`.
 #[derive(Debug, Serialize)]
 struct ComparedItem {
@@ -91,8 +78,8 @@ struct ComparedItem {
     mask_difference: Option<f64>,
     translation_m: Option<f64>,
     rotation_deg: Option<f64>,
-    shadow_work_ms: f64,
-    real_work_ms: f64,
+    shadow_work_ms: Option<f64>,
+    real_work_ms: Option<f64>,
     shadow_answer_ms: Option<f64>,
     real_answer_ms: Option<f64>,
 }
@@ -103,15 +90,12 @@ impl Record {
         stage: StageId,
         topic: &'static str,
         rows: Option<&Path>,
-    ) -> Result<Self, ProgramError> {
-        let rows = rows.map(|path| {
-            let file = File::create(path).map_err(ProgramError::file(path));
-            file.map(csv::Writer::from_writer)
-        });
+    ) -> Result<Self, StageError> {
+        let rows = rows.map(|path| File::create(path).map_err(at(path)));
         Ok(Self {
             stage,
             topic,
-            rows: rows.transpose()?,
+            rows: rows.transpose()?.map(csv::Writer::from_writer),
             counts: Counts::default(),
             differences: Differences::default(),
             work: Times::default(),
@@ -121,37 +105,27 @@ impl Record {
         })
     }
 
-    /// Compares the results for an item.
-    pub(crate) fn compare(&mut self, pair: &Pair<'_>) -> Result<(), ProgramError> {
-        let identical =
-            result_bytes(self.topic, pair.real)? == result_bytes(self.topic, pair.shadow)?;
+    /// Compares the results of the run and of the shadow for an item. `answer_ns`: from the
+    /// shadow's input to its output; `None` if it had more than this item to work on.
+    pub(crate) fn compare(
+        &mut self,
+        real: &Recorded,
+        shadow: &Recorded,
+        answer_ns: Option<i64>,
+    ) -> Result<(), Failure> {
+        let identical = result_bytes(self.topic, real)? == result_bytes(self.topic, shadow)?;
         self.counts.compared += 1;
         self.counts.identical += u64::from(identical);
-        let row = self.row(pair, identical)?;
-        if let Some(rows) = &mut self.rows {
-            rows.serialize(row)?;
-            // At once: a person or a script reads them as they come.
-            rows.flush().map_err(csv::Error::from)?;
-        }
-        Ok(())
-    }
-
-    fn row(&mut self, pair: &Pair<'_>, identical: bool) -> Result<ComparedItem, StageError> {
-        let (real, shadow) = (pair.real.item(), pair.shadow.item());
         let [mask_difference, translation_m, rotation_deg] = match identical {
             true => [None; 3],
-            false => self.differences.add(self.topic, pair.real, pair.shadow)?,
+            false => self.differences.add(self.topic, real, shadow)?,
         };
-        let (shadow_work_ns, real_work_ns) =
-            (work_ns(self.stage, &shadow), work_ns(self.stage, &real));
-        self.work.shadow.add(shadow_work_ns);
-        self.work.real.add(real_work_ns);
-        let answers = pair.answer_ns.zip(self.answer_ns(&real));
-        if let Some((shadow_ns, real_ns)) = answers {
-            self.answer.shadow.add(shadow_ns);
-            self.answer.real.add(real_ns);
-        }
-        Ok(ComparedItem {
+        let (real, shadow) = (real.item(), shadow.item());
+        let work = Some((work_ns(self.stage, &shadow), work_ns(self.stage, &real)));
+        let answers = answer_ns.zip(self.answer_ns(&real));
+        let [shadow_work_ms, real_work_ms] = self.work.add(work);
+        let [shadow_answer_ms, real_answer_ms] = self.answer.add(answers);
+        let row = ComparedItem {
             seq: real.seq,
             scan: real.scan,
             stamp_ns: real.stamp_ns,
@@ -159,11 +133,17 @@ impl Record {
             mask_difference,
             translation_m,
             rotation_deg,
-            shadow_work_ms: ms(shadow_work_ns),
-            real_work_ms: ms(real_work_ns),
-            shadow_answer_ms: answers.map(|(shadow_ns, _)| ms(shadow_ns)),
-            real_answer_ms: answers.map(|(_, real_ns)| ms(real_ns)),
-        })
+            shadow_work_ms,
+            real_work_ms,
+            shadow_answer_ms,
+            real_answer_ms,
+        };
+        if let Some(rows) = &mut self.rows {
+            // At once: a person or a script reads them as they come.
+            let written = rows.serialize(row).and_then(|()| Ok(rows.flush()?));
+            written.map_err(|error| format!("cannot write shadow.csv: {error}"))?;
+        }
+        Ok(())
     }
 
     /// Returns the time from the publication of an item's last input to the publication of the
@@ -175,24 +155,26 @@ impl Record {
         Some(item.hops[stage].published_ns.saturating_sub(before))
     }
 
-    /// Notes a breach of the contract.
     pub(crate) fn breach(&mut self, sentence: String) {
         self.counts.breaches += 1;
         keep(&mut self.breaches, sentence);
     }
+}
 
-    /// Notes the end of the shadow.
-    pub(crate) fn ended(&mut self, sentence: String) {
-        keep(&mut self.ends, sentence);
+impl Times {
+    /// Adds the times of the shadow and of the stage, ns, and returns them in ms.
+    fn add(&mut self, times_ns: Option<(i64, i64)>) -> [Option<f64>; 2] {
+        let Some((shadow_ns, real_ns)) = times_ns else {
+            return [None; 2];
+        };
+        self.shadow.add(shadow_ns);
+        self.real.add(real_ns);
+        [shadow_ns, real_ns].map(|ns| Some(ns as f64 / 1e6))
     }
 }
 
-fn keep(sentences: &mut Vec<String>, sentence: String) {
+pub(crate) fn keep(sentences: &mut Vec<String>, sentence: String) {
     if sentences.len() < SENTENCES {
         sentences.push(sentence);
     }
-}
-
-fn ms(ns: i64) -> f64 {
-    ns as f64 / 1e6
 }

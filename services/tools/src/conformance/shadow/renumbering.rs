@@ -14,7 +14,7 @@
 use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
 
-use super::observation::Observed;
+use super::observation::{Feedback, Observed};
 use crate::conformance::harness::{Harness, start_of_trajectory};
 
 /// The numbers of the shadow's stream.
@@ -28,12 +28,9 @@ pub(crate) struct Renumbering {
     broken_at: Option<u64>,
 }
 
-/// The entry of an item into the stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
-    /// It follows the last one.
     Continues,
-    /// It opens the stream.
     Opens,
     /// It is left out: its result depends on items before, which were not seen.
     IsLeftOut,
@@ -41,10 +38,8 @@ pub(crate) enum Entry {
     NeedsNewLife,
 }
 
-/// An item as it was sent to the shadow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentItem {
-    /// The item of its last input.
     pub item: Item,
     /// True if the item is one that only opens the stream.
     pub opens: bool,
@@ -62,7 +57,6 @@ impl Renumbering {
         }
     }
 
-    /// Returns the entry of an item into the stream.
     pub(crate) fn entry(&self, observed: &Observed) -> Entry {
         match self.last {
             Some((run, _)) if run.checked_add(1) == Some(observed.seq()) => Entry::Continues,
@@ -82,7 +76,6 @@ impl Renumbering {
         }
     }
 
-    /// Sends the inputs of an item.
     pub(crate) fn send(
         &mut self,
         shadow: &Harness<'_>,
@@ -132,23 +125,19 @@ impl Renumbering {
         observed: &Observed,
         number: u64,
     ) -> Result<(), StageError> {
-        let run = observed.seq();
         if self.last.is_none() {
             return send_start(shadow, observed);
         }
-        let mut before = observed.before.iter();
-        let lagged = before.find(|it| self.lag > 0 && it.seq.checked_add(self.lag) == Some(run));
-        let Some(lagged) = lagged else {
+        let run = observed.seq();
+        let is_lagged = |it: &&Feedback| it.seq.checked_add(self.lag) == Some(run);
+        let mut before = observed.before.iter().filter(|_| self.lag > 0);
+        let Some(lagged) = before.find(is_lagged) else {
             return Ok(());
         };
         for (topic, message) in [(Motion::TOPIC, &lagged.motion), (Pose::TOPIC, &lagged.pose)] {
-            let item = Item {
-                seq: number - self.lag,
-                flags: message.item().flags & !flag::SYNC,
-                generation: 0,
-                numbered_from: 0,
-                ..message.item()
-            };
+            let mut item = message.item();
+            (item.seq, item.generation, item.numbered_from) = (number - self.lag, 0, 0);
+            item.flags &= !flag::SYNC;
             shadow.feed(topic, &message.about(&item))?;
         }
         Ok(())
@@ -163,11 +152,8 @@ fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageErro
     let Some(newest) = observed.before.last() else {
         return shadow.feed(Pose::TOPIC, &start_of_trajectory());
     };
-    let item = newest.pose.item();
-    let item = Item {
-        flags: item.flags | flag::SYNC,
-        ..item
-    };
+    let mut item = newest.pose.item();
+    item.flags |= flag::SYNC;
     shadow.feed(Pose::TOPIC, &newest.pose.about(&item))
 }
 
@@ -179,13 +165,8 @@ mod tests {
     use super::*;
 
     fn item(seq: u64, can_open: bool) -> Observed {
-        let header = MaskedHeader {
-            item: Item {
-                seq,
-                ..Item::default()
-            },
-            ..MaskedHeader::default()
-        };
+        let mut header = MaskedHeader::default();
+        header.item.seq = seq;
         Observed {
             inputs: Vec::new(),
             output: Recorded::of::<Masked>(&header, &[], 0),
@@ -194,30 +175,29 @@ mod tests {
         }
     }
 
+    /// Masking does not jump within the lag of a break, and refinement does not jump.
     #[test]
     fn a_stream_is_opened_where_the_results_depend_on_nothing_that_was_not_seen() {
-        let stream = Renumbering::new(StageId::Masking, 2);
-        assert_eq!(stream.entry(&item(7, false)), Entry::IsLeftOut);
-        assert_eq!(stream.entry(&item(7, true)), Entry::Opens);
-        let begun = Renumbering {
-            last: Some((7, 5)),
-            ..stream
-        };
-        assert_eq!(begun.entry(&item(8, false)), Entry::Continues);
-        assert_eq!(begun.entry(&item(9, true)), Entry::Opens);
-    }
-
-    #[test]
-    fn masking_does_not_jump_within_the_lag_of_a_break_and_refinement_not_at_all() {
-        let stream = |stage, broken_at| Renumbering {
-            last: Some((7, 5)),
-            broken_at: Some(broken_at),
-            ..Renumbering::new(stage, 2)
-        };
-        let entry = |stage, broken_at| stream(stage, broken_at).entry(&item(20, true));
-        assert_eq!(entry(StageId::Masking, 4), Entry::NeedsNewLife);
-        assert_eq!(entry(StageId::Masking, 3), Entry::Opens);
-        assert_eq!(entry(StageId::RotationSearch, 5), Entry::Opens);
-        assert_eq!(entry(StageId::Refinement, 0), Entry::NeedsNewLife);
+        use Entry::{Continues, IsLeftOut, NeedsNewLife, Opens};
+        use StageId::{Masking, Refinement, RotationSearch};
+        let begun = Some((7, 5));
+        for (stage, last, broken_at, (seq, can_open), entry) in [
+            (Masking, None, None, (7, false), IsLeftOut),
+            (Masking, None, None, (7, true), Opens),
+            (Masking, begun, None, (8, false), Continues),
+            (Masking, begun, None, (9, true), Opens),
+            (Masking, begun, Some(4), (20, true), NeedsNewLife),
+            (Masking, begun, Some(3), (20, true), Opens),
+            (RotationSearch, begun, Some(5), (20, true), Opens),
+            (Refinement, begun, Some(0), (20, true), NeedsNewLife),
+        ] {
+            let stream = Renumbering {
+                last,
+                broken_at,
+                ..Renumbering::new(stage, 2)
+            };
+            let found = stream.entry(&item(seq, can_open));
+            assert_eq!(found, entry, "{stream:?}");
+        }
     }
 }

@@ -12,32 +12,25 @@ use crate::conformance::Spreads;
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,
-    /// The program and its arguments.
     pub command: Vec<String>,
-    /// The fates of the items.
     pub counts: Counts,
-    /// The differences of the results that are not identical.
     pub differences: Spreads,
     /// From the start of the work on an item to its end.
     pub work: Option<Beside>,
     /// From the publication of an item's input to the publication of its output.
     pub answer: Option<Beside>,
-    /// The first breaches of the contract.
     pub breaches: Vec<String>,
     /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
     pub verdict: Verdict,
 }
 
-/// The verdict on the results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// All compared items have the same bytes.
     Identical,
-    /// Some do not.
     Differs,
-    /// No item was compared.
     Nothing,
 }
 
@@ -45,7 +38,6 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
     pub shadow: Percentiles,
-    /// Of the stage of the run.
     pub real: Percentiles,
 }
 
@@ -72,30 +64,8 @@ impl Report {
     /// Returns whether items were compared, and the program has neither died nor hung nor broken
     /// the contract. Its results may differ.
     pub fn is_sound(&self) -> bool {
-        let Counts {
-            deaths,
-            hangs,
-            breaches,
-            ..
-        } = self.counts;
-        self.verdict != Verdict::Nothing && deaths + hangs + breaches == 0
-    }
-
-    fn words(&self) -> String {
-        let Counts {
-            compared,
-            identical,
-            ..
-        } = self.counts;
-        let stage = self.stage;
-        match self.verdict {
-            Verdict::Identical => format!("{stage}: identical in {compared} items"),
-            Verdict::Differs => {
-                let differing = compared - identical;
-                format!("{stage}: differs in {differing} of {compared} items")
-            }
-            Verdict::Nothing => format!("{stage}: no item was compared"),
-        }
+        let faults = self.counts.deaths + self.counts.hangs + self.counts.breaches;
+        self.verdict != Verdict::Nothing && faults == 0
     }
 }
 
@@ -110,97 +80,65 @@ impl Beside {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.fmt_items(f)?;
-        self.fmt_differences(f)?;
-        for (name, times) in [("work", self.work), ("input to output", self.answer)] {
-            let Some(times) = times else { continue };
-            row_of_times(f, name, "shadow", &times.shadow)?;
-            row_of_times(f, "", "real", &times.real)?;
-        }
-        self.fmt_faults(f)?;
-        write!(f, "{}", self.words())
-    }
-}
-
-impl Report {
-    fn fmt_items(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Counts {
-            observed,
-            compared,
-            opening,
-            skipped,
-            while_starting,
-            unanswered,
-            left,
-            missed,
-            gaps,
-            ..
-        } = self.counts;
-        write!(f, "items           {observed} seen, {compared} compared")?;
+        let (counts, stage) = (&self.counts, self.stage);
+        let (compared, identical) = (counts.compared, counts.identical);
+        let differing = compared - identical;
+        write!(
+            f,
+            "items           {} seen, {compared} compared",
+            counts.observed
+        )?;
         for (count, what) in [
-            (opening, "only to begin with"),
-            (skipped, "skipped since the shadow was behind"),
-            (while_starting, "passed while it started"),
-            (unanswered, "not answered"),
-            (left, "left at the end"),
+            (counts.opening, "only to begin with"),
+            (counts.skipped, "skipped since the shadow was behind"),
+            (counts.while_starting, "passed while it started"),
+            (counts.unanswered, "not answered"),
+            (counts.left, "left at the end"),
         ] {
             if count > 0 {
                 write!(f, ", {count} {what}")?;
             }
         }
-        match missed {
-            0 => writeln!(f),
-            _ => writeln!(f, "; {missed} missed in {gaps} gaps"),
+        match counts.missed {
+            0 => writeln!(f)?,
+            missed => writeln!(f, "; {missed} missed in {} gaps", counts.gaps)?,
         }
-    }
-
-    fn fmt_differences(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Counts {
-            compared,
-            identical,
-            ..
-        } = self.counts;
-        let differing = compared - identical;
         writeln!(
             f,
             "results         {identical} identical, {differing} differ"
         )?;
-        for row in self.differences.rows() {
-            writeln!(f, "  {row}")?;
-        }
-        match differing > 0 && self.differences.are_zero() {
-            true => writeln!(
+        let rows = self.differences.rows();
+        rows.iter().try_for_each(|row| writeln!(f, "  {row}"))?;
+        if differing > 0 && self.differences.are_zero() {
+            writeln!(
                 f,
                 "  they differ in other fields only, as scores and covariances"
-            ),
-            false => Ok(()),
+            )?;
         }
-    }
-
-    fn fmt_faults(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Counts {
-            starts,
-            deaths,
-            hangs,
-            breaches,
-            ..
-        } = self.counts;
+        for (name, times) in [("work", self.work), ("input to output", self.answer)] {
+            let Some(times) = times else { continue };
+            row_of_times(f, name, "shadow", &times.shadow)?;
+            row_of_times(f, "", "real", &times.real)?;
+        }
+        let (starts, deaths, hangs) = (counts.starts, counts.deaths, counts.hangs);
         if starts > 1 || deaths + hangs > 0 {
             writeln!(
                 f,
                 "shadow          started {starts} times, died {deaths} times, hung {hangs} times"
             )?;
         }
-        for sentence in &self.ends {
-            writeln!(f, "  {sentence}")?;
+        self.ends.iter().try_for_each(|it| writeln!(f, "  {it}"))?;
+        if counts.breaches > 0 {
+            writeln!(f, "contract        broken {} times", counts.breaches)?;
         }
-        if breaches > 0 {
-            writeln!(f, "contract        broken {breaches} times")?;
+        self.breaches
+            .iter()
+            .try_for_each(|it| writeln!(f, "  {it}"))?;
+        match self.verdict {
+            Verdict::Identical => write!(f, "{stage}: identical in {compared} items"),
+            Verdict::Differs => write!(f, "{stage}: differs in {differing} of {compared} items"),
+            Verdict::Nothing => write!(f, "{stage}: no item was compared"),
         }
-        for sentence in &self.breaches {
-            writeln!(f, "  {sentence}")?;
-        }
-        Ok(())
     }
 }
 
@@ -210,8 +148,7 @@ fn row_of_times(
     whose: &str,
     times: &Percentiles,
 ) -> fmt::Result {
-    let ms = [times.p50_us, times.p99_us, times.max_us].map(|us| us * 1e-3);
-    let [p50, p99, max] = ms;
+    let [p50, p99, max] = [times.p50_us, times.p99_us, times.max_us].map(|us| us * 1e-3);
     writeln!(
         f,
         "{name:<15} {whose:<6} p50 {p50:.2} ms, p99 {p99:.2} ms, max {max:.2} ms"

@@ -10,19 +10,19 @@ use std::{
 
 use gyre_messages::StageId;
 use gyre_stage::{
-    Listener, clock,
+    Listener, StageError, clock,
     observer::ObservedRun,
     wake::{MAX_WAIT, Signals},
 };
+use gyre_terminal::Failure;
 
 use super::{
     Options,
     life::{Life, ShadowProgram},
     observation::{Observation, Observed},
-    record::Record,
+    record::{Record, keep},
     renumbering::{Entry, Renumbering, SentItem},
 };
-use crate::conformance::ProgramError;
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
 const BACKLOG: usize = 16;
@@ -40,7 +40,6 @@ const MAX_FAILURES: u64 = 3;
 /// Time between two lines about the progress.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
 
-/// A shadow of a stage of a run.
 pub(crate) struct Shadowing<'a> {
     options: &'a Options,
     program: &'a ShadowProgram,
@@ -62,7 +61,6 @@ pub(crate) struct Shadowing<'a> {
     lines: Vec<String>,
 }
 
-/// The item that the shadow has.
 struct UnderWay {
     observed: Observed,
     sent: SentItem,
@@ -79,16 +77,11 @@ impl<'a> Shadowing<'a> {
         run: &'a ObservedRun,
         signals: &'a Signals,
         record: Record,
-    ) -> Result<Self, ProgramError> {
+    ) -> Result<Self, StageError> {
         let now = Instant::now();
         let candidate = &program.candidate;
-        let (topics, out) = (candidate.topics(), &candidate.manifest.out);
-        let command = candidate.command.join(" ");
-        let beside = format!(
-            "`{command}` beside {} of {}",
-            options.stage.name(),
-            out.display()
-        );
+        let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
+        let (command, stage) = (candidate.command.join(" "), options.stage.name());
         Ok(Self {
             options,
             program,
@@ -104,12 +97,12 @@ impl<'a> Shadowing<'a> {
             due: now,
             failures: 0,
             record,
-            lines: vec![beside],
+            lines: vec![format!("`{command}` beside {stage} of {out}")],
         })
     }
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
-    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, ProgramError> {
+    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, Failure> {
         let (began, mut reported) = (Instant::now(), Instant::now());
         loop {
             // Before the poll: the messages before the end are still in the queues.
@@ -117,23 +110,22 @@ impl<'a> Shadowing<'a> {
             self.take(has_ended)?;
             self.attend()?;
             self.lines.drain(..).for_each(|line| observe(&line));
+            let counts = &self.record.counts;
             if reported.elapsed() >= PROGRESS_PERIOD {
                 reported = Instant::now();
-                observe(&self.progress());
+                let (compared, identical) = (counts.compared, counts.identical);
+                let skipped = counts.skipped;
+                observe(&format!(
+                    "{compared} items compared, {identical} identical, {skipped} skipped"
+                ));
             }
-            let is_over = self
-                .options
-                .duration
-                .is_some_and(|it| began.elapsed() >= it);
-            if is_over || self.has_enough() || self.is_done(has_ended) || self.sleep()? {
+            let limits = (self.options.duration, self.options.scans);
+            let is_over = limits.0.is_some_and(|limit| began.elapsed() >= limit);
+            let has_enough = limits.1.is_some_and(|scans| counts.compared >= scans);
+            if is_over || has_enough || self.is_done(has_ended) || self.sleep()? {
                 return self.finish();
             }
         }
-    }
-
-    fn has_enough(&self) -> bool {
-        let compared = self.record.counts.compared;
-        self.options.scans.is_some_and(|scans| compared >= scans)
     }
 
     /// Returns whether nothing more can come: the run has ended and all is answered, or the shadow
@@ -145,30 +137,21 @@ impl<'a> Shadowing<'a> {
         is_given_up || (has_ended && (has_answered || !comes_again))
     }
 
-    fn progress(&self) -> String {
-        let counts = self.record.counts;
-        let (compared, identical, skipped) = (counts.compared, counts.identical, counts.skipped);
-        format!("{compared} items compared, {identical} identical, {skipped} skipped")
-    }
-
-    fn sleep(&self) -> Result<bool, ProgramError> {
+    fn sleep(&self) -> Result<bool, StageError> {
         let rest = REST.saturating_sub(self.taken.elapsed());
-        let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open());
-        let limit = match (rest.is_zero(), is_starting) {
-            (false, _) => rest,
-            (true, true) => STARTING,
-            (true, false) => MAX_WAIT,
-        };
+        let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open);
         let shadow = self.life.iter().map(|life| life.harness.output.listener());
-        let listeners: Vec<&Listener> = match rest.is_zero() {
-            true => shadow.chain(self.observation.listeners()).collect(),
-            false => shadow.collect(),
-        };
-        Ok(self.signals.sleep_until_any(&listeners, limit)?)
+        let mut listeners: Vec<&Listener> = shadow.collect();
+        if !rest.is_zero() {
+            return self.signals.sleep_until_any(&listeners, rest);
+        }
+        listeners.extend(self.observation.listeners());
+        let limit = if is_starting { STARTING } else { MAX_WAIT };
+        self.signals.sleep_until_any(&listeners, limit)
     }
 
     /// Takes the messages of the run, if a poll is due.
-    fn take(&mut self, at_once: bool) -> Result<(), ProgramError> {
+    fn take(&mut self, at_once: bool) -> Result<(), StageError> {
         if !at_once && self.taken.elapsed() < REST {
             return Ok(());
         }
@@ -183,34 +166,34 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Leaves out the items for which the shadow is too late.
-    fn bound_backlog(&mut self) -> Result<(), ProgramError> {
-        let is_full = match self.options.stage {
-            StageId::Refinement if self.life.is_some() => {
-                self.backlog.iter().map(Observed::bytes).sum::<usize>() > BACKLOG_BYTES
-            }
-            _ => self.backlog.len() > BACKLOG,
+    fn bound_backlog(&mut self) -> Result<(), StageError> {
+        let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
+        let bytes = || self.backlog.iter().map(Observed::bytes).sum::<usize>();
+        let is_full = match starts_again {
+            true => bytes() > BACKLOG_BYTES,
+            false => self.backlog.len() > BACKLOG,
         };
         if !is_full {
             return Ok(());
         }
-        let is_open = self.life.as_ref().is_some_and(Life::is_open);
+        let is_open = self.life.as_ref().is_some_and(|life| life.is_open);
+        let counts = &mut self.record.counts;
         // One that starts finds the newest ones.
-        let kept = if is_open { 1 } else { BACKLOG };
+        let (kept, count) = match is_open {
+            true => (1, &mut counts.skipped),
+            false => (BACKLOG, &mut counts.while_starting),
+        };
         let left_out = self.backlog.len().saturating_sub(kept);
         self.backlog.drain(..left_out);
-        let counts = &mut self.record.counts;
-        match is_open {
-            true => counts.skipped += left_out as u64,
-            false => counts.while_starting += left_out as u64,
-        }
-        match self.options.stage {
-            StageId::Refinement if self.life.is_some() => self.end_life(Duration::ZERO),
-            _ => Ok(()),
+        *count += left_out as u64;
+        match starts_again {
+            true => self.end_life(Duration::ZERO),
+            false => Ok(()),
         }
     }
 
     /// Starts the shadow if it is not running, and exchanges messages with it.
-    fn attend(&mut self) -> Result<(), ProgramError> {
+    fn attend(&mut self) -> Result<(), Failure> {
         let Some(life) = &mut self.life else {
             return self.start();
         };
@@ -225,19 +208,19 @@ impl<'a> Shadowing<'a> {
                 .flatten()
                 .try_for_each(|it| self.receive(it))?;
             self.record.counts.deaths += 1;
-            return self.fail(death.to_string());
+            return Ok(self.fail(death.to_string())?);
         }
         if let Some(reason) = self.hangs() {
             self.record.counts.hangs += 1;
-            return self.fail(reason);
+            return Ok(self.fail(reason)?);
         }
-        match is_open {
-            true => self.send(),
-            false => Ok(()),
+        if is_open {
+            self.send()?;
         }
+        Ok(())
     }
 
-    fn start(&mut self) -> Result<(), ProgramError> {
+    fn start(&mut self) -> Result<(), Failure> {
         // A refinement begins with a copy of the state after its first item, which has to be there.
         let waits = self.options.stage == StageId::Refinement && self.backlog.is_empty();
         if waits || Instant::now() < self.due {
@@ -256,9 +239,9 @@ impl<'a> Shadowing<'a> {
     fn hangs(&self) -> Option<String> {
         let life = self.life.as_ref()?;
         let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);
-        if !life.is_open() {
+        if !life.is_open {
             let topic = self.topic;
-            return (life.age() > start)
+            return (life.began.elapsed() > start)
                 .then(|| format!("it has not opened `{topic}` within {start:.0?}"));
         }
         let under_way = self.under_way.as_ref()?;
@@ -267,19 +250,18 @@ impl<'a> Shadowing<'a> {
             .then(|| format!("it has not answered item {seq} within {item_timeout:.0?}"))
     }
 
-    /// Ends a life that has failed.
-    fn fail(&mut self, sentence: String) -> Result<(), ProgramError> {
+    fn fail(&mut self, sentence: String) -> Result<(), StageError> {
         self.failures += 1;
         let again = match self.failures >= MAX_FAILURES {
             true => "it is not started again",
             false => "it is started again",
         };
         self.lines.push(format!("{sentence}; {again}"));
-        self.record.ended(sentence);
+        keep(&mut self.record.ends, sentence);
         self.end_life(BACKOFF)
     }
 
-    fn end_life(&mut self, backoff: Duration) -> Result<(), ProgramError> {
+    fn end_life(&mut self, backoff: Duration) -> Result<(), StageError> {
         self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
         self.unanswerable = None;
         self.due = Instant::now() + backoff;
@@ -290,7 +272,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Sends the next items: one that has to be answered, and those before it.
-    fn send(&mut self) -> Result<(), ProgramError> {
+    fn send(&mut self) -> Result<(), StageError> {
         while self.under_way.is_none()
             && let Some(observed) = self.backlog.pop_front()
         {
@@ -327,7 +309,7 @@ impl<'a> Shadowing<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<Record, ProgramError> {
+    fn finish(mut self) -> Result<Record, Failure> {
         let counts = &mut self.record.counts;
         counts.left += self.backlog.len() as u64 + u64::from(self.under_way.is_some());
         if let Some(mut life) = self.life.take() {

@@ -1,7 +1,5 @@
 //! Counts of found, lost and skipped scans.
 
-use std::fmt::Write;
-
 use gyre_slam::localisation::Status;
 use serde::Serialize;
 
@@ -70,27 +68,28 @@ impl Counts {
             Some((scan, after_s)) => format!("first fix: scan {scan}, after {after_s:.1} s"),
             None => "no scan was found in the map".to_owned(),
         };
-        let (scans, fixes) = (self.scans(), self.found + self.tracked);
-        let _ = write!(
-            text,
-            "\n{fixes} of {scans} scans localised ({:.1} %): {} found, {} tracked; {} predicted, {} lost",
-            100.0 * fixes as f64 / scans.max(1) as f64,
-            self.found,
-            self.tracked,
-            self.predicted,
-            self.lost
-        );
+        let Self {
+            found,
+            tracked,
+            predicted,
+            lost,
+            ..
+        } = self;
+        let (scans, fixes) = (self.scans(), found + tracked);
+        let percent = 100.0 * fixes as f64 / scans.max(1) as f64;
+        text += &format!("\n{fixes} of {scans} scans localised ({percent:.1} %): ");
+        text += &format!("{found} found, {tracked} tracked; {predicted} predicted, {lost} lost");
         if left_out > 0 {
-            let _ = write!(text, "; {left_out} more could not be used");
+            text += &format!("; {left_out} more could not be used");
         }
         if !self.spans.is_empty() {
             let span = |(first, last): &(usize, usize)| format!("{first} to {last}");
             let spans: Vec<String> = self.spans.iter().take(LISTED).map(span).collect();
-            let more = match self.spans.len().checked_sub(LISTED) {
-                None | Some(0) => String::new(),
-                Some(more) => format!(" and {more} more times"),
-            };
-            let _ = write!(text, "\nlost: scans {}{more}", spans.join(", "));
+            text += &format!("\nlost: scans {}", spans.join(", "));
+            let more = self.spans.len().saturating_sub(LISTED);
+            if more > 0 {
+                text += &format!(" and {more} more times");
+            }
         }
         text
     }
@@ -116,15 +115,9 @@ mod tests {
             4 of 8 scans localised (50.0 %): 2 found, 2 tracked; 1 predicted, 3 lost; 1 more could not be used\n\
             lost: scans 0 to 1, 5 to 5";
         assert_eq!(counts(&drive).summary(1), expected);
-    }
-
-    #[test]
-    fn a_drive_elsewhere_was_not_found() {
         let elsewhere = counts(&[Status::Lost; 3]);
         assert!(!elsewhere.has_fix());
-        let summary = elsewhere.summary(0);
-        assert!(
-            summary.starts_with("no scan was found in the map\n0 of 3 scans localised (0.0 %)")
-        );
+        let none = "no scan was found in the map\n0 of 3 scans localised (0.0 %)";
+        assert!(elsewhere.summary(0).starts_with(none));
     }
 }

@@ -13,28 +13,26 @@ use gyre_terminal::{Failure, print};
 /// The scans of a recording, one after the other.
 pub struct Scans {
     dataset: Box<dyn Dataset>,
-    played: Range<usize>,
+    /// The scans that are left.
+    pub played: Range<usize>,
     odometry: Odometry,
     scan: OwnedScan,
     samples: ScanSamples,
-    left_out: usize,
+    /// Scans that could not be used.
+    pub left_out: usize,
     /// Scans in a row that were left out, and the most that may be.
     unreadable: usize,
     max_unreadable: usize,
 }
 
-/// A scan with its motion.
 pub struct RegisteredScan<'a> {
-    /// The number in the recording.
     pub number: usize,
-    /// The observation for the localisation.
     pub observation: Observation<'a>,
     /// The chain of motions starts with it: nothing is known of the motion since the scan before.
     pub starts: bool,
 }
 
 impl Scans {
-    /// Opens the scans that a configuration plays.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let played = gyre_configuration::open(configuration)?;
         let dataset = played.dataset;
@@ -51,21 +49,6 @@ impl Scans {
             max_unreadable: configuration.source.max_unreadable,
             dataset,
         })
-    }
-
-    /// Returns the number of scans that are left.
-    pub fn len(&self) -> usize {
-        self.played.len()
-    }
-
-    /// Returns whether no scan is left.
-    pub fn is_empty(&self) -> bool {
-        self.played.is_empty()
-    }
-
-    /// Returns the number of scans that could not be used.
-    pub fn left_out(&self) -> usize {
-        self.left_out
     }
 
     /// Registers the next scan that can be read; `None` after the last one.
@@ -117,7 +100,7 @@ impl Scans {
         probes: usize,
         mut is_found: impl FnMut(&Observation<'_>) -> bool,
     ) -> Result<bool, Failure> {
-        let step = self.len().div_ceil(probes).max(1);
+        let step = self.played.len().div_ceil(probes).max(1);
         for number in self.played.clone().skip(step / 2).step_by(step) {
             self.odometry.restart();
             self.played = number.saturating_sub(1)..number + 1;
@@ -134,11 +117,8 @@ impl Scans {
         self.left_out += 1;
         self.unreadable += 1;
         if self.unreadable > self.max_unreadable {
-            return Err(format!(
-                "{} scans in a row cannot be used (source.max_unreadable), the last one: {reason}",
-                self.unreadable
-            )
-            .into());
+            let scans = self.unreadable;
+            return Err(format!("{scans} scans in a row cannot be used (source.max_unreadable), the last one: {reason}").into());
         }
         print::note(format_args!("left out: {reason}"));
         Ok(())

@@ -14,27 +14,21 @@ pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Fai
     let drawn = gyre_mapping::Map::open(path)?;
     let map = Map::open(path)
         .map_err(|error| format!("{} cannot be localised in: {error}", path.display()))?;
-    if map.keyframes().len() != drawn.keyframes() {
-        return Err(format!(
-            "{} was drawn from {} keyframes and keeps {}: draw the map again with gyre map",
-            path.display(),
-            drawn.keyframes(),
-            map.keyframes().len()
-        )
-        .into());
+    let (path, drawn, kept) = (path.display(), drawn.keyframes(), map.keyframes().len());
+    if kept != drawn {
+        return Err(format!("{path} was drawn from {drawn} keyframes and keeps {kept}: draw the map again with gyre map").into());
     }
     plan(map, configuration)
 }
 
-/// Plans localisation in a map.
 pub fn plan(map: Map, configuration: &Configuration) -> Result<Localiser, Failure> {
     let odometry = &configuration.odometry;
-    if odometry.points.capacity == 0 {
+    let capacity = odometry.points.capacity;
+    if capacity == 0 {
         return Err(
             "points.capacity is 0, but scans are localised by their points: it must be 1 or more"
                 .into(),
         );
     }
-    let capacity = odometry.points.capacity;
     Ok(Localiser::new(map, &odometry.refinement, capacity)?)
 }

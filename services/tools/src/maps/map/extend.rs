@@ -5,8 +5,7 @@ use std::{fs, path::Path};
 use gyre_geometry::Pose;
 use gyre_mapping::Drawing;
 use gyre_results::{Content, Out};
-use gyre_slam::localisation::FoundKeyframe;
-use gyre_slam::{Keyframe, RecordReader};
+use gyre_slam::{Keyframe, RecordReader, localisation::FoundKeyframe};
 use gyre_terminal::Failure;
 
 use super::{Lines, MapArguments, MapFormat, placing};
@@ -72,10 +71,10 @@ fn all(
 /// Checks that the map that is extended is kept.
 fn require_another_folder(map: &Path, out: &Path) -> Result<(), Failure> {
     let same = fs::canonicalize(map).ok() == fs::canonicalize(out).ok() && out.exists();
+    let map = map.display();
     match same {
         true => Err(format!(
-            "--out is the map {} itself: choose another folder, so that it is kept",
-            map.display()
+            "--out is the map {map} itself: choose another folder, so that it is kept"
         )
         .into()),
         false => Ok(()),

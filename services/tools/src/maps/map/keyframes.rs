@@ -2,8 +2,7 @@
 
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
-use gyre_slam::localisation::Map;
-use gyre_slam::{Keyframe, RecordReader};
+use gyre_slam::{Keyframe, RecordReader, localisation::Map};
 use gyre_terminal::Failure;
 
 /// Returns the keyframes that have a pose, with their poses in the frame of the first one.

@@ -53,9 +53,6 @@ mod tests {
         assert_eq!(used_loops(&path).unwrap(), [[2, 9], [2, 12]]);
         fs::write(&path, "scan,found_scan,verdict\n9,two,used\n").unwrap();
         let refused = used_loops(&path).unwrap_err().to_string();
-        assert!(
-            refused.contains("loops.csv") && refused.contains("line: 2"),
-            "{refused}"
-        );
+        assert!(refused.contains("loops.csv") && refused.contains("line: 2"));
     }
 }

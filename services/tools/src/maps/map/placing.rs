@@ -13,18 +13,16 @@ const GRAPH: &str = "graph.g2o";
 /// The largest such file, bytes: a drive of 1,000 km.
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
 
-/// Reads the corrected keyframes of a run.
 pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     let path = run.join(GRAPH);
     let text =
         gyre_storage::read_text(&path, MAX_GRAPH_BYTES).map_err(StorageError::at("read", &path))?;
     let graph = G2o::parse(&text).map_err(|error| format!("{}: {error}", path.display()))?;
-    match graph.poses.len() == keyframes {
+    let (path, count) = (path.display(), graph.poses.len());
+    match count == keyframes {
         true => Ok(graph),
         false => Err(format!(
-            "{} has {} keyframes, and the run {keyframes}: run it again to its end",
-            path.display(),
-            graph.poses.len()
+            "{path} has {count} keyframes, and the run {keyframes}: run it again to its end"
         )
         .into()),
     }
@@ -49,11 +47,10 @@ pub fn place(
         )
         .into());
     };
+    let (found, all) = (search.found().len(), keyframes.len());
+    let contradict = found - placed.agreeing.len();
     print::note(format_args!(
-        "{} of {} keyframes were found in {map}; {} of them contradict the others and are not used",
-        search.found().len(),
-        keyframes.len(),
-        search.found().len() - placed.agreeing.len()
+        "{found} of {all} keyframes were found in {map}; {contradict} of them contradict the others and are not used"
     ));
     Ok(placed)
 }

@@ -1,7 +1,7 @@
 //! A snapshot at a run as a screen, or as text.
 
-use gyre_run::latency::{HopLatency, Percentiles};
-use gyre_stage::control::{Activity, ProcessStatus, Status};
+use gyre_run::latency::HopLatency;
+use gyre_stage::control::{Activity, ProcessStatus};
 use gyre_terminal::wrap;
 use ratatui::{
     Frame,
@@ -65,10 +65,8 @@ pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
 
 fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
     let longest = snapshot.history.iter().max().copied().unwrap_or_default();
-    let title = format!(
-        " sensor to pose: the longest of each snapshot, up to {} ",
-        duration(longest as f64 * 1e-6)
-    );
+    let most = duration(longest as f64 * 1e-6);
+    let title = format!(" sensor to pose: the longest of each snapshot, up to {most} ");
     let block = Block::bordered().title(title);
     let width = usize::from(block.inner(area).width);
     let first = snapshot.history.len().saturating_sub(width);
@@ -105,9 +103,9 @@ pub fn text(snapshot: &Snapshot, width: u16) -> String {
     let mut lines = head_lines(snapshot, width);
     let shown = columns(width);
     let line = |cells: [String; COLUMNS.len()]| {
-        let cells = shown.iter().map(|it| (&cells[*it], COLUMNS[*it]));
-        let cells = cells.map(|(cell, (_, width))| format!("{cell:width$}", width = width.into()));
-        cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
+        let cell = |it: &usize| format!("{:width$}", cells[*it], width = COLUMNS[*it].1.into());
+        let cells: Vec<String> = shown.iter().map(cell).collect();
+        cells.join(" ").trim_end().to_owned()
     };
     lines.push(line(COLUMNS.map(|(title, _)| title.to_owned())));
     for (process, used) in snapshot.status.processes.iter().zip(&snapshot.processes) {
@@ -119,36 +117,26 @@ pub fn text(snapshot: &Snapshot, width: u16) -> String {
 /// Returns the lines above the table, wrapped to this width.
 fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let status = &snapshot.status;
-    let in_flight = snapshot
-        .in_flight
-        .map_or_else(|| "unknown".to_owned(), |count| count.to_string());
-    let Percentiles {
-        p50_us,
-        p99_us,
-        max_us,
-        ..
-    } = snapshot.latency.sensor_to_pose;
+    let in_flight = snapshot.in_flight.map(|count| count.to_string());
+    let in_flight = in_flight.as_deref().unwrap_or("unknown");
+    let received = status
+        .processes
+        .iter()
+        .filter_map(|it| it.received.as_ref());
+    let lacks: String = received.map(lacks).collect();
+    let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
+    let missed = match missed {
+        0 => String::new(),
+        missed => format!(", {missed} messages missed by the recorder"),
+    };
+    let latency = &snapshot.latency.sensor_to_pose;
+    let [p50, p99, max] = [latency.p50_us, latency.p99_us, latency.max_us].map(us);
+    let (rate, scans) = (snapshot.rate, snapshot.latency.scans);
     let lines = [
         status.out.display().to_string(),
         summary(status),
-        format!(
-            "{:.1} scans/s, {in_flight} in flight{}{}",
-            snapshot.rate,
-            missed_by_recorder(status),
-            status
-                .processes
-                .iter()
-                .filter_map(|it| it.received.as_ref())
-                .map(lacks)
-                .collect::<String>()
-        ),
-        format!(
-            "sensor to pose p50 {}, p99 {}, max {} of {} poses in 10 s",
-            us(p50_us),
-            us(p99_us),
-            us(max_us),
-            snapshot.latency.scans
-        ),
+        format!("{rate:.1} scans/s, {in_flight} in flight{missed}{lacks}"),
+        format!("sensor to pose p50 {p50}, p99 {p99}, max {max} of {scans} poses in 10 s"),
         witnesses(snapshot),
     ];
     wrap(&lines.join("\n"), width.into())
@@ -165,15 +153,6 @@ fn witnesses(snapshot: &Snapshot) -> String {
     match words.as_slice() {
         [] => basis.to_owned(),
         words => format!("{basis}: {}", words.join("; ")),
-    }
-}
-
-/// Returns the losses of a recorder, if there are any.
-fn missed_by_recorder(status: &Status) -> String {
-    let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
-    match missed {
-        0 => String::new(),
-        missed => format!(", {missed} messages missed by the recorder"),
     }
 }
 

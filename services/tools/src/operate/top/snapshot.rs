@@ -22,8 +22,6 @@ const SPAN: Duration = Duration::from_secs(10);
 /// Number of snapshots whose latency is drawn.
 const HISTORY: usize = 300;
 
-/// A run at a moment.
-#[derive(Clone)]
 pub struct Snapshot {
     pub status: Status,
     /// Scans with a pose, 1/s.
@@ -43,22 +41,18 @@ pub struct Snapshot {
     pub history: Vec<u64>,
 }
 
-/// The usage of a process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Use {
     /// Share of one processor since the last snapshot.
     pub cpu: f64,
-    /// Memory of its own, bytes.
     pub own_bytes: u64,
     /// Wake-ups since the last snapshot, 1/s.
     pub wake_ups: f64,
 }
 
-/// Takes snapshots of a run.
 pub struct Snapshots<'run> {
     control: Control,
     poses: Poses<'run>,
-    /// The scans of a run with samples.
     scans: Option<Scans<'run>>,
     rates: SampleRates,
     recent: VecDeque<PoseHeader>,
@@ -68,7 +62,6 @@ pub struct Snapshots<'run> {
     has_new: bool,
     history: VecDeque<u64>,
     earlier: Option<Earlier>,
-    last: Option<Snapshot>,
 }
 
 /// The counts at the snapshot before.
@@ -91,18 +84,11 @@ impl<'run> Snapshots<'run> {
             has_new: false,
             history: VecDeque::new(),
             earlier: None,
-            last: None,
         }
     }
 
-    /// Returns whether the run has ended.
     pub fn has_ended(&self) -> bool {
         !self.control.is_there() || self.control.status().is_err()
-    }
-
-    /// Returns the newest snapshot.
-    pub fn last(&mut self) -> Option<Snapshot> {
-        self.last.take()
     }
 
     /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest
@@ -155,15 +141,21 @@ impl<'run> Snapshots<'run> {
             usage: usage.clone(),
         });
         let elapsed = earlier.as_ref().map_or(Duration::ZERO, |it| now - it.at);
+        let per_s = |count: u64| count as f64 / elapsed.as_secs_f64().max(1e-9);
         let rate = earlier.as_ref().map_or(0.0, |earlier| {
-            status.poses.saturating_sub(earlier.poses) as f64 / elapsed.as_secs_f64().max(1e-9)
+            per_s(status.poses.saturating_sub(earlier.poses))
         });
         let used = |pid: u32| {
             let now = usage.get(&pid).copied().unwrap_or_default();
             let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
-            Use::between(before.unwrap_or(now), now, elapsed)
+            let before = before.unwrap_or(now);
+            Use {
+                cpu: now.processor_share(&before, elapsed),
+                own_bytes: now.own_bytes,
+                wake_ups: per_s(now.wake_ups.saturating_sub(before.wake_ups)),
+            }
         };
-        let snapshot = Snapshot {
+        Ok(Snapshot {
             rate,
             in_flight,
             latency: meter.latency(),
@@ -173,9 +165,7 @@ impl<'run> Snapshots<'run> {
             processes: status.processes.iter().map(|it| used(it.pid)).collect(),
             history: self.history.iter().copied().collect(),
             status,
-        };
-        self.last = Some(snapshot.clone());
-        Ok(snapshot)
+        })
     }
 
     /// Adds the longest time since the last snapshot to the drawing: while poses are due and none
@@ -184,24 +174,11 @@ impl<'run> Snapshots<'run> {
         let is_owed =
             !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);
         self.owed_since = is_owed.then(|| self.owed_since.unwrap_or(now));
-        let owed_us = self
-            .owed_since
-            .map_or(0, |since| (now - since).as_micros() as u64);
-        self.history
-            .push_back(std::mem::take(&mut self.longest_us).max(owed_us));
+        let owed = self.owed_since.map_or(Duration::ZERO, |since| now - since);
+        let longest_us = std::mem::take(&mut self.longest_us).max(owed.as_micros() as u64);
+        self.history.push_back(longest_us);
         if self.history.len() > HISTORY {
             self.history.pop_front();
-        }
-    }
-}
-
-impl Use {
-    fn between(before: Usage, now: Usage, elapsed: Duration) -> Self {
-        let wake_ups = now.wake_ups.saturating_sub(before.wake_ups) as f64;
-        Self {
-            cpu: now.processor_share(&before, elapsed),
-            own_bytes: now.own_bytes,
-            wake_ups: wake_ups / elapsed.as_secs_f64().max(1e-9),
         }
     }
 }

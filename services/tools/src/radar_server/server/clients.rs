@@ -10,7 +10,6 @@ use std::{
 
 use gyre_colossus::{Configuration, Event, Message, Parser, Request, write_configuration};
 
-/// The most clients of a radar.
 const MAX_CLIENTS: usize = 3;
 /// Time without a read after which a client is given up.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -19,8 +18,9 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Time for the clients to read the last bytes.
 const LINGER: Duration = Duration::from_secs(5);
 
-/// The clients that are connected.
 pub struct Clients {
+    /// It is taken when clients are accepted.
+    listener: Option<TcpListener>,
     all: Arc<Mutex<Vec<Client>>>,
 }
 
@@ -32,10 +32,20 @@ struct Client {
 }
 
 impl Clients {
+    /// The clients that connect to a listener; it accepts nobody yet.
+    pub fn of(listener: TcpListener) -> Self {
+        Self {
+            listener: Some(listener),
+            all: Arc::default(),
+        }
+    }
+
     /// Accepts clients from now on, each in a thread of its own, which ends with its connection.
-    pub fn accept(listener: TcpListener, radar: &Configuration) -> io::Result<Self> {
-        let all = Arc::default();
-        let clients = Arc::clone(&all);
+    pub fn accept(&mut self, radar: &Configuration) -> io::Result<()> {
+        let Some(listener) = self.listener.take() else {
+            return Ok(());
+        };
+        let clients = Arc::clone(&self.all);
         let mut configuration = Vec::new();
         write_configuration(&mut configuration, radar);
         thread::Builder::new()
@@ -50,7 +60,7 @@ impl Clients {
                     let _ = admit(stream, number as u64, &configuration, &clients);
                 }
             })?;
-        Ok(Self { all })
+        Ok(())
     }
 
     /// Returns whether a client has asked for azimuths.

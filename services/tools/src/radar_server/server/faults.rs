@@ -38,49 +38,13 @@ pub struct Faults {
     pub garbage_every: Option<u64>,
 }
 
-impl Faults {
-    /// Returns whether an azimuth is lost.
-    pub(super) fn loses(&self, scan: u64, row: usize) -> bool {
-        uniform(scan, row as u64) < self.lost
-    }
-
-    /// Returns whether a datagram is lost.
-    pub(super) fn loses_datagram(&self, number: u64) -> bool {
-        uniform(number, 0) < self.lost
-    }
-
-    /// Returns whether a datagram is sent twice.
-    pub(super) fn doubles(&self, number: u64) -> bool {
-        uniform(number, 1) < self.doubled
-    }
-
-    /// Returns whether a datagram is sent after the next one.
-    pub(super) fn swaps(&self, number: u64) -> bool {
-        uniform(number, 2) < self.swapped
-    }
-
-    /// Returns whether the connections are reset in a scan.
-    pub(super) fn resets(&self, scan: u64) -> bool {
-        is_nth(scan, self.reset_every)
-    }
-
-    /// Returns whether nothing is sent before a scan.
-    pub(super) fn stalls(&self, scan: u64) -> bool {
-        is_nth(scan, self.stall_every)
-    }
-
-    /// Returns whether there is garbage before an azimuth.
-    pub(super) fn garbles(&self, scan: u64, row: usize) -> bool {
-        row == 100 && is_nth(scan, self.garbage_every)
-    }
-}
-
-fn is_nth(scan: u64, every: Option<u64>) -> bool {
+/// Returns whether a fault of every Nth scan is in a scan.
+pub(super) fn is_nth(scan: u64, every: Option<u64>) -> bool {
     every.is_some_and(|every| (scan + 1).is_multiple_of(every.max(1)))
 }
 
-/// Returns a number from 0 to 1 that scan and row determine (SplitMix64).
-fn uniform(scan: u64, row: u64) -> f64 {
+/// Returns a number from 0 to 1 that scan and row, or datagram and fault, determine (SplitMix64).
+pub(super) fn uniform(scan: u64, row: u64) -> f64 {
     let mut z = (scan << 16 | row)
         .wrapping_add(1)
         .wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -94,24 +58,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_of_lost_azimuths_is_as_asked_for() {
-        let faults = Faults {
-            lost: 0.01,
-            ..Faults::default()
-        };
+    fn faults_come_in_every_nth_scan_and_in_the_share_that_was_asked_for() {
         let rows = (0..1000).flat_map(|scan| (0..400).map(move |row| (scan, row)));
-        let lost = rows.filter(|(scan, row)| faults.loses(*scan, *row)).count();
+        let lost = rows.filter(|(scan, row)| uniform(*scan, *row) < 0.01);
+        let lost = lost.count();
         assert!((3800..4200).contains(&lost), "{lost}");
-    }
-
-    #[test]
-    fn faults_come_in_every_nth_scan() {
-        let faults = Faults {
-            reset_every: Some(3),
-            ..Faults::default()
-        };
-        let resets: Vec<_> = (0..9).filter(|scan| faults.resets(*scan)).collect();
+        let resets: Vec<_> = (0..9).filter(|scan| is_nth(*scan, Some(3))).collect();
         assert_eq!(resets, [2, 5, 8]);
-        assert!(!faults.stalls(2) && !faults.garbles(2, 100));
+        assert!(!is_nth(2, None));
     }
 }

@@ -1,15 +1,17 @@
 //! The receivers of a playback: clients by TCP, or a group by UDP.
 
 use std::{
-    io,
-    net::{Ipv4Addr, SocketAddrV4, TcpListener},
+    net::{Ipv4Addr, SocketAddrV4, UdpSocket},
     thread::sleep,
     time::{Duration, Instant},
 };
 
-use gyre_colossus::Configuration;
+use gyre_colossus::{
+    Azimuth, Configuration,
+    asterix::{write_azimuth, write_description},
+};
 
-use super::{Clients, Faults, Group};
+use super::{Clients, Faults, faults::uniform, unserved};
 
 /// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
@@ -19,41 +21,21 @@ const POLL: Duration = Duration::from_millis(5);
 const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 
 /// The receivers that a recording is played to.
-#[derive(Debug)]
-pub enum Audience {
+pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
-    Clients(TcpListener),
-    /// The receivers of the datagrams, if there are any.
-    Group {
-        /// The group, or the address of one receiver.
-        to: SocketAddrV4,
-        /// The address of this machine for sending them; if unspecified, the system chooses.
-        interface: Ipv4Addr,
-        /// Time before the first scan, for which only the radar's description is sent.
-        wait: Duration,
-    },
-}
-
-/// The open sockets of a playback.
-pub(crate) enum Output {
     Clients(Clients),
+    /// The receivers of the datagrams, if there are any. `wait`: the time before the first scan,
+    /// for which only the radar's description is sent.
     Group { group: Group, wait: Duration },
 }
 
 impl Output {
-    /// Begins to accept clients, or opens the socket of a group.
-    pub fn open(audience: Audience, radar: &Configuration, faults: Faults) -> io::Result<Self> {
-        Ok(match audience {
-            Audience::Clients(listener) => Self::Clients(Clients::accept(listener, radar)?),
-            Audience::Group {
-                to,
-                interface,
-                wait,
-            } => Self::Group {
-                group: Group::open(to, interface, faults)?,
-                wait,
-            },
-        })
+    /// Begins to accept clients of this radar.
+    pub fn begin(&mut self, radar: &Configuration) -> Result<(), String> {
+        match self {
+            Self::Clients(clients) => clients.accept(radar).map_err(unserved),
+            Self::Group { .. } => Ok(()),
+        }
     }
 
     /// Describes the radar to a group for the time that was asked for; false on a request to stop.
@@ -114,5 +96,83 @@ pub(crate) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
             return false;
         }
         sleep(left.min(SLICE));
+    }
+}
+
+/// The socket and the destination of datagrams.
+pub struct Group {
+    socket: UdpSocket,
+    to: SocketAddrV4,
+    faults: Faults,
+    number: u32,
+    /// A datagram that is sent after the next one.
+    held: Option<Vec<u8>>,
+    /// Datagrams that were not sent.
+    pub lost: u64,
+}
+
+impl Group {
+    /// Opens a socket for datagrams that leave by an interface; unspecified: the system chooses it.
+    pub fn open(to: SocketAddrV4, interface: Ipv4Addr, faults: Faults) -> Result<Self, String> {
+        Ok(Self {
+            socket: UdpSocket::bind((interface, 0)).map_err(unserved)?,
+            to,
+            faults,
+            number: 0,
+            held: None,
+            lost: 0,
+        })
+    }
+
+    /// Sends the radar's description of itself, and no powers.
+    pub fn describe(&mut self, radar: &Configuration) {
+        let mut datagram = Vec::new();
+        write_description(&mut datagram, radar, self.number);
+        self.number = self.number.wrapping_add(1);
+        self.pass(&datagram);
+    }
+
+    /// Sends an azimuth in several datagrams, with the faults of a network.
+    pub fn send(&mut self, radar: &Configuration, azimuth: &Azimuth<'_>) {
+        let (first, mut next) = (self.number, self.number);
+        let mut datagrams = Vec::new();
+        write_azimuth(radar, azimuth, &mut next, &mut |datagram| {
+            datagrams.push(datagram.to_vec());
+        });
+        self.number = next;
+        for (k, datagram) in datagrams.into_iter().enumerate() {
+            self.send_or_fail(u64::from(first.wrapping_add(k as u32)), datagram);
+        }
+    }
+
+    /// Loses, doubles or delays a datagram, as its number determines.
+    fn send_or_fail(&mut self, number: u64, datagram: Vec<u8>) {
+        let [is_lost, is_doubled, is_swapped] = [
+            uniform(number, 0) < self.faults.lost,
+            uniform(number, 1) < self.faults.doubled,
+            uniform(number, 2) < self.faults.swapped,
+        ];
+        if is_lost {
+            self.lost += 1;
+            return;
+        }
+        if self.held.is_none() && is_swapped {
+            self.held = Some(datagram);
+            return;
+        }
+        self.pass(&datagram);
+        if is_doubled {
+            self.pass(&datagram);
+        }
+        if let Some(held) = self.held.take() {
+            self.pass(&held);
+        }
+    }
+
+    /// Sends a datagram as it is. Nobody need be there to receive it.
+    pub fn pass(&mut self, datagram: &[u8]) {
+        if self.socket.send_to(datagram, self.to).is_err() {
+            self.lost += 1;
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::{
     fs::{self, File},
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
-    process::{Child, Stdio},
+    process::Child,
     thread,
     time::{Duration, Instant},
 };
@@ -19,14 +19,14 @@ use gyre_stage::{
 };
 use gyre_storage::create_folder;
 use gyre_supervise::last_line;
+use gyre_terminal::Failure;
 use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
 
-use super::{Setup, Summary, TICK, drain};
+use super::{Setup, TICK, drain};
 use crate::stress::{
-    StressError,
-    helper::{self, Helper, Work},
-    load::Taken,
-    tested::TestedPipeline,
+    TestedPipeline,
+    helper::{Work, spawn},
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.
@@ -42,48 +42,36 @@ const POLL_PERIOD: Duration = Duration::from_millis(20);
 pub(super) struct Running<'a> {
     setup: &'a Setup,
     process: Child,
-    out: PathBuf,
+    pub out: PathBuf,
     log: PathBuf,
     /// The latest time of its first poses.
     deadline: Instant,
 }
 
 impl<'a> Running<'a> {
-    pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, StressError> {
+    pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, Failure> {
+        let out = tested.run_out(&setup.name);
+        let log = tested.run_out(&format!("{}.txt", setup.name));
+        let unusable =
+            |path: &Path, error: std::io::Error| format!("cannot use {}: {error}", path.display());
         let runs = tested.out.join("runs");
-        create_folder(&runs).map_err(|error| StressError::file(&runs)(error.source))?;
-        let (out, log) = (
-            runs.join(&setup.name),
-            runs.join(format!("{}.txt", setup.name)),
-        );
-        let output = File::create(&log).map_err(StressError::file(&log))?;
-        let errors = output.try_clone().map_err(StressError::file(&log))?;
+        create_folder(&runs).map_err(|error| unusable(&runs, error.source))?;
+        let output = File::create(&log).map_err(|error| unusable(&log, error))?;
+        let errors = output.try_clone().map_err(|error| unusable(&log, error))?;
         // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));
-        let mut command = helper::command(&tested.program, &work)?;
-        command.stdin(Stdio::null()).stdout(output).stderr(errors);
-        let process = command.spawn().map_err(|source| StressError::Start {
-            program: tested.program.display().to_string(),
-            source,
-        })?;
         Ok(Self {
             setup,
-            process,
+            process: spawn(&tested.program, &work, output.into(), errors.into())?,
             out,
             log,
             deadline: Instant::now() + START_LIMIT,
         })
     }
 
-    /// Returns the process of its supervisor.
     pub fn pid(&self) -> u32 {
         self.process.id()
-    }
-
-    /// Returns the folder of its results.
-    pub fn out(&self) -> &Path {
-        &self.out
     }
 
     pub fn has_ended(&mut self) -> bool {
@@ -112,7 +100,7 @@ impl<'a> Running<'a> {
     }
 
     /// Waits until the run can be observed.
-    pub fn attach(&mut self) -> Result<ObservedRun, StressError> {
+    pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
         // A supervisor of the same results may still be there, if an earlier run was killed.
         while !self.is_supervised_by_its_process() {
             self.require_life()?;
@@ -123,7 +111,7 @@ impl<'a> Running<'a> {
                 match run.observe::<Pose>().map(drop) {
                     Ok(()) => return Ok(run),
                     Err(StageError::NoPlace { observers: 0, .. }) => {
-                        return Err(StressError::NoPlace);
+                        return Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into());
                     }
                     Err(error @ StageError::NoPlace { .. }) => return Err(error.into()),
                     // Its topics are not there yet.
@@ -140,26 +128,24 @@ impl<'a> Running<'a> {
         status.is_ok_and(|status| status.pid == self.pid())
     }
 
-    fn require_life(&mut self) -> Result<(), StressError> {
+    fn require_life(&mut self) -> Result<(), Failure> {
+        let setup = self.setup;
+        let scenario = &setup.name;
         if self.has_ended() {
-            return Err(StressError::EndedEarly {
-                scenario: self.setup.name.clone(),
-                said: self.last_words(),
-            });
+            let said = self.last_words();
+            let reason = format!("the run of {scenario} ended before it could be measured: {said}");
+            return Err(reason.into());
         }
+        let (limit_s, log) = (START_LIMIT.as_secs(), self.log.display());
         match Instant::now() < self.deadline {
             true => Ok(()),
-            false => Err(StressError::NoPose {
-                scenario: self.setup.name.clone(),
-                limit_s: START_LIMIT.as_secs(),
-                log: self.log.clone(),
-            }),
+            false => Err(format!("the run of {scenario} has made no pose within {limit_s} s; {log} shows what it waits for").into()),
         }
     }
 
     /// Waits for the first poses, and returns the newest of them; where hardly a scan comes, for
     /// one.
-    pub fn warm_up(&mut self, poses: &mut Observer<'_, Pose>) -> Result<PoseHeader, StressError> {
+    pub fn warm_up(&mut self, poses: &mut Observer<'_, Pose>) -> Result<PoseHeader, Failure> {
         let enough = match self.setup.scenario {
             Scenario::Idle => 1,
             _ => WARM_UP,
@@ -179,31 +165,11 @@ impl<'a> Running<'a> {
         Ok(newest)
     }
 
-    /// Starts the helpers that load the machine; returns them with the memory that they have taken.
-    pub fn load(
-        &self,
-        tested: &TestedPipeline,
-    ) -> Result<(Vec<Helper>, Option<Taken>), StressError> {
-        let observers = (0..self.setup.observers).map(|_| Work::Observe(self.out.clone()));
-        let loads = self.setup.loads.iter().cloned().chain(observers);
-        let start = |work| Helper::start(&tested.program, work);
-        let mut helpers: Vec<_> = loads.map(start).collect::<Result<_, _>>()?;
-        let Some(share) = self.setup.memory_share else {
-            return Ok((helpers, None));
-        };
-        let mut memory = start(Work::Memory(share))?;
-        let taken = memory.read_result()?;
-        helpers.push(memory);
-        Ok((helpers, Some(taken)))
-    }
-
-    /// Ends the run and reads its summary.
-    pub fn end(mut self) -> Summary {
+    /// Ends the run and reads its summary; without one it is null.
+    pub fn end(mut self) -> Value {
         self.stop();
         let summary = fs::read_to_string(self.out.join("summary.json"));
-        let summary = summary
-            .ok()
-            .and_then(|text| serde_json::from_str(&text).ok());
+        let summary = summary.map(|text| serde_json::from_str(&text).unwrap_or_default());
         summary.unwrap_or_default()
     }
 
@@ -229,24 +195,17 @@ impl Drop for Running<'_> {
 fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     // Relative to the sensor's own pace.
     let rate = tested.relative_rate(setup.rate_hz);
-    let configuration = tested.configuration.display().to_string();
-    let out = out.display().to_string();
-    let rate = rate.to_string();
-    let fixed = [
-        "run",
-        &configuration,
-        "--fresh",
-        "--out",
-        &out,
-        "--rate",
-        &rate,
-        "--set",
-        "run.mode=live",
-        "--set",
-        "source.repeat=true",
+    let set = ["run.mode=live", "source.repeat=true"].map(str::to_owned);
+    let set = set.iter().chain(&setup.set);
+    let named = [
+        "run".to_owned(),
+        tested.configuration.display().to_string(),
+        "--fresh".to_owned(),
+        format!("--out={}", out.display()),
+        format!("--rate={rate}"),
     ];
-    let set = setup.set.iter().flat_map(|sentence| ["--set", sentence]);
-    fixed.into_iter().chain(set).map(str::to_owned).collect()
+    let set = set.map(|sentence| format!("--set={sentence}"));
+    named.into_iter().chain(set).collect()
 }
 
 #[cfg(test)]

@@ -10,24 +10,16 @@ const FIRM: f64 = 10.0;
 /// 1 / (1 - q) samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Distribution {
-    /// Number of samples.
     pub samples: u64,
-    /// Median.
     pub p50_ms: Option<f64>,
-    /// 90th percentile.
     pub p90_ms: Option<f64>,
-    /// 99th percentile.
     pub p99_ms: Option<f64>,
-    /// 99.9th percentile.
     pub p99_9_ms: Option<f64>,
-    /// 99.99th percentile.
     pub p99_99_ms: Option<f64>,
-    /// Maximum.
     pub max_ms: Option<f64>,
 }
 
 impl Distribution {
-    /// Returns the distribution of durations.
     pub fn of(durations: &Durations) -> Self {
         let samples = durations.count();
         let at = |share: f64| durations.at(share).map(|ns| ns as f64 * 1e-6);
@@ -65,8 +57,6 @@ impl Distribution {
 mod tests {
     use super::*;
 
-    const MS: i64 = 1_000_000;
-
     fn near(a: Option<f64>, b: f64) -> bool {
         a.is_some_and(|a| (a - b).abs() <= 2e-3 * b)
     }
@@ -74,26 +64,27 @@ mod tests {
     #[test]
     fn percentiles_need_samples() {
         let mut durations = Durations::default();
-        (1..=100).for_each(|ms| durations.add(ms * MS));
-        let distribution = Distribution::of(&durations);
-        assert!(near(distribution.p50_ms, 50.0) && near(distribution.p99_ms, 99.0));
-        assert_eq!(
-            (distribution.p99_9_ms, distribution.p99_99_ms),
-            (None, None)
-        );
-        assert!(near(distribution.judged(distribution.p99_9_ms), 100.0));
+        (1..=100).for_each(|ms| durations.add(ms * 1_000_000));
+        let of = Distribution::of(&durations);
+        assert!(near(of.p50_ms, 50.0) && near(of.p99_ms, 99.0));
+        assert_eq!((of.p99_9_ms, of.p99_99_ms), (None, None));
+        assert!(near(of.judged(of.p99_9_ms), 100.0));
         assert_eq!(Distribution::of(&Durations::default()).p50_ms, None);
     }
 
     #[test]
     fn a_percentile_that_rests_on_few_samples_is_marked() {
-        let of = |samples| Distribution {
-            samples,
-            ..Distribution::default()
-        };
-        assert_eq!(of(480).mark(Some(7.0), 0.99), " of 480");
-        assert_eq!(of(480).mark(None, 0.999), "");
-        assert_eq!(of(480).mark(Some(4.5), 0.5), "");
-        assert_eq!(of(1000).mark(Some(7.0), 0.99), "");
+        for (samples, percentile, share, mark) in [
+            (480, Some(7.0), 0.99, " of 480"),
+            (480, None, 0.999, ""),
+            (480, Some(4.5), 0.5, ""),
+            (1000, Some(7.0), 0.99, ""),
+        ] {
+            let of = Distribution {
+                samples,
+                ..Distribution::default()
+            };
+            assert_eq!(of.mark(percentile, share), mark);
+        }
     }
 }

@@ -13,25 +13,20 @@ use crate::stress::{
     witness_fault::WitnessFault,
 };
 
-/// The figures of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
     #[serde(flatten)]
     pub latency: RunLatency,
-    /// Faults and recoveries.
     pub faults: Vec<Fault>,
     /// Faults of gyro, wheels and radar, and recoveries.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub witness_faults: Vec<WitnessFault>,
     /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
-    /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
     /// Lost wake-ups by stage, each found after up to 200 ms.
     pub wakes_caught_late: BTreeMap<String, u64>,
-    /// The resources of each process.
     pub processes: Vec<Cost>,
-    /// Shared memory, bytes.
     pub shared_bytes: u64,
     /// Memory that a load has taken beside it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,7 +40,6 @@ impl Figures {
         (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
     }
 
-    /// Returns whether there was any fault.
     pub fn had_faults(&self) -> bool {
         !self.faults.is_empty() || !self.witness_faults.is_empty()
     }

@@ -1,14 +1,51 @@
-//! The outcome of a scenario: figures and the verdict.
+//! The outcome of a scenario: figures, the comparison with their limits, and the verdict.
 
-use std::{fmt::Write, time::Duration};
+use std::time::Duration;
 
 use gyre_run::{Judged, Scenario};
 use serde::Serialize;
 
-use super::{Figures, Step};
-use crate::stress::check::Check;
+use super::Figures;
+use crate::stress::search::Step;
 
-/// The verdict on a scenario.
+/// One figure beside its limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// The key of `[budget]`.
+    pub key: &'static str,
+    /// The measured figure; `None`: there is no figure, which misses the limit.
+    pub measured: Option<f64>,
+    pub limit: f64,
+    pub passed: bool,
+}
+
+impl Check {
+    /// The measured figure must not be above the limit.
+    pub fn at_most(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            key,
+            measured,
+            limit,
+            passed: measured.is_some_and(|measured| measured <= limit),
+        }
+    }
+
+    /// The measured figure must not be below the limit.
+    pub fn at_least(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            passed: measured.is_some_and(|measured| measured >= limit),
+            ..Self::at_most(key, measured, limit)
+        }
+    }
+
+    /// Returns `p99_ms 312.4, limit 250`.
+    pub fn sentence(&self) -> String {
+        let measured = self.measured.map(|measured| format!("{measured:.1}"));
+        let measured = measured.as_deref().unwrap_or("not measured");
+        format!("{} {measured}, limit {}", self.key, self.limit)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -16,15 +53,13 @@ pub enum Verdict {
     Passed,
     /// A limit is not kept, or the run has ended, or not recovered.
     Failed,
-    /// There is no limit for it.
     NotJudged,
     /// It could not be carried out, which is no verdict on the pipeline.
     NotCarriedOut,
 }
 
 impl Verdict {
-    /// Returns it in a word or two.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Passed => "passed",
             Self::Failed => "FAILED",
@@ -34,22 +69,16 @@ impl Verdict {
     }
 }
 
-/// The outcome of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenarioOutcome {
     pub scenario: Scenario,
-    /// A line that describes it.
     pub line: &'static str,
     pub verdict: Verdict,
-    /// The figures that have limits.
     pub checks: Vec<Check>,
     /// A failure that does not depend on the latency.
     pub problem: Option<String>,
-    /// Scans a second.
     pub rate_hz: f64,
-    /// Time that was measured, s.
     pub duration_s: f64,
-    /// The figures of its run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
     /// The largest load that passed: scans a second, or radars.
@@ -58,7 +87,6 @@ pub struct ScenarioOutcome {
     /// The smallest load above it that failed, twice; `None`: none was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<f64>,
-    /// The steps of a search.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<Step>,
 }
@@ -81,7 +109,6 @@ impl ScenarioOutcome {
         }
     }
 
-    /// The same with its verdict.
     #[must_use]
     pub fn judged(mut self) -> Self {
         let had_faults = self.figures.as_ref().is_some_and(Figures::had_faults);
@@ -106,30 +133,21 @@ impl ScenarioOutcome {
         self
     }
 
-    /// Returns the verdict with its reasons.
     pub fn sentence(&self) -> String {
         let mut sentence = format!("{}: {}", self.scenario, self.verdict.name());
         let failed = self.checks.iter().filter(|check| !check.passed);
-        let reasons = self
-            .problem
-            .iter()
-            .cloned()
-            .chain(failed.map(Check::sentence));
-        for reason in reasons {
-            let _ = write!(sentence, "; {reason}");
+        let problem = self.problem.iter().cloned();
+        for reason in problem.chain(failed.map(Check::sentence)) {
+            sentence += &format!("; {reason}");
         }
         if let Some(figures) = &self.figures {
-            let _ = write!(sentence, " ({})", figures.sentence());
+            sentence += &format!(" ({})", figures.sentence());
         }
-        match (self.best, self.failed) {
-            (Some(best), Some(failed)) => {
-                let _ = write!(sentence, " ({best:.1}; {failed:.1} failed twice)");
-            }
-            (Some(best), None) => {
-                let _ = write!(sentence, " ({best:.1})");
-            }
-            (None, _) => {}
-        }
+        sentence += &match (self.best, self.failed) {
+            (Some(best), Some(failed)) => format!(" ({best:.1}; {failed:.1} failed twice)"),
+            (Some(best), None) => format!(" ({best:.1})"),
+            (None, _) => String::new(),
+        };
         sentence
     }
 }
@@ -142,63 +160,60 @@ mod tests {
         report::Report,
     };
 
-    fn outcome(scenario: Scenario) -> ScenarioOutcome {
-        ScenarioOutcome::new(scenario, Duration::from_secs(1))
+    #[test]
+    fn a_figure_on_its_limit_keeps_it_and_a_missing_one_does_not() {
+        assert!(Check::at_most("p99_ms", Some(100.0), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", Some(100.1), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", None, 100.0).passed);
+        assert!(Check::at_least("radars", Some(2.0), 2.0).passed);
+        assert!(!Check::at_least("radars", Some(1.0), 2.0).passed);
+        let sentence = Check::at_most("p99_ms", Some(312.44), 100.0).sentence();
+        assert_eq!(sentence, "p99_ms 312.4, limit 100");
     }
 
-    fn check(passed: bool) -> Check {
-        Check {
-            key: "p99_ms",
-            measured: Some(300.0),
-            limit: 250.0,
-            passed,
+    /// An outcome with faults after which the run has recovered, and these measured figures, of
+    /// which at most 250 is allowed.
+    fn outcome(scenario: Scenario, faults: usize, measured: &[f64]) -> ScenarioOutcome {
+        let fault = Fault {
+            kind: FaultKind::Kill,
+            stage: "masking",
+            at_s: 1.5,
+            recovery_ms: Some(40.0),
+        };
+        let checks = measured
+            .iter()
+            .map(|ms| Check::at_most("p99_ms", Some(*ms), 250.0));
+        ScenarioOutcome {
+            checks: checks.collect(),
+            figures: Some(Figures {
+                faults: vec![fault; faults],
+                ..Figures::default()
+            }),
+            ..ScenarioOutcome::new(scenario, Duration::from_secs(1))
         }
     }
 
     #[test]
-    fn a_scenario_fails_by_one_limit_or_by_a_problem() {
-        let mut steady = outcome(Scenario::Steady);
-        assert_eq!(steady.clone().judged().verdict, Verdict::NotJudged);
-        steady.checks = vec![check(true)];
-        assert_eq!(steady.clone().judged().verdict, Verdict::Passed);
-        steady.checks.push(check(false));
-        let failed = steady.judged();
-        assert_eq!(failed.verdict, Verdict::Failed);
+    fn a_scenario_is_judged_by_its_limits_or_by_its_recovery() {
+        for (scenario, faults, measured, verdict) in [
+            (Scenario::Steady, 0, &[][..], Verdict::NotJudged),
+            (Scenario::Steady, 0, &[200.0], Verdict::Passed),
+            (Scenario::Steady, 0, &[200.0, 300.0], Verdict::Failed),
+            (Scenario::Kills, 1, &[], Verdict::Passed),
+            (Scenario::SlowStage, 0, &[], Verdict::NotJudged),
+        ] {
+            let judged = outcome(scenario, faults, measured).judged();
+            assert_eq!(judged.verdict, verdict, "{scenario}, {measured:?}");
+        }
+        let failed = outcome(Scenario::Steady, 0, &[300.0]).judged();
         assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
         assert!(Report::of(vec![failed]).has(Verdict::Failed));
     }
 
-    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> ScenarioOutcome {
-        let fault = |recovery_ms: &Option<f64>| Fault {
-            kind: FaultKind::Kill,
-            stage: "masking",
-            at_s: 1.5,
-            recovery_ms: *recovery_ms,
-        };
-        ScenarioOutcome {
-            figures: Some(Figures {
-                faults: faults.iter().map(fault).collect(),
-                ..Figures::default()
-            }),
-            ..outcome(scenario)
-        }
-    }
-
     #[test]
-    fn a_fault_without_limits_passes_by_recovery_alone() {
-        let mut kills = with_faults(Scenario::Kills, &[Some(40.0)]);
-        assert_eq!(kills.clone().judged().verdict, Verdict::Passed);
-        kills.problem = Some("no pose has followed the fault of masking".to_owned());
-        assert_eq!(kills.judged().verdict, Verdict::Failed);
-    }
-
-    #[test]
-    fn without_any_fault_there_is_no_recovery_to_pass_by() {
-        let slow = with_faults(Scenario::SlowStage, &[]);
-        assert_eq!(slow.judged().verdict, Verdict::NotJudged);
+    fn a_problem_fails_a_scenario_and_an_omission_is_no_verdict() {
         let omitted = Some("nothing was done".to_owned());
-        let mut kills = with_faults(Scenario::Kills, &[]);
-        kills.checks = vec![check(true)];
+        let mut kills = outcome(Scenario::Kills, 0, &[200.0]);
         let not_done = kills.clone().judged().unless(omitted.clone());
         assert_eq!(not_done.verdict, Verdict::NotCarriedOut);
         assert!(not_done.sentence().contains("nothing was done"));

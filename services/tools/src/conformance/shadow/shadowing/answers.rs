@@ -3,18 +3,17 @@
 
 use gyre_messages::{Item, flag};
 use gyre_supervise::rig::Recorded;
+use gyre_terminal::Failure;
 
 use super::{Shadowing, UnderWay};
 use crate::conformance::{
-    ProgramError,
     harness::Sent,
     item::{not_copied, wrong_stamps},
-    shadow::record::Pair,
 };
 
 impl Shadowing<'_> {
     /// Examines a message of the shadow.
-    pub(super) fn receive(&mut self, sent: Sent) -> Result<(), ProgramError> {
+    pub(super) fn receive(&mut self, sent: Sent) -> Result<(), Failure> {
         let output = match sent {
             Sent::Message(output) => output,
             Sent::Malformed { sentence, .. } => {
@@ -35,13 +34,18 @@ impl Shadowing<'_> {
             Some(seq) if seq == item.seq && !item.is(flag::END) => {}
             unasked => {
                 self.unanswerable = unasked;
-                self.breach(unexpected(&item, self.under_way.as_ref()));
+                let owed = match &self.under_way {
+                    Some(it) => format!("item {}", it.sent.item.seq),
+                    None => "none".to_owned(),
+                };
+                let seq = item.seq;
+                self.breach(format!("it sent item {seq}, and {owed} was to be answered"));
             }
         }
         Ok(())
     }
 
-    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), ProgramError> {
+    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), Failure> {
         let stage = self.options.stage;
         let (item, sent) = (output.item(), &it.sent.item);
         for field in not_copied(stage, sent, &item) {
@@ -64,11 +68,9 @@ impl Shadowing<'_> {
             seq: it.observed.seq(),
             ..item
         };
-        self.record.compare(&Pair {
-            real: &it.observed.output,
-            shadow: &output.about(&as_observed),
-            answer_ns: it.is_timed.then_some(answered_ns - it.sent_ns),
-        })
+        let answer_ns = it.is_timed.then_some(answered_ns - it.sent_ns);
+        let shadow = output.about(&as_observed);
+        self.record.compare(&it.observed.output, &shadow, answer_ns)
     }
 
     fn breach(&mut self, sentence: String) {
@@ -77,16 +79,5 @@ impl Shadowing<'_> {
                 .push(format!("it breaks the contract: {sentence}"));
         }
         self.record.breach(sentence);
-    }
-}
-
-fn unexpected(item: &Item, under_way: Option<&UnderWay>) -> String {
-    let seq = item.seq;
-    match under_way {
-        Some(it) => format!(
-            "it sent item {seq}, and item {} was to be answered",
-            it.sent.item.seq
-        ),
-        None => format!("it sent item {seq}, and none was to be answered"),
     }
 }
