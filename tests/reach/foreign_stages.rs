@@ -27,7 +27,6 @@ fn run_with(stage: &str, fault: &str, once: bool) -> Run {
             program.display()
         ),
     )
-    .set(&format!("stages.{stage}.restart.backoff_ms=10"))
 }
 
 /// The limits of each message have tests beside their checks; here, each stage checks its inputs,

@@ -62,7 +62,7 @@ fn a_stage_that_never_starts_ends_the_run_with_its_name() {
 fn a_stage_that_always_dies_ends_the_run_with_its_last_line_of_output() {
     let run = Run::of_recording()
         .stage_script("masking", "echo 'the mask is on fire' >&2; exit 7")
-        .set("stages.masking.restart={limit = 2, backoff_ms = 10}");
+        .set("stages.masking.restart.limit=2");
     let ended = run.finish();
     ended.failed_with(&[
         "masking died 3 times",

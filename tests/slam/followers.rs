@@ -136,9 +136,9 @@ fn assert_made_up_for(follower: &str) {
         "[ ! -e {broken} ] || { echo 'no more loops' >&2; exit 7; }; exec {gyre} stage {follower}"
             .replace("{broken}", broken.to_str().unwrap())
             .replace("{follower}", follower);
-    let run = run.stage_script(follower, &script).set(&format!(
-        "stages.{follower}.restart={{limit = 2, backoff_ms = 10}}"
-    ));
+    let run = run
+        .stage_script(follower, &script)
+        .set(&format!("stages.{follower}.restart.limit=2"));
     let ended = run.finish();
     let died = format!("{follower} died 3 times");
     ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);

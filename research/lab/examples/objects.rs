@@ -20,7 +20,7 @@ use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_masking::networks::runtime;
-use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
+use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
 use gyre_worlds::drive::DriveKind;
@@ -49,20 +49,13 @@ struct DriveScan {
 
 fn main() -> Outcome<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let config = match env::var_os("OBJECTS_CONFIG") {
-        Some(path) => toml::from_str(&fs::read_to_string(path)?)?,
-        None => ObjectsConfig {
-            kind: ObjectsKind::Tracks,
-            ..ObjectsConfig::default()
-        },
-    };
     if let Some(folder) = arguments.first().filter(|name| Path::new(name).is_dir()) {
         let drive = annotated(Path::new(folder), arguments.get(1).map(String::as_str))?;
-        return show(&track(&drive, &config)?);
+        return show(&track(&drive)?);
     }
     let mut all = Vec::new();
     for name in &arguments {
-        let scans = track(&simulated(name)?, &config)?;
+        let scans = track(&simulated(name)?)?;
         println!(
             "{name}\n{}\n",
             object_errors(&scans, &ObjectOptions::default())
@@ -85,9 +78,9 @@ fn main() -> Outcome<()> {
 }
 
 /// Tracks the objects of a drive, and puts those of each scan beside the true ones.
-fn track(drive: &[DriveScan], config: &ObjectsConfig) -> Outcome<Vec<ObjectScan>> {
+fn track(drive: &[DriveScan]) -> Outcome<Vec<ObjectScan>> {
     let runtime = runtime::find(None).ok();
-    let mut tracker = ObjectTracker::new(config, runtime.as_deref())?;
+    let mut tracker = ObjectTracker::new(runtime.as_deref())?;
     let scan = |scan: &DriveScan| {
         let sensor = scan.placed.pose.inverse();
         let objects = tracker.update(&scan.placed, &scan.points)?;
@@ -447,7 +440,7 @@ mod tests {
     #[test]
     fn a_network_finds_the_vehicles_of_a_simulated_town_and_little_else() -> Outcome<()> {
         let drive = simulated("cts350x-radiate:21:dry:60")?;
-        let scans = track(&drive, &ObjectsConfig::default())?;
+        let scans = track(&drive)?;
         let errors = object_errors(&scans, &ObjectOptions::default());
         assert!(errors.required > 100, "{errors}");
         // Of this drive's 14 vehicles a hidden one is a tenth; over 24 drives it is 92 and 98 %.

@@ -11,7 +11,7 @@ use gyre_journal::{
 };
 use gyre_masking::{Library, MaskingConfig};
 use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
-use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
+use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -21,14 +21,12 @@ use gyre_stage::{
 /// Runs the follower to the end of the scans, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
-    let config: ObjectsConfig = launch.section("objects")?;
     let masking: MaskingConfig = launch.section("masking")?;
     let out = launch.manifest.out.clone();
     let mut tracking = Tracking {
         scans: RecordReader::open(&out)?,
         tracked: RecordLog::open(&out)?,
-        tracker: tracker(&config, &masking)?,
-        config,
+        tracker: tracker(&masking)?,
         masking,
         out,
         read: 0,
@@ -38,18 +36,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Returns a tracker whose network is computed by the library of learned masks.
-pub fn tracker(
-    config: &ObjectsConfig,
-    masking: &MaskingConfig,
-) -> Result<ObjectTracker, StageError> {
+pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
     let library = Library::find(masking);
     let library = library.map_err(StageError::configuration)?;
-    ObjectTracker::new(config, library.onnx_runtime()).map_err(StageError::configuration)
+    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::configuration)
 }
 
 struct Tracking {
     out: PathBuf,
-    config: ObjectsConfig,
     masking: MaskingConfig,
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
@@ -65,7 +59,7 @@ impl Tracking {
         if self.scans.unchanged() < self.read {
             self.tracked.cut(self.scans.unchanged())?;
             self.scans = RecordReader::open(&self.out)?;
-            self.tracker = tracker(&self.config, &self.masking)?;
+            self.tracker = tracker(&self.masking)?;
             self.read = 0;
         }
         Ok(())

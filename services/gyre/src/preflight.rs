@@ -62,7 +62,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
         &configuration.odometry.masking,
     )?;
     if configuration.objects.is_on() {
-        gyre_followers::objects::tracker(&configuration.objects, &configuration.odometry.masking)?;
+        gyre_followers::objects::tracker(&configuration.odometry.masking)?;
     }
     check_gnss(configuration)?;
     if configuration.slam.is_localised() {

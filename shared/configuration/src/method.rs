@@ -53,8 +53,7 @@ macro_rules! sections {
         /// Checks the ranges of all values.
         pub fn validate(&self) -> Result<(), ConfigurationError> {
             $(within(stringify!($checked), self.odometry.$checked.validate())?;)*
-            within("gnss", self.gnss.validate())?;
-            within("objects", self.objects.validate())
+            within("gnss", self.gnss.validate())
         }
     };
 }

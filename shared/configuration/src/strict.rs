@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Display, path::Path};
 
-use gyre_datasets::in_plain_words;
+use gyre_datasets::{clipped, in_plain_words};
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
@@ -110,6 +110,7 @@ pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
         nearest if nearest.is_empty() => format!("; it knows {}", known.join(", ")),
         nearest => nearest,
     };
+    let key = clipped(key);
     ConfigurationError(format!("[{section}] has no key `{key}`{suggestion}"))
 }
 

@@ -77,7 +77,6 @@ rotation.band_high=7.0 | rotation | band_high
 dataset.format=oxfort | oxfort | oxford
 stages.masking.command=./x | [stages.masking]: command is "./x", but must be a list, as in ["./x"]
 stages.masking.restart.limit=-1 | masking | -1
-stages.masking.restart.window_s=-1.0 | stages.masking | window_s is -1
 stages.refinement.python=a.py | stages.refinement | masking, rotation-search, translation-search
 search.kind=exhaustive; stages.rotation-search.python=a.py | stages.rotation-search | no such stage
 stages.masking.python=a.py; stages.masking.command=['x'] | stages.masking | remove one of them
@@ -147,7 +146,6 @@ fn settings_without_effect_are_named() {
         &["gyro.kind=auto", "gyro.file=a.csv"][..],
         &["wheels.delay_s=1"],
         &["gnss.listen=127.0.0.1:1"],
-        &["objects.even_likely=0.5"],
         &["masking.kind=none", "masking.threshold=60"],
     ] {
         assert_eq!(named(idle).len(), 1, "{idle:?}");

@@ -62,10 +62,6 @@ impl Configuration {
         ] {
             zero_or_more(section, key, number)?;
         }
-        for (name, stage) in &self.stages {
-            let section = format!("stages.{name}");
-            zero_or_more(&section, "restart.window_s", stage.restart.window_s)?;
-        }
         if let Some((key, time_s)) = source.faults.iter().find_map(PlayedFault::invalid) {
             let reason = format!("faults has {key} = {time_s}, but must have 0 or more");
             return Err(value("source", reason));

@@ -74,8 +74,11 @@ pub fn reference(schema: &Schema) -> String {
 }
 
 fn write_section(page: &mut Page, name: &str, schema: &Value) {
-    if schema["type"] == "array" {
-        return write_object(page, &format!("[[{name}]]"), name, schema, &schema["items"]);
+    if name == "stages.NAME.scheduling" {
+        let described = text(&schema["description"]);
+        let same = "The keys are those of `[run.scheduling]`.";
+        page.sections += &format!("\n\n## `[{name}]`\n\n{described} {same}");
+        return;
     }
     match schema.get("additionalProperties") {
         Some(named @ Value::Object(_)) => {

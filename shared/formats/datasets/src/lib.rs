@@ -32,6 +32,6 @@ pub use ground_truth::{
 pub use gyro_log::{GyroLog, LogFaults, LogGap, SampleTrack};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
 pub use logs::LogError;
-pub use plain_words::in_plain_words;
+pub use plain_words::{clipped, in_plain_words};
 pub use scan_samples::ScanSamples;
 pub use wheel_log::WheelLog;

@@ -5,6 +5,7 @@
 pub fn in_plain_words(key: &str, message: &str) -> Option<String> {
     if let Some(variants) = message.strip_prefix("unknown variant ") {
         let (found, expected) = variants.split_once(", expected ")?;
+        let found = clipped(found);
         return Some(format!("{key} is {found}, but must be {expected}"));
     }
     let types = message
@@ -21,7 +22,16 @@ pub fn in_plain_words(key: &str, message: &str) -> Option<String> {
         _ => "of another kind",
     });
     let must = must_be(expected, value.filter(|_| kind == "string "));
-    Some(format!("{key} is {found}, but must be {must}"))
+    Some(format!("{key} is {}, but must be {must}", clipped(found)))
+}
+
+/// Returns the begin of a word that is longer than a line, so that a sentence with it stays
+/// readable.
+pub fn clipped(word: &str) -> String {
+    match word.char_indices().nth(100) {
+        Some((at, _)) => format!("{}...", &word[..at]),
+        None => word.to_owned(),
+    }
 }
 
 fn must_be(expected: &str, text: Option<&str>) -> String {
@@ -36,7 +46,7 @@ fn must_be(expected: &str, text: Option<&str>) -> String {
         "a string" | "string only" | "path string" => "a text",
         "a map" => "a section of keys",
         "a sequence" => {
-            let example = text.unwrap_or("\"a\"");
+            let example = text.filter(|it| it.len() < 100).unwrap_or("\"a\"");
             return format!("a list, as in [{example}]");
         }
         _ if expected.starts_with("struct ") => "a section of keys",
@@ -67,6 +77,12 @@ mod tests {
             let words = format!("threshold is {found}, but must be {expected}");
             assert_eq!(said, words);
         }
+        let long = format!(
+            "unknown variant `{}`, expected `none`",
+            "\u{fffd}".repeat(200)
+        );
+        let said = in_plain_words("kind", &long).unwrap_or_default();
+        assert!(said.len() < 350 && said.ends_with("..., but must be `none`"));
         for other in ["missing field `sha256`", "rate is `abc`, but must be `max`"] {
             assert_eq!(in_plain_words("rate", other), None);
         }

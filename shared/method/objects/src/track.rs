@@ -2,11 +2,10 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use crate::config::MAX_SCORE;
+use crate::Object;
 use crate::detector::Detection;
 use crate::filter::{Filter, Sighting, mahalanobis};
 use crate::object::Outline;
-use crate::{Object, ObjectsConfig};
 
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
@@ -22,6 +21,14 @@ const HEADING_SIGMA_RAD: f64 = 0.2;
 /// prediction of the same object: wider than its own noise, so that it contains an object that
 /// brakes hard or turns off.
 const GATE: f64 = 50.0;
+/// Likelihood at which the network is as often wrong as right: it was trained to miss rather than to
+/// invent.
+const EVEN_LIKELY: f64 = 0.35;
+/// Least score of a track that becomes an object: the sum of the log-likelihood ratios of an object
+/// to no object.
+const CONFIRM_SCORE: f64 = 1.0;
+/// The largest score, so that an object that has gone ends soon.
+const MAX_SCORE: f64 = 4.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
 const END_SCORE: f64 = -2.0;
@@ -71,7 +78,7 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
+    pub fn new(detection: &Detection) -> Self {
         let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
         measure_velocity(&mut filter, detection);
         Self {
@@ -87,7 +94,7 @@ impl Track {
             moving: false,
             lost: false,
             stopped: false,
-            score: evidence(detection, config),
+            score: evidence(detection),
         }
     }
 
@@ -114,7 +121,7 @@ impl Track {
         (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
-    pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
+    pub fn update(&mut self, detection: &Detection) {
         self.filter.update(&sighting(detection));
         measure_velocity(&mut self.filter, detection);
         let speed_mps = self.filter.velocity().norm();
@@ -129,7 +136,7 @@ impl Track {
         for (size_m, seen_m) in self.size_m.iter_mut().zip(detection.size_m) {
             *size_m += share * (seen_m - *size_m);
         }
-        self.score = (self.score + evidence(detection, config)).min(MAX_SCORE);
+        self.score = (self.score + evidence(detection)).min(MAX_SCORE);
         self.hits = self.hits.saturating_add(1);
         self.unseen_s = 0.0;
         self.judge_sight();
@@ -187,14 +194,14 @@ impl Track {
 
     /// Decides whether it moves: whether its speed exceeds a standing object's by more than its
     /// uncertainty explains. Returns whether it becomes an object by that.
-    pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
+    pub fn judge(&mut self) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
         self.moving = speed_mps - STANDING_MPS > MOVING_SIGMAS * sigma_mps;
         self.moving
             && !self.is_object()
             && !self.lost
             && self.hits >= BIRTH_HITS
-            && self.score >= config.confirm_score
+            && self.score >= CONFIRM_SCORE
     }
 
     /// Makes it the object that another track has lost, which ends.
@@ -230,9 +237,9 @@ impl Track {
 
     /// Returns the object, if it is one that is seen, or has been seen well until a moment ago: one
     /// that may have gone elsewhere keeps its identity in case that it is seen again.
-    pub fn object(&self, config: &ObjectsConfig) -> Option<Object> {
+    pub fn object(&self) -> Option<Object> {
         let is_seen = self.unseen_s == 0.0 && self.score >= KEEP_SCORE;
-        let is_there = is_seen || self.score >= config.confirm_score;
+        let is_there = is_seen || self.score >= CONFIRM_SCORE;
         let id = self.id.filter(|_| is_there && !self.lost)?;
         let [length_m, width_m] = self.size_m;
         Some(Object {
@@ -266,12 +273,12 @@ fn measure_velocity(filter: &mut Filter, detection: &Detection) {
 }
 
 /// Returns the log-likelihood ratio of an object to no object, given a detection.
-fn evidence(detection: &Detection, config: &ObjectsConfig) -> f64 {
+fn evidence(detection: &Detection) -> f64 {
     let odds = |likely: f64| {
         let likely = likely.clamp(1e-3, 1.0 - 1e-3);
         (likely / (1.0 - likely)).ln()
     };
-    odds(detection.likely) - odds(config.even_likely)
+    odds(detection.likely) - odds(EVEN_LIKELY)
 }
 
 #[cfg(test)]
@@ -292,34 +299,32 @@ mod tests {
         }
     }
 
-    fn seen(times: u32, config: &ObjectsConfig) -> Track {
-        let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
+    fn seen(times: u32) -> Track {
+        let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]));
         for scan in 1..times {
             track.predict(0.25);
             let x = 20.0 - 2.5 * f64::from(scan);
-            track.update(&detection([x, 3.0], [-10.0, 0.0]), config);
+            track.update(&detection([x, 3.0], [-10.0, 0.0]));
         }
         track
     }
 
     #[test]
     fn a_track_is_where_the_vehicle_was_at_the_time_of_the_scan_and_becomes_an_object() {
-        let config = ObjectsConfig::default();
-        let mut track = seen(1, &config);
+        let mut track = seen(1);
         assert!((track.position() - Point2::new(21.0, 3.0)).norm() < 0.05);
-        assert!(!track.judge(&config));
-        let mut track = seen(3, &config);
+        assert!(!track.judge());
+        let mut track = seen(3);
         assert!((track.position() - Point2::new(16.0, 3.0)).norm() < 0.05);
-        assert!(track.judge(&config));
+        assert!(track.judge());
         track.id = Some(7);
-        let object = track.object(&config).expect("it is one");
+        let object = track.object().expect("it is one");
         assert!(object.id == 7 && object.moving && object.age == 3);
     }
 
     #[test]
     fn what_drives_the_other_way_at_the_same_place_is_not_its_own() {
-        let config = ObjectsConfig::default();
-        let mut track = seen(4, &config);
+        let mut track = seen(4);
         track.predict(0.25);
         assert!(track.cost(&detection([10.0, 3.0], [-9.0, 0.0])).is_some());
         let other = detection([12.0, 3.0], [10.0, 0.0]);
@@ -328,9 +333,8 @@ mod tests {
 
     #[test]
     fn tracks_of_one_vehicle_are_in_one_lane_and_less_than_its_length_apart() {
-        let config = ObjectsConfig::default();
-        let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]), &config);
-        let oncoming = |mps: f64| Track::new(&detection([22.0, 3.5], [mps, 0.1]), &config);
+        let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]));
+        let oncoming = |mps: f64| Track::new(&detection([22.0, 3.5], [mps, 0.1]));
         let first = track(20.0, 3.0);
         assert!(first.is_same(&track(24.0, 3.5)));
         assert!(!first.is_same(&track(25.0, 3.0)));
@@ -342,13 +346,12 @@ mod tests {
 
     #[test]
     fn what_stops_keeps_its_heading_though_it_looks_the_same_from_both_ends() {
-        let config = ObjectsConfig::default();
-        let mut track = seen(4, &config);
+        let mut track = seen(4);
         for _ in 0..12 {
             track.predict(0.25);
             let mut standing = detection([12.0, 3.0], [-0.1, 0.0]);
             standing.heading = Vector2::new(1.0, 0.05).normalize();
-            track.update(&standing, &config);
+            track.update(&standing);
         }
         assert!(track.filter.velocity().norm() < HEADING_MPS);
         assert!(track.heading.x < -0.99 && track.heading.y < 0.0);
@@ -356,18 +359,17 @@ mod tests {
 
     #[test]
     fn a_lost_object_is_what_begins_where_it_would_be_and_nothing_that_was_beside_it() {
-        let config = ObjectsConfig::default();
-        let mut lost = seen(4, &config);
+        let mut lost = seen(4);
         lost.id = Some(1);
         for _ in 0..8 {
             lost.predict(0.25);
             lost.miss();
         }
         assert!(lost.lost && !lost.is_over());
-        assert_eq!(lost.object(&config), None);
+        assert_eq!(lost.object(), None);
         let begun = |known_s: f64, x: f64| Track {
             known_s,
-            ..Track::new(&detection([x, 3.0], [-10.0, 0.0]), &config)
+            ..Track::new(&detection([x, 3.0], [-10.0, 0.0]))
         };
         // It is 20 m on, at 13.5 - 20 m.
         assert!(lost.distance(&begun(0.5, -7.5)).is_some());
@@ -378,31 +380,29 @@ mod tests {
         assert!(found.id == Some(1) && found.age == 12);
         assert!(lost.is_over() && !found.is_over());
         lost.score = MAX_SCORE;
-        assert!(!lost.judge(&config), "it becomes none again");
+        assert!(!lost.judge(), "it becomes none again");
     }
 
     #[test]
     fn what_gave_way_keeps_its_identity_if_it_has_one() {
-        let config = ObjectsConfig::default();
-        let mut track = seen(4, &config);
+        let mut track = seen(4);
         track.lose();
         assert!(track.is_over());
         track.id = Some(1);
-        assert!(!track.is_over() && track.object(&config).is_none());
+        assert!(!track.is_over() && track.object().is_none());
         track.predict(0.5);
-        let begun = Track::new(&detection([8.5, 3.0], [-10.0, 0.0]), &config);
+        let begun = Track::new(&detection([8.5, 3.0], [-10.0, 0.0]));
         assert!(track.distance(&begun).is_some());
     }
 
     #[test]
     fn an_object_that_stopped_is_what_begins_to_drive_from_there() {
-        let config = ObjectsConfig::default();
         let slow = |scan: u32| detection([20.0 - 0.375 * f64::from(scan), 3.0], [-1.5, 0.0]);
-        let mut stopped = Track::new(&slow(0), &config);
+        let mut stopped = Track::new(&slow(0));
         stopped.id = Some(1);
         for scan in 1..12 {
             stopped.predict(0.25);
-            stopped.update(&slow(scan), &config);
+            stopped.update(&slow(scan));
         }
         for _ in 0..60 {
             stopped.predict(0.25);
@@ -412,7 +412,7 @@ mod tests {
         let place = stopped.position();
         let begun = |ahead_m: f64, velocity: [f64; 2]| {
             let at = [place.x - ahead_m, place.y];
-            let mut begun = Track::new(&detection(at, velocity), &config);
+            let mut begun = Track::new(&detection(at, velocity));
             begun.known_s = 0.5;
             stopped.distance(&begun).is_some()
         };

@@ -7,7 +7,7 @@ use gyre_geometry::SparsePoint;
 use crate::assignment::assign;
 use crate::detector::{Detection, Detector};
 use crate::track::Track;
-use crate::{Object, ObjectsConfig, ObjectsError, PlacedScan};
+use crate::{Object, ObjectsError, PlacedScan};
 
 /// A place counts as part of a moving vehicle from this likelihood of the network on: a less likely
 /// place keeps no track alive.
@@ -17,7 +17,6 @@ const LEAST_LIKELY: f64 = 0.1;
 const MAX_GAP_S: f64 = 2.0;
 
 pub struct ObjectTracker {
-    config: ObjectsConfig,
     detector: Detector,
     tracks: Vec<Track>,
     objects: Vec<Object>,
@@ -28,10 +27,8 @@ pub struct ObjectTracker {
 impl ObjectTracker {
     /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
     /// rten, which takes several times as long.
-    pub fn new(config: &ObjectsConfig, runtime: Option<&Path>) -> Result<Self, ObjectsError> {
-        config.validate()?;
+    pub fn new(runtime: Option<&Path>) -> Result<Self, ObjectsError> {
         Ok(Self {
-            config: config.clone(),
             detector: Detector::new(runtime)?,
             tracks: Vec::new(),
             objects: Vec::new(),
@@ -51,10 +48,10 @@ impl ObjectTracker {
         self.predict(scan.stamp_ns);
         let found = self.detector.detect(scan, points, LEAST_LIKELY)?;
         let rest = self.assign(found);
-        let begun = rest.iter().map(|it| Track::new(it, &self.config));
+        let begun = rest.iter().map(Track::new);
         self.tracks.extend(begun);
         self.judge();
-        let objects = self.tracks.iter().filter_map(|it| it.object(&self.config));
+        let objects = self.tracks.iter().filter_map(Track::object);
         self.objects.clear();
         self.objects.extend(objects);
         Ok(&self.objects)
@@ -86,7 +83,6 @@ impl ObjectTracker {
     }
 
     fn assign_to(&mut self, tracks: &[usize], found: Vec<Detection>) -> Vec<Detection> {
-        let config = &self.config;
         let costs: Vec<Vec<Option<f64>>> = tracks
             .iter()
             .map(|track| {
@@ -101,7 +97,7 @@ impl ObjectTracker {
             match assigned {
                 Some(detection) => {
                     is_left[detection] = false;
-                    track.update(&found[detection], config);
+                    track.update(&found[detection]);
                 }
                 None => track.miss(),
             }
@@ -125,7 +121,7 @@ impl ObjectTracker {
         }
         self.tracks.retain(|track| !track.is_over());
         for index in 0..self.tracks.len() {
-            if self.tracks[index].judge(&self.config) {
+            if self.tracks[index].judge() {
                 self.confirm(index);
             }
         }

@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::{Pose, SparsePoint, Twist, pose};
-use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
+use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -66,7 +66,7 @@ impl Scene {
     fn settled() -> Self {
         let mut scene = Self {
             sensor_mps: 8.0,
-            tracker: ObjectTracker::new(&ObjectsConfig::default(), None).unwrap(),
+            tracker: ObjectTracker::new(None).unwrap(),
             random: ChaCha8Rng::seed_from_u64(5),
             scan: 0,
         };

@@ -140,25 +140,17 @@ impl StageConfig {
     }
 }
 
-/// When to give up on a stage: after `limit` restarts within `window_s`.
+/// When to give up on a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RestartPolicy {
-    /// Maximum number of restarts within `window_s`; one more ends the run.
+    /// Maximum number of restarts within 30 s; one more ends the run.
     pub limit: usize,
-    /// Length of the time window of `limit`, s.
-    pub window_s: f64,
-    /// Delay before the restart of a stage that exited, ms. A killed one is restarted at once.
-    pub backoff_ms: u64,
 }
 
 impl Default for RestartPolicy {
     fn default() -> Self {
-        Self {
-            limit: 5,
-            window_s: 30.0,
-            backoff_ms: 100,
-        }
+        Self { limit: 5 }
     }
 }
 

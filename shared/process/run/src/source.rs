@@ -65,6 +65,7 @@ pub struct SourceConfig {
     /// Play the recording again and again, with times that advance: `gyre stress`. `scans` then
     /// counts the scans of all turns; without it the run has no end.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(skip)]
     pub repeat: bool,
     /// Number of scans that become due at once, as from a network that holds them back; the mean
     /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
@@ -75,6 +76,7 @@ pub struct SourceConfig {
     /// Faults to inject into the playback of a recording: `gyre stress`. As in `[{ kind =
     /// "gyro-out", from_s = 4.0, for_s = 3.0 }]`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(skip)]
     pub faults: Vec<PlayedFault>,
     /// Time for which a file that the disk or the network does not give is tried again, s. Then the
     /// run ends, and the same command continues it.

@@ -25,6 +25,10 @@ use crate::{
     start::{Position, Starter},
 };
 
+/// The time in which restarts are counted against the limit of a stage.
+const RESTART_WINDOW: Duration = Duration::from_secs(30);
+/// Delay before the restart of a process that exited. A killed one is restarted at once.
+pub const RESTART_BACKOFF: Duration = Duration::from_millis(100);
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
 /// folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
@@ -156,11 +160,7 @@ impl Child {
 
     /// Returns whether it has lived for longer than the window for counting its deaths.
     pub fn has_outlived_its_window(&self) -> bool {
-        self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
-    }
-
-    pub fn backoff(&self) -> Duration {
-        Duration::from_millis(self.plan.restart.backoff_ms)
+        self.started.elapsed() > RESTART_WINDOW
     }
 
     pub fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
@@ -187,18 +187,17 @@ impl Child {
         if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Process(message));
         }
-        let policy = self.plan.restart;
-        let window = Duration::try_from_secs_f64(policy.window_s).unwrap_or(Duration::MAX);
         self.deaths.push_back(Instant::now());
-        self.deaths.retain(|death| death.elapsed() <= window);
-        if self.deaths.len() <= policy.limit {
+        self.deaths
+            .retain(|death| death.elapsed() <= RESTART_WINDOW);
+        if self.deaths.len() <= self.plan.restart.limit {
             return Ok(());
         }
         Err(SuperviseError::Process(format!(
             "{} died {} times within {} s, the last time by {}{}; giving up",
             self.name(),
             self.deaths.len(),
-            policy.window_s,
+            RESTART_WINDOW.as_secs(),
             death.cause,
             death.output()
         )))

@@ -11,7 +11,7 @@ use gyre_stage::{
 
 use crate::{
     Ending, Event, SuperviseError,
-    child::Child,
+    child::{Child, RESTART_BACKOFF},
     death::Death,
     process_status::{activity, of_child},
     run::Run,
@@ -99,7 +99,7 @@ impl Recorder {
                 death.last_output.unwrap_or_default()
             }
             Ok(()) => {
-                self.restart_at = Some(Instant::now() + self.child.backoff());
+                self.restart_at = Some(Instant::now() + RESTART_BACKOFF);
                 format!(
                     "the recorder died ({}), and is started again: it goes on in another file",
                     death.cause

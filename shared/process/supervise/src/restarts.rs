@@ -5,8 +5,13 @@ use std::time::{Duration, Instant};
 use gyre_stage::clock;
 
 use crate::{
-    Event, Stall, SuperviseError, child::Child, clean, death::Death, followers::Patience,
-    recovery::restarted_after, supervisor::Supervisor,
+    Event, Stall, SuperviseError,
+    child::{Child, RESTART_BACKOFF},
+    clean,
+    death::Death,
+    followers::Patience,
+    recovery::restarted_after,
+    supervisor::Supervisor,
 };
 
 impl Supervisor<'_> {
@@ -41,7 +46,7 @@ impl Supervisor<'_> {
             self.run
                 .note(&format!("{name} died by {}{output}", death.cause));
             if !death.killed {
-                backoff = backoff.max(child.backoff());
+                backoff = backoff.max(RESTART_BACKOFF);
                 if !child.is_on_trial {
                     failure = Some(format!("{name} died after it: {death}"));
                 }

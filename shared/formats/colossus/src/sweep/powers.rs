@@ -42,7 +42,7 @@ impl PowerOrder {
             return order;
         }
         let difference = |number: fn([u8; 2]) -> u16| -> u64 {
-            let of_pair = |pair: &[[u8; 2]]| number(pair[0]).abs_diff(number(pair[1])).into();
+            let of_pair = |pair: &[[u8; 2]]| u64::from(number(pair[0]).abs_diff(number(pair[1])));
             powers.windows(2).map(of_pair).sum()
         };
         self.little += difference(u16::from_le_bytes);

@@ -130,7 +130,7 @@ mod tests {
         let log = GyroLog::of(vec![sample], Path::new("log")).unwrap();
         let config = GyroConfig {
             delay_s: 1.58,
-            up: Some(UpAxis::MinusZ),
+            up: Some(MinusZ),
             scale: 1.01,
             bias_radps: 0.5,
             ..GyroConfig::default()

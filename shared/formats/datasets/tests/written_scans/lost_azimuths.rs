@@ -6,7 +6,7 @@ use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, inspect, open};
 use gyre_radar::{lost::stale_rows, scan::flag};
 
 use super::{folder, opened, options};
-use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
+use crate::common::{PERIOD_US, START_US, read, write_png, write_radiate};
 
 const AZIMUTHS: usize = 40;
 const BINS: usize = 60;
