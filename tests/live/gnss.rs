@@ -11,7 +11,10 @@ use gyre_messages::FollowerId;
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-use super::{gyro::address, radar::Radar};
+use super::{
+    gyro::address,
+    radar::{Radar, complete},
+};
 use crate::{
     common::{
         Ended, Run, gyre,
@@ -29,11 +32,7 @@ pub const FIXES: usize = 58;
 /// The beginning of the drive around a block. All its rows are measured, because a radar sends no
 /// others.
 pub fn drive() -> TempDir {
-    let drive = recording::linked(around_a_block(), |scan| scan < SCANS);
-    for image in recording::images(drive.path()) {
-        recording::complete(&image);
-    }
-    drive
+    complete(recording::linked(around_a_block(), |scan| scan < SCANS))
 }
 
 /// A run of a live radar and a receiver that sends to this address.

@@ -12,7 +12,7 @@ use std::{
 use gyre_simulator::{GyroProfile, SimulationConfig};
 use tempfile::TempDir;
 
-use super::radar::Radar;
+use super::radar::{Radar, complete};
 use crate::{
     common::{Run, recording},
     observers::record::{file, recorded, replay},
@@ -28,11 +28,7 @@ pub fn with_log() -> TempDir {
     config.gyro.profile = GyroProfile::Asm330lhh;
     config.wheels.rate_hz = 20.0;
     let drive = recording::of("live-gyro", &config);
-    let whole = recording::linked(&drive, |_| true);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
-    whole
+    complete(recording::linked(&drive, |_| true))
 }
 
 /// A sensor that sends a log once somebody receives it, in datagrams of ten samples.

@@ -12,6 +12,7 @@ use std::{
 };
 
 use rustix::process::Signal;
+use tempfile::TempDir;
 
 use crate::{
     common::{Ended, Run, gyre, odometry, recording},
@@ -108,6 +109,20 @@ pub(crate) fn run_at(address: &str) -> Run {
         .set("source.silence_s=1")
 }
 
+/// A copy of so many scans of the small recording. All its rows are measured, because a radar sends
+/// no others.
+pub(crate) fn whole(scans: usize) -> TempDir {
+    complete(recording::copy(scans))
+}
+
+/// Makes all rows of a recording measured ones.
+pub(crate) fn complete(drive: TempDir) -> TempDir {
+    recording::images(drive.path())
+        .iter()
+        .for_each(|image| recording::complete(image));
+    drive
+}
+
 impl Drop for Radar {
     fn drop(&mut self) {
         let _ = self.server.kill();
@@ -118,10 +133,7 @@ impl Drop for Radar {
 #[test]
 fn a_radar_gives_the_motions_of_its_recording() {
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
     for clock in [&[][..], &["--big-endian"]] {
         let radar = Radar::playing(whole.path(), clock);
@@ -148,10 +160,7 @@ fn motions(odometry: &str) -> Vec<&str> {
 
 #[test]
 fn datagrams_give_the_motions_of_the_recording() {
-    let whole = recording::copy(recording::SCANS);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(recording::SCANS);
     let scans = recording::SCANS / 2;
     let arguments = ["--double", "0.05", "--repeat"];
     let radar = Radar::sending(&group(1), whole.path(), &arguments);
@@ -236,10 +245,7 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
 #[test]
 fn a_capture_of_a_radar_is_played_as_that_radar() {
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let radar = Radar::playing(whole.path(), &["--rate", "8"]);
     let file = whole.path().join("radar.capture");
     let mut command = gyre();

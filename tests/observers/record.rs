@@ -20,6 +20,7 @@ use crate::{
         send, undisturbed,
     },
     operate::commands::{ask, await_status, process},
+    reach::python_has,
     restart::faults::configurations,
 };
 
@@ -147,41 +148,6 @@ fn await_file(path: &Path) {
     while !path.exists() {
         thread::sleep(Duration::from_millis(5));
     }
-}
-
-#[test]
-fn a_recording_in_several_files_replays_to_the_same_bytes() {
-    let run = recorded(&played()).set(ALL).set("record.split_s=1.5");
-    let odometry = run.complete();
-    let files = parts(&file(&run));
-    // Six seconds of scans; a file may begin with a message of a scan that is in the one before.
-    assert!((4..8).contains(&files.len()), "{files:?}");
-    let recording = open_recording(&file(&run)).unwrap();
-    assert_eq!(seqs(&recording, "scan").len(), SCANS);
-    assert_eq!(recording.damages().count(), 0, "each file has its end");
-    assert_eq!(replay(run.folder(), &[]), odometry, "named by its folder");
-    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
-}
-
-#[test]
-fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
-    let run = recorded(&played()).rate("1").set("record.split_mb=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 2);
-    let killed = await_recorder(&mut running, None);
-    let before = parts(&file(&run));
-    assert!(before.len() > 1, "{before:?}");
-    send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
-    running.finish().succeeded();
-    let recording = open_recording(&file(&run)).unwrap();
-    assert!(
-        recording.damages().count() <= 1,
-        "only the file of the kill"
-    );
-    assert!(parts(&file(&run)).len() > before.len());
-    assert_eq!(seqs(&recording, "scan").len(), SCANS);
-    assert_eq!(replay(&file(&run), &[]), run.odometry());
 }
 
 #[test]
@@ -486,34 +452,6 @@ fn real_scans_replay_to_the_same_bytes() {
         .refused_with(&["range_offset_m", "that they were recorded with"]);
 }
 
-/// Reads a recording with the Python package `mcap` and prints the messages by channel.
-const READ: &str = "
-import collections, sys
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
-counts = collections.Counter()
-with open(sys.argv[1], 'rb') as file:
-    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
-        topics=['/scan', '/pose', '/tf', '/trajectory', '/motion', '/refined', '/log']
-    ):
-        counts[channel.topic] += 1
-        if channel.topic == '/scan':
-            assert len(decoded.data) == decoded.step * decoded.height, decoded.step
-print(dict(counts))
-";
-
-/// Returns whether recordings can be read by others; prints why a test is skipped.
-fn can_read() -> bool {
-    let import = Command::new(python())
-        .args(["-c", "import mcap_protobuf"])
-        .output();
-    let can = import.is_ok_and(|output| output.status.success());
-    if !can {
-        println!("skipped: {} has no package mcap-protobuf-support", python());
-    }
-    can
-}
-
 /// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of
 /// each box the time, the identity, the place and the length, and the number of arrows.
 const READ_OBJECTS: &str = "
@@ -537,7 +475,7 @@ print(json.dumps({'boxes': boxes, 'arrows': arrows}))
 
 #[test]
 fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
-    if !can_read() {
+    if !python_has("mcap_protobuf") {
         return;
     }
     let run = Run::small().data(around_a_block()).set(WINDOW);
@@ -572,19 +510,4 @@ fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
     assert_eq!(boxes.len(), rows.len());
     let moving = rows.iter().filter(|row| row[5] == "1").count();
     assert_eq!(read["arrows"], moving);
-}
-
-#[test]
-fn the_python_package_mcap_reads_a_recording() {
-    if !can_read() {
-        return;
-    }
-    let run = recorded(&played());
-    run.complete();
-    let mut command = Command::new(python());
-    command.args(["-c", READ]).arg(file(&run));
-    let ended = Ended::of(command);
-    ended.succeeded();
-    let counts = format!("'/scan': {SCANS}");
-    assert!(ended.stdout.contains(&counts), "{}", ended.stdout);
 }

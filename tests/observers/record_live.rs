@@ -89,18 +89,6 @@ fn assert_lacks_little(run: &Run) {
 
 #[test]
 #[ignore = ".ci/nightly: kills at many moments"]
-fn a_recording_is_of_the_results_after_masking_was_killed() {
-    let run = played();
-    let mut running = run.start();
-    for poses in [8, 14, 20] {
-        running.await_poses(poses).kill("masking");
-    }
-    running.finish().succeeded();
-    assert_lacks_little(&run);
-}
-
-#[test]
-#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
     let mut running = run.start();

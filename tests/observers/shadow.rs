@@ -17,7 +17,7 @@ use crate::{
     common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
-    reach::{conformance, python_stage},
+    reach::conformance,
 };
 
 const SCANS: usize = 160;
@@ -377,31 +377,6 @@ fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
     release(&running);
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-#[ignore = ".ci/nightly: a stage in Python beside a run"]
-fn python_masking_beside_the_own_one_is_compared() {
-    if !python_stage::can_start() {
-        return;
-    }
-    let run = long().rate(RATE).set("masking.kind=threshold");
-    let running = held(&run);
-    let [python, script] = python_stage::command();
-    let command = format!("'{python}' '{script}'");
-    let shadow = Shadow::start(
-        &run,
-        "python",
-        "masking",
-        &["--command", &command, "--scans", "8"],
-    );
-    shadow.await_attached();
-    release(&running);
-    let (code, report) = shadow.end();
-    assert_eq!(code, Some(0), "{report:#}");
-    let largest = report["differences"]["mask"]["max"].as_f64();
-    assert!(largest.is_none_or(|largest| largest < 0.05), "{report:#}");
-    running.finish().succeeded();
 }
 
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {

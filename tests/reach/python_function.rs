@@ -10,26 +10,16 @@ use std::{
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-use crate::common::{
-    Ended, Run, folder, gyre,
-    leftovers::root,
-    odometry::columns,
-    processes::{child_with, of_run},
-    python, send, undisturbed,
+use crate::{
+    common::{
+        Ended, Run, folder, gyre,
+        leftovers::root,
+        odometry::columns,
+        processes::{child_with, of_run},
+        send, undisturbed,
+    },
+    reach::{assert_near, python_has, swap_masking},
 };
-
-/// Returns whether Python has numpy; prints why a test is skipped.
-fn can_start() -> bool {
-    let imported = Command::new(python()).args(["-c", "import numpy"]).output();
-    let has_numpy = imported.is_ok_and(|output| output.status.success());
-    if !has_numpy {
-        println!(
-            "skipped: {} has no numpy, or GYRE_PYTHON names another",
-            python()
-        );
-    }
-    has_numpy
-}
 
 /// A file with a function.
 fn file(text: &str) -> (TempDir, PathBuf) {
@@ -51,7 +41,7 @@ fn failing(stage: &str, file: &Path) -> Run {
 
 #[test]
 fn factors_of_one_change_no_byte() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     for shape in ["power", "raster"] {
@@ -64,7 +54,7 @@ fn factors_of_one_change_no_byte() {
 
 #[test]
 fn factors_of_powers_are_a_threshold_where_they_are_one() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
@@ -76,23 +66,12 @@ fn factors_of_powers_are_a_threshold_where_they_are_one() {
     let masked = run.complete();
     assert_ne!(masked, undisturbed());
     // Powers count from the threshold on, so the rasters differ, but not by where things are.
-    for (a, b) in places(&threshold).iter().zip(places(&masked)) {
-        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.1, "{a:?} {b:?}");
-    }
-}
-
-/// The x and y of all motions, m.
-fn places(odometry: &str) -> Vec<[f64; 2]> {
-    let rows = columns(odometry, &["x_m", "y_m"]);
-    let number = |text: &String| text.parse().unwrap();
-    rows.iter()
-        .map(|row| [number(&row[0]), number(&row[1])])
-        .collect()
+    assert_near(&threshold, &masked, 0.1);
 }
 
 #[test]
 fn a_mask_sees_the_scan_and_its_place() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let (folder, file) = file(
@@ -119,7 +98,7 @@ fn a_mask_sees_the_scan_and_its_place() {
 
 #[test]
 fn searches_return_the_motion_of_the_run() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let (_folder, file) = file(
@@ -167,7 +146,7 @@ fn failing_mask() -> (TempDir, PathBuf) {
 
 #[test]
 fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let (_folder, file) = failing_mask();
@@ -185,79 +164,55 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: starts Python often"]
-fn conformance_says_the_line_of_an_exception() {
-    if !can_start() {
-        return;
-    }
-    let (_folder, file) = failing_mask();
-    let mut conformance = gyre();
-    conformance
-        .args(["conformance", "masking", "--scans", "12", "--python"])
-        .arg(&file);
-    let output = conformance.output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
-    assert!(
-        !output.status.success() && printed.contains("line 3: KeyError: 'wall'"),
-        "{printed}"
-    );
-}
-
-#[test]
 fn what_cannot_be_loaded_or_returned_is_said() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
-    for (text, sentence) in [
-        ("def mask(scan)\n    return 1\n", "line 1: SyntaxError"),
+    let spread = "neither a standard deviation nor a covariance";
+    for (stage, text, sentence) in [
+        ("masking", "def mask(scan)", "line 1: SyntaxError"),
+        ("masking", "masks = 1", "there is no function `mask`"),
+        ("masking", "mask = lambda s: s.power[:, :3]", "shape"),
         (
-            "import nothing_of_this_name\n",
-            "line 1: ModuleNotFoundError",
-        ),
-        (
-            "def masks(scan):\n    return 1\n",
-            "there is no function `mask`",
-        ),
-        ("def mask(scan):\n    return scan.power[:, :3]\n", "shape"),
-        (
-            "def mask(scan):\n    return scan.raster + 2.0\n",
+            "masking",
+            "mask = lambda s: s.raster + 2.0",
             "not all from 0 to 1",
         ),
+        ("masking", "mask = lambda s: 1j * s.raster", "complex"),
         (
-            "def mask(scan):\n    return scan.raster * float('nan')\n",
-            "not all from 0 to 1",
-        ),
-        ("def mask(s):\n    return 1j * s.raster\n", "complex"),
-        (
-            "from numpy.ma import *\nmask = lambda _: masked_all(9)\n",
+            "masking",
+            "from numpy.ma import *\nmask = lambda s: masked_all(9)",
             "masked",
         ),
         (
-            "import os\ndef mask(scan):\n    os._exit(3)\n",
+            "masking",
+            "import os\nmask = lambda s: os._exit(3)",
             "Python has ended",
+        ),
+        (
+            "rotation-search",
+            "rotation = lambda *s: (7.0, 0.1)",
+            "at most half a turn",
+        ),
+        ("rotation-search", "rotation = lambda *s: 0.1", "TypeError"),
+        (
+            "rotation-search",
+            "rotation = lambda *s: (float('nan'), 0)",
+            "not finite",
+        ),
+        (
+            "translation-search",
+            "translation = lambda *s: (1, 0, -0.1)",
+            spread,
+        ),
+        (
+            "translation-search",
+            "translation = lambda *s: (1, 0, [[1, 5], [0, 1]])",
+            spread,
         ),
     ] {
         let (_folder, file) = file(text);
-        let run = failing("masking", &file);
-        run.finish().failed_with(&["mine.py", sentence]);
-    }
-    for (returned, sentence) in [
-        ("7.0, 0.1", "at most half a turn"),
-        ("0.1, -0.1", "0 or more"),
-        ("0.1", "TypeError"),
-        ("float('nan'), 0.1", "not finite"),
-        ("0.1, 1j", "complex numbers"),
-    ] {
-        let text = format!("def rotation(scan, previous):\n    return {returned}\n");
-        let (_folder, file) = file(&text);
-        let run = failing("rotation-search", &file);
-        run.finish().failed_with(&["mine.py", sentence]);
-    }
-    for spread in ["-0.1", "[[-1, 0], [0, 1]]", "[[1, 5], [0, 1]]"] {
-        let text = format!("def translation(scan, previous, turn):\n    return 1, 0, {spread}\n");
-        let (_folder, file) = file(&text);
-        let run = failing("translation-search", &file);
-        let sentence = "neither a standard deviation nor a covariance";
+        let run = failing(stage, &file);
         run.finish().failed_with(&["mine.py", sentence]);
     }
     let run = with(Run::of_recording(), "masking", Path::new("no_such.py"));
@@ -301,7 +256,7 @@ fn an_interpreter_that_is_none_is_tried_once() {
 
 #[test]
 fn killed_it_leaves_no_interpreter_and_no_other_byte() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
@@ -322,7 +277,7 @@ fn killed_it_leaves_no_interpreter_and_no_other_byte() {
 
 #[test]
 fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let above = |power: u8| format!("def mask(scan):\n    return scan.power > {power}\n");
@@ -365,7 +320,7 @@ fn begun_searches_keep_the_contract_and_drive() {
 }
 
 fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     for (stage, function) in stages {
@@ -382,10 +337,7 @@ fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
             .arg(&file);
         Ended::of(conformance).succeeded();
         let odometry = with(Run::of_recording(), stage, &file).complete();
-        for (own, mine) in places(undisturbed()).iter().zip(places(&odometry)) {
-            let apart_m = (own[0] - mine[0]).hypot(own[1] - mine[1]);
-            assert!(apart_m < 0.5, "{stage}: {apart_m} m");
-        }
+        assert_near(undisturbed(), &odometry, 0.5);
     }
 }
 
@@ -415,7 +367,7 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
 
 #[test]
 fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let run = Run::of_recording().rate("0.5");
@@ -423,10 +375,8 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
     let own = running.await_poses(4).await_stage("masking");
     let swap = |text: &str| {
         let (folder, file) = file(text);
-        let mut swap = gyre();
-        swap.args(["swap", "masking"]).arg(run.out());
-        swap.arg("--python").arg(&file);
-        (folder, Ended::of(swap))
+        let ended = swap_masking(&run, &["--python", file.to_str().unwrap()]);
+        (folder, ended)
     };
     let (_folder, ended) = swap("def mask(scan):\n    return scan.\n");
     ended.refused_with(&["cannot take over", "line 2: SyntaxError"]);
@@ -443,7 +393,7 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
 
 #[test]
 fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
-    if !can_start() {
+    if !python_has("numpy") {
         return;
     }
     let model = "shared/method/masking/tests/models/pair-127.toml";
@@ -453,10 +403,8 @@ fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
     let mut running = run.start();
     running.await_poses(2);
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.arg("--python").arg(&file);
-    Ended::of(swap).refused_with(&["cannot take over", "one scan at a time"]);
+    let swap = swap_masking(&run, &["--python", file.to_str().unwrap()]);
+    swap.refused_with(&["cannot take over", "one scan at a time"]);
     running.signal(Signal::INT);
     running.end();
     // In a run that begins with it, it takes the network's place.

@@ -21,6 +21,7 @@ use serde_json::Value;
 use crate::{
     PROJECT,
     common::{Ended, Run, gyre, python, recording, undisturbed},
+    reach::{assert_near, python_has, swap_masking},
 };
 
 /// The Python and the script.
@@ -33,16 +34,7 @@ pub fn command() -> [String; 2] {
 
 /// Returns whether the stage can be started; prints why a test is skipped.
 pub fn can_start() -> bool {
-    let mut python = Command::new(&command()[0]);
-    let imported = python.args(["-c", "import iceoryx2, numpy"]).output();
-    let has_packages = imported.is_ok_and(|output| output.status.success());
-    if !has_packages {
-        println!(
-            "skipped: {} has no packages iceoryx2 and numpy, or GYRE_PYTHON names another",
-            command()[0]
-        );
-    }
-    has_packages
+    python_has("iceoryx2, numpy")
 }
 
 pub fn with_python(run: Run) -> Run {
@@ -151,21 +143,10 @@ fn it_keeps_the_contract_of_masking() {
         return;
     }
     let mut command = gyre();
-    command.args([
-        "conformance",
-        "masking",
-        "--command",
-        &self::command().join(" "),
-    ]);
-    command.args([
-        "--scans",
-        "12",
-        "--set",
-        "raster.n=63",
-        "--stop-timeout-s",
-        "30",
-    ]);
-    command.args(["--patience-s", "60"]);
+    let words =
+        "conformance masking --scans 12 --set raster.n=63 --stop-timeout-s 30 --patience-s 60";
+    command.args(words.split(' '));
+    command.args(["--command", &self::command().join(" ")]);
     Ended::of(command).succeeded();
 }
 
@@ -175,25 +156,7 @@ fn its_motions_are_those_of_the_own_masking_to_a_centimetre() {
         return;
     }
     let python = with_python(Run::of_recording()).complete();
-    let (own, python) = (motions(undisturbed()), motions(&python));
-    assert_eq!(own.len(), python.len());
-    for (own, python) in own.iter().zip(&python) {
-        let apart_m = (own[0] - python[0]).hypot(own[1] - python[1]);
-        assert!(apart_m < 0.01, "{apart_m} m");
-    }
-}
-
-/// The x and y of all motions, m.
-fn motions(odometry: &str) -> Vec<[f64; 2]> {
-    let mut rows = csv::Reader::from_reader(odometry.as_bytes());
-    let columns = rows.headers().unwrap().clone();
-    let column = |name| columns.iter().position(|column| column == name).unwrap();
-    let (x, y) = (column("x_m"), column("y_m"));
-    let number = |row: &csv::StringRecord, at: usize| row[at].parse().unwrap();
-    rows.records()
-        .map(|row| row.unwrap())
-        .map(|row| [number(&row, x), number(&row, y)])
-        .collect()
+    assert_near(undisturbed(), &python, 0.01);
 }
 
 #[test]
@@ -205,9 +168,9 @@ fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
     let run = Run::of_recording().rate("0.5");
     let mut running = run.start();
     running.await_poses(4);
-    swap_masking(&run, &["--command", &command().join(" ")]);
+    swap_masking(&run, &["--command", &command().join(" ")]).succeeded();
     running.await_poses(12);
-    swap_masking(&run, &[]);
+    swap_masking(&run, &[]).succeeded();
     running.finish().succeeded();
     let summary = run.summary();
     assert_eq!(
@@ -215,31 +178,7 @@ fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
         (&0.into(), &recording::SCANS.into())
     );
     assert_eq!(summary["swaps"].as_array().unwrap().len(), 2);
-    for (own, mixed) in motions(undisturbed()).iter().zip(motions(&run.odometry())) {
-        let apart_m = (own[0] - mixed[0]).hypot(own[1] - mixed[1]);
-        assert!(apart_m < 0.01, "{apart_m} m");
-    }
-}
-
-#[test]
-fn it_takes_over_in_a_live_run_and_gives_way_again_and_every_scan_is_accounted_for() {
-    if !can_start() {
-        return;
-    }
-    let run = Run::of_recording().rate("0.4").set("run.mode=live");
-    let mut running = run.start();
-    running.await_poses(4);
-    // Each returns after the first pose of the program that has taken over.
-    swap_masking(&run, &["--command", &command().join(" ")]);
-    swap_masking(&run, &[]);
-    swap_masking(&run, &["--command", &command().join(" ")]);
-    running.finish().succeeded();
-    let summary = run.summary();
-    let count = |key: &str| summary[key].as_u64().unwrap();
-    assert_eq!(count("published"), recording::SCANS as u64);
-    assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert_eq!(count("breaks"), 0, "the chain goes on");
-    assert_eq!(summary["swaps"].as_array().unwrap().len(), 3);
+    assert_near(undisturbed(), &run.odometry(), 0.01);
 }
 
 #[test]
@@ -252,18 +191,9 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
         .set("masking.undo_doppler=true");
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.args(["--command", &command().join(" ")]);
-    Ended::of(swap).refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
+    let swap = swap_masking(&run, &["--command", &command().join(" ")]);
+    swap.refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
     assert_eq!(running.await_stage("masking"), own);
     running.signal(Signal::INT);
     running.end();
-}
-
-fn swap_masking(run: &Run, command: &[&str]) {
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.args(command);
-    Ended::of(swap).succeeded();
 }

@@ -9,31 +9,20 @@ use std::{
     process::{self, Child, ChildStdout, Command, Stdio},
 };
 
-use gyre_geometry::{ComposedMotion, OdometryMotion, UncertainMotion, covariance, pose};
-use nalgebra::{Matrix3, Vector3};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::common::{Run, gyre, odometry, python};
+use crate::{
+    common::{Run, gyre, odometry, python},
+    reach::python_has,
+};
 
 /// The variance of an unmeasured quantity.
 const UNKNOWN: f64 = 1e6;
-/// Where x, y and yaw are among the values of ROS.
-const PLANAR: [usize; 3] = [0, 1, 5];
 
 /// Returns whether the peer can be started; prints why a test is skipped.
 pub(crate) fn can_speak() -> bool {
-    let can = Command::new(python())
-        .args(["-c", "import cyclonedds"])
-        .output()
-        .is_ok_and(|output| output.status.success());
-    if !can {
-        println!(
-            "skipped: {} has no package cyclonedds, or GYRE_PYTHON names another",
-            python()
-        );
-    }
-    can
+    python_has("cyclonedds")
 }
 
 /// A domain that only this test of this process uses. Those above 101 share their ports with other
@@ -124,163 +113,44 @@ pub(crate) fn stamp_ns(header: &Value) -> i64 {
     part("sec") * 1_000_000_000 + part("nanosec")
 }
 
-/// A pose and its covariance as they are expected.
-struct Expected {
-    stamp_ns: i64,
-    pose: UncertainMotion,
-    /// The velocity, 0 at the first scan.
-    velocity: [f64; 3],
-    /// The covariance, if it was measured.
-    covariance: Option<Matrix3<f64>>,
-}
-
-/// Returns each pose by `odometry.csv`: the motions composed with their covariances, after the
-/// first scan's pose.
-fn expected(run: &Run) -> Vec<Expected> {
-    let names = [
-        "stamp_ns",
-        "interval_ns",
-        "x_m",
-        "y_m",
-        "yaw_rad",
-        "cov_xx",
-        "cov_xy",
-        "cov_xyaw",
-        "cov_yy",
-        "cov_yyaw",
-        "cov_yawyaw",
-        "drift_share",
-        "scale_sigma",
-        "outcome",
-    ];
-    let rows = odometry::columns(&run.odometry(), &names);
-    let mut composed = ComposedMotion::new();
-    let mut poses = Vec::new();
-    for row in rows {
-        let [stamp_ns, interval_ns] =
-            [0, 1].map(|column: usize| row[column].parse::<i64>().unwrap());
-        let at = |column: usize| row[column].parse::<f64>().unwrap();
-        if poses.is_empty() {
-            poses.push(Expected {
-                stamp_ns: stamp_ns - interval_ns,
-                pose: UncertainMotion::identity(),
-                velocity: [0.0; 3],
-                covariance: None,
-            });
-        }
-        let motion = OdometryMotion {
-            motion: pose(at(2), at(3), at(4)),
-            covariance: covariance::unpack(&[5, 6, 7, 8, 9, 10].map(at)),
-            drift_share: at(11),
-            scale_sigma: at(12),
-        };
-        composed = composed.then(&motion);
-        let interval_s = interval_ns as f64 * 1e-9;
-        poses.push(Expected {
-            stamp_ns,
-            pose: composed.motion(),
-            velocity: velocity([2, 3, 4].map(at), interval_s),
-            covariance: (row[13] != "predicted")
-                .then(|| velocity_covariance([2, 3, 4].map(at), &motion.covariance, interval_s)),
-        });
-    }
-    poses
-}
-
-/// The constant velocity in the frame of the vehicle.
-fn velocity([x_m, y_m, yaw_rad]: [f64; 3], interval_s: f64) -> [f64; 3] {
-    let twist = gyre_geometry::Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s);
-    [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps]
-}
-
-/// The covariance of the velocity, from what small errors of the motion do to it.
-fn velocity_covariance(
-    motion: [f64; 3],
-    covariance: &Matrix3<f64>,
-    interval_s: f64,
-) -> Matrix3<f64> {
-    const STEP: f64 = 1e-5;
-    let columns = [0, 1, 2].map(|value| {
-        let [after, before] = [STEP, -STEP].map(|by| {
-            let mut moved = motion;
-            moved[value] += by;
-            Vector3::from(velocity(moved, interval_s))
-        });
-        (after - before) / (2.0 * STEP)
-    });
-    let jacobian = Matrix3::from_columns(&columns);
-    jacobian * covariance * jacobian.transpose()
-}
-
-/// Asserts that 36 numbers are a covariance of (x, y, yaw) in the order of ROS.
-fn assert_covariance(found: &Value, planar: Option<&Matrix3<f64>>, what: &str) {
-    for row in 0..6 {
-        for column in 0..6 {
-            let found = number(&found[6 * row + column]);
-            let place = |value: usize| PLANAR.iter().position(|planar| *planar == value);
-            let expected = match (planar, place(row), place(column)) {
-                (Some(planar), Some(row), Some(column)) => planar[(row, column)],
-                _ if row == column => UNKNOWN,
-                _ => 0.0,
-            };
-            let limit = 1e-9 + 1e-5 * expected.abs();
-            assert!(
-                (found - expected).abs() <= limit,
-                "{what} ({row}, {column}): {found}, expected {expected}"
-            );
-        }
-    }
-}
-
-/// Asserts that odometry equals the results of the run, field by field.
+/// Asserts that odometry has the poses of the results with their covariances, and the velocities of
+/// the motions, whose covariance is unknown where nothing was measured.
 fn assert_odometry(found: &[Value], run: &Run) {
-    let poses = expected(run);
+    let of_pose = "stamp_ns x_m y_m yaw_rad cov_xx cov_xy cov_xyaw cov_yy cov_yyaw cov_yawyaw";
+    let of_pose: Vec<&str> = of_pose.split(' ').collect();
+    let poses = odometry::columns(&run.result("poses.csv"), &of_pose);
+    let motions = odometry::columns(&run.odometry(), &["x_m", "interval_ns", "outcome"]);
     assert_eq!(found.len(), poses.len());
-    for (found, expected) in found.iter().zip(&poses) {
-        assert_eq!(stamp_ns(&found["header"]), expected.stamp_ns);
-        assert_eq!(
-            (&found["header"]["frame_id"], &found["child_frame_id"]),
-            (&"odom".into(), &"base_link".into())
-        );
-        let place = &found["pose"]["pose"];
-        let [x_m, y_m, yaw_rad] = gyre_geometry::xy_yaw(&expected.pose.motion);
-        let turn = &place["orientation"];
-        let found_yaw = 2.0 * number(&turn["z"]).atan2(number(&turn["w"]));
-        for (found, expected) in [
-            (number(&place["position"]["x"]), x_m),
-            (number(&place["position"]["y"]), y_m),
-            (gyre_geometry::wrap_angle(found_yaw - yaw_rad), 0.0),
-            (number(&place["position"]["z"]), 0.0),
-            (number(&turn["x"]), 0.0),
-            (number(&turn["y"]), 0.0),
-        ] {
-            // Rounding of the file, composed.
+    for (index, (found, row)) in found.iter().zip(&poses).enumerate() {
+        let header = &found["header"];
+        assert_eq!(stamp_ns(header).to_string(), row[0]);
+        assert_eq!(header["frame_id"], "odom");
+        assert_eq!(found["child_frame_id"], "base_link");
+        let (pose, covariance) = (&found["pose"]["pose"], &found["pose"]["covariance"]);
+        let turn = &pose["orientation"];
+        let (x, y) = (&pose["position"]["x"], &pose["position"]["y"]);
+        let yaw_rad = 2.0 * number(&turn["z"]).atan2(number(&turn["w"]));
+        let expected: Vec<f64> = row[1..].iter().map(|text| text.parse().unwrap()).collect();
+        let apart_rad = gyre_geometry::wrap_angle(yaw_rad - expected[2]);
+        let covariance = [0, 1, 5, 7, 11, 35].map(|place: usize| number(&covariance[place]));
+        for (found, expected) in [number(x), number(y)].iter().zip(&expected) {
             assert!(
                 (found - expected).abs() < 1e-5,
-                "{}: {found} {expected}",
-                poses.len()
+                "{index}: {found} {expected}"
             );
         }
-        assert_covariance(
-            &found["pose"]["covariance"],
-            Some(&expected.pose.covariance),
-            "pose",
-        );
-        let twist = &found["twist"]["twist"];
-        let found_velocity = [
-            &twist["linear"]["x"],
-            &twist["linear"]["y"],
-            &twist["angular"]["z"],
-        ]
-        .map(number);
-        for (found, expected) in found_velocity.iter().zip(expected.velocity) {
-            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        assert!(apart_rad.abs() < 1e-5, "{index}: {apart_rad}");
+        for (found, expected) in covariance.iter().zip(&expected[3..]) {
+            assert!((found - expected).abs() < 1e-9 + 1e-5 * expected.abs());
         }
-        assert_covariance(
-            &found["twist"]["covariance"],
-            expected.covariance.as_ref(),
-            "twist",
-        );
+        let twist = &found["twist"];
+        let motion = index.checked_sub(1).map(|before| &motions[before]);
+        let is_measured = motion.is_some_and(|motion| motion[2] != "predicted");
+        assert_eq!(number(&twist["covariance"][0]) < UNKNOWN, is_measured);
+        let forward_m = motion.map_or(0.0, |motion| motion[0].parse::<f64>().unwrap());
+        let interval_ns = motion.map_or(0.0, |motion| motion[1].parse::<f64>().unwrap());
+        let driven_m = number(&twist["twist"]["linear"]["x"]) * interval_ns * 1e-9;
+        assert!((driven_m - forward_m).abs() < 0.1, "{driven_m} {forward_m}");
     }
 }
 

@@ -3,16 +3,15 @@
 
 use std::{
     fs,
-    io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Stdio},
 };
 
 use crate::{
-    common::{Run, gyre, odometry, recording, recording::with_constants},
+    common::{Run, odometry, recording, recording::with_constants},
     live::{
         gnss,
         gyro::{SCANS, address, with_log},
+        radar::{Radar, whole},
     },
     observers::record::recorded,
     reach::ros2::{Program, can_speak, domain},
@@ -25,8 +24,8 @@ const B_SCANS: &str = "/radar_data/b_scan_msg";
 
 /// A radar of a recording, behind a driver in ROS 2.
 struct Driver {
-    server: Child,
     _driver: Program,
+    _radar: Radar,
 }
 
 impl Driver {
@@ -42,34 +41,15 @@ impl Driver {
         options: &[&str],
         logs: &[PathBuf],
     ) -> Self {
-        let mut command = gyre();
-        command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
-        let mut server = command
-            .arg(recording)
-            .args(options)
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        BufReader::new(server.stderr.take().unwrap())
-            .read_line(&mut said)
-            .unwrap();
-        let address = said.trim().rsplit(' ').next().unwrap();
-        let mut arguments = vec![domain, address, publishes];
+        // At the radar's own rate, unless the options have another.
+        let radar = Radar::playing(recording, &[&["--rate", "1"], options].concat());
+        let mut arguments = vec![domain, &radar.address, publishes];
         arguments.extend(logs.iter().filter_map(|log| log.to_str()));
         let driver = Program::peer("driver.py", &arguments);
         Self {
-            server,
             _driver: driver,
+            _radar: radar,
         }
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
     }
 }
 
@@ -101,10 +81,7 @@ fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String)
         return;
     }
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
     let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
     let run = receiving(with_constants(Run::small()), &domain, topic, scans);

@@ -188,7 +188,7 @@ impl Stage for ForeignMasking {
             n: fault("n").unwrap_or(127.0) as u32,
             rasters: 1,
             cell_m: 0.8,
-            points: fault("points").unwrap_or(1.0) as u32,
+            points: 1,
             ..MaskedHeader::default()
         };
         self.0.edit(header, seq);
@@ -242,9 +242,6 @@ impl Source for ForeignSource {
         let fault = |field: &str| self.fault.of(field, index as u64);
         if let Some(bins) = fault("bins") {
             header.bins = bins as u32;
-        }
-        if let Some(azimuths) = fault("azimuths") {
-            header.azimuths = azimuths as u32;
         }
         if let Some(stamp_ns) = fault("stamp") {
             header.azimuth_stamp_ns[3] = stamp_ns as i64;
