@@ -52,10 +52,9 @@ impl fmt::Display for Evaluation {
                 write!(f, "RPE           none: {why}")?;
             }
         }
-        if f.alternate() {
-            self.fmt_lengths(f)
-        } else {
-            Ok(())
+        match f.alternate() {
+            true => self.fmt_lengths(f),
+            false => Ok(()),
         }
     }
 }
@@ -138,10 +137,10 @@ impl fmt::Display for Kitti {
 
 impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = self.percent;
         write!(
             f,
-            "{:.4} % of the length; rmse after SE(2) alignment of each segment",
-            self.percent
+            "{percent:.4} % of the length; rmse after SE(2) alignment of each segment"
         )
     }
 }
@@ -188,30 +187,16 @@ impl fmt::Display for Nees {
     /// Writes a table of all segments; the alternate form has lines for each half of the drive,
     /// too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (motions, without_truth) = (self.motions, self.without_truth);
+        let (without_covariance, sigma) = (self.without_covariance, self.truth_sigma);
         write!(
             f,
-            "covariance    {} motions; left out: {} without ground truth, ",
-            self.motions, self.without_truth
-        )?;
-        writeln!(
-            f,
-            "{} without covariance; ground truth {}",
-            self.without_covariance, self.truth_sigma
-        )?;
-        writeln!(
-            f,
-            "{:14}mean NEES over its degrees of freedom (1: consistent, above: overconfident)",
+            "covariance    {motions} motions; left out: {without_truth} without ground truth, \
+             {without_covariance} without covariance; ground truth {sigma}\n\
+             {0:14}mean NEES over its degrees of freedom (1: consistent, above: overconfident)\n\
+             {0:14}[95 % acceptance interval of independent errors]  share outside the 95 % region\n\
+             \n motions      half   segments            pose                     translation                      yaw",
             ""
-        )?;
-        writeln!(
-            f,
-            "{:14}[95 % acceptance interval of independent errors]  share outside the 95 % region",
-            ""
-        )?;
-        write!(
-            f,
-            "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
-            "motions", "half", "segments", "pose", "translation", "yaw"
         )?;
         self.by_length.iter().try_for_each(|length| length.fmt(f))?;
         let lengths = self.by_length.iter();
@@ -230,13 +215,10 @@ impl fmt::Display for NeesLength {
     /// half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
-        let halves = [("first", &self.first_half), ("second", &self.second_half)];
-        let halves = if f.alternate() { &halves[..] } else { &[] };
-        for (half, figures) in halves
-            .iter()
-            .filter_map(|(half, figures)| Some((half, figures.as_ref()?)))
-        {
-            write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
+        for (half, figures) in [("first", &self.first_half), ("second", &self.second_half)] {
+            if let Some(figures) = figures.as_ref().filter(|_| f.alternate()) {
+                write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
+            }
         }
         Ok(())
     }

@@ -58,7 +58,17 @@ pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
         rotation_deg_per_km: 10.0 * rotation_deg_per_100m,
         segments,
         step,
-        by_length: errors.means().map(length_mean).collect(),
+        by_length: errors
+            .means()
+            .map(
+                |(length_m, [translation_percent, rotation_deg_per_100m], segments)| KittiLength {
+                    length_m,
+                    translation_percent,
+                    rotation_deg_per_100m,
+                    segments,
+                },
+            )
+            .collect(),
     })
 }
 
@@ -107,16 +117,5 @@ impl Motion {
     /// acos((trace - 1) / 2) of the rotation as a 3 x 3 matrix, whose trace is 1 + 2 cos.
     fn angle_rad(&self) -> f64 {
         self.rotation.re.clamp(-1.0, 1.0).acos()
-    }
-}
-
-fn length_mean(
-    (length_m, [translation_percent, rotation_deg_per_100m], segments): (f64, [f64; 2], usize),
-) -> KittiLength {
-    KittiLength {
-        length_m,
-        translation_percent,
-        rotation_deg_per_100m,
-        segments,
     }
 }

@@ -5,7 +5,7 @@
 //! *required*: vehicles that move, are near and have been seen in some scans. An object that
 //! matches one that is there but not required, as a pedestrian, counts neither for nor against.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use gyre_objects::assign;
@@ -18,7 +18,7 @@ mod hota;
 pub use bands::ObjectBand;
 pub use hota::Hota;
 
-use bands::{Band, RANGES_M, SPEEDS_MPS, Sums};
+use bands::{ALL, Band, RANGES_M, SPEEDS_MPS, Sums};
 use hota::Compared;
 
 /// A true object at the time of a scan, in the frame of the sensor.
@@ -127,32 +127,26 @@ pub struct ObjectErrors {
 
 impl fmt::Display for ObjectErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            scans,
-            objects,
-            required,
-            matched,
-            ..
-        } = self;
-        writeln!(
-            f,
-            "objects       {objects} in {scans} scans, {matched} of {required} matched"
-        )?;
-        writeln!(f, "recall        {:.1} %", 100.0 * self.recall)?;
-        let wrong = self.false_positives;
-        writeln!(
-            f,
-            "precision     {:.1} %, {wrong} false",
-            100.0 * self.precision
-        )?;
-        writeln!(f, "MOTA          {:.3}", self.mota)?;
-        writeln!(f, "HOTA          {}", self.hota)?;
+        let (objects, scans, hota) = (self.objects, self.scans, &self.hota);
+        let (matched, required) = (self.matched, self.required);
+        let (recall, precision) = (100.0 * self.recall, 100.0 * self.precision);
+        let (wrong, mota) = (self.false_positives, self.mota);
         let (switches, each) = (self.switches, self.switches_per_object);
-        writeln!(f, "ID switches   {switches}, {each:.3} an object")?;
-        writeln!(f, "position      {:.2} m RMSE", self.position_rmse_m)?;
-        writeln!(f, "velocity      {:.2} m/s RMSE", self.velocity_rmse_mps)?;
-        writeln!(f, "heading       {:.1} deg RMSE", self.heading_rmse_deg)?;
-        write!(f, "velocity NEES {:.2}", self.velocity_nees)?;
+        let (position, velocity) = (self.position_rmse_m, self.velocity_rmse_mps);
+        let (heading, nees) = (self.heading_rmse_deg, self.velocity_nees);
+        write!(
+            f,
+            "objects       {objects} in {scans} scans, {matched} of {required} matched\n\
+             recall        {recall:.1} %\n\
+             precision     {precision:.1} %, {wrong} false\n\
+             MOTA          {mota:.3}\n\
+             HOTA          {hota}\n\
+             ID switches   {switches}, {each:.3} an object\n\
+             position      {position:.2} m RMSE\n\
+             velocity      {velocity:.2} m/s RMSE\n\
+             heading       {heading:.1} deg RMSE\n\
+             velocity NEES {nees:.2}"
+        )?;
         for (bands, unit) in [(&self.by_range, "m"), (&self.by_speed, "m/s")] {
             for band in bands {
                 write!(f, "\n{}", band.line(unit))?;
@@ -178,7 +172,7 @@ struct Count {
     seen: BTreeMap<u64, usize>,
     /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,
-    objects: BTreeMap<u64, ()>,
+    objects: BTreeSet<u64>,
     switches: usize,
     all: Sums,
     by_range: [Sums; RANGES_M.len()],
@@ -189,12 +183,8 @@ struct Count {
 impl Count {
     fn add(&mut self, scan: &ObjectScan, options: &ObjectOptions) {
         let (required, others) = self.split(scan, options);
-        let tracked: Vec<TrackedObject> = scan
-            .tracked
-            .iter()
-            .filter(|tracked| tracked.moving)
-            .copied()
-            .collect();
+        let tracked = scan.tracked.iter().filter(|tracked| tracked.moving);
+        let tracked: Vec<TrackedObject> = tracked.copied().collect();
         let pairs = self.pairs(&required, &tracked, options.gate_m);
         let found_as = |truth: usize| {
             let pair = pairs.iter().find(|pair| pair.0 == truth)?;
@@ -215,11 +205,8 @@ impl Count {
         for found in &wrong {
             self.add_false(&tracked[*found]);
         }
-        let judged: Vec<&TrackedObject> = [matched, wrong]
-            .concat()
-            .iter()
-            .map(|f| &tracked[*f])
-            .collect();
+        let judged = matched.iter().chain(&wrong).map(|found| &tracked[*found]);
+        let judged: Vec<&TrackedObject> = judged.collect();
         self.compared
             .push(Compared::new(&required, &judged, options.gate_m));
     }
@@ -234,9 +221,7 @@ impl Count {
             let is_near = range_m(&truth.position) <= options.max_range_m;
             let seen = self.seen.entry(truth.id).or_default();
             *seen += usize::from(is_near && truth.is_seen);
-            let speed_mps = truth
-                .velocity
-                .map_or(f64::INFINITY, |velocity| velocity.norm());
+            let speed_mps = truth.velocity.map_or(f64::INFINITY, |it| it.norm());
             is_near
                 && truth.is_seen
                 && truth.is_vehicle
@@ -285,7 +270,7 @@ impl Count {
 
     /// Adds a required object, and what matches it.
     fn add_required(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
-        self.objects.insert(truth.id, ());
+        self.objects.insert(truth.id);
         if let Some(found) = found {
             let before = self.matches.insert(truth.id, found.id);
             self.switches += usize::from(before.is_some_and(|id| id != found.id));
@@ -315,12 +300,9 @@ impl Count {
     }
 
     fn errors(&self, scans: usize) -> ObjectErrors {
-        let Sums {
-            required,
-            matched,
-            false_positives,
-            ..
-        } = self.all;
+        let (sums, all) = (&self.all, self.all.in_band(&ALL));
+        let (required, matched) = (sums.required, sums.matched);
+        let false_positives = sums.false_positives;
         let wrong = required - matched + false_positives + self.switches;
         let by = |bands: &[Band], sums: &[Sums]| -> Vec<ObjectBand> {
             let both = bands.iter().zip(sums);
@@ -333,15 +315,15 @@ impl Count {
             matched,
             false_positives,
             switches: self.switches,
-            recall: self.all.recall(),
-            precision: self.all.precision(),
+            recall: all.recall,
+            precision: all.precision,
             mota: 1.0 - share(wrong as f64, required),
             hota: Hota::of(&self.compared),
             switches_per_object: share(self.switches as f64, self.objects.len()),
-            position_rmse_m: self.all.position_rmse_m(),
-            velocity_rmse_mps: self.all.velocity_rmse_mps(),
-            heading_rmse_deg: self.all.heading_rmse_deg(),
-            velocity_nees: self.all.velocity_nees(),
+            position_rmse_m: all.position_rmse_m,
+            velocity_rmse_mps: all.velocity_rmse_mps,
+            heading_rmse_deg: all.heading_rmse_deg,
+            velocity_nees: sums.velocity_nees(),
             by_range: by(&RANGES_M, &self.by_range),
             by_speed: by(&SPEEDS_MPS, &self.by_speed),
         }

@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 
 use crate::common::{any_drive, any_pose, chain, drive};
 use gyre_evaluation::{
-    Association, Evaluation, MatchedPoses, Options, SEGMENT_LENGTHS_M, TimedPoses, align, ate,
-    evaluate, kitti, rpe, seg,
+    Association, Evaluation, MatchedPoses, Options, SEGMENT_LENGTHS_M, TimedPoses, ate, evaluate,
+    kitti, rpe, seg,
 };
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
@@ -70,19 +70,13 @@ proptest! {
         let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
         let m = matched(&estimate, &truth);
         prop_assert!(ate(&m).max_m < 1e-8);
+        let round_trip = ate(&m).truth_from_estimate * moved_by;
+        prop_assert!(round_trip.translation.vector.norm() < 1e-7);
+        prop_assert!(round_trip.rotation.angle().abs() < 1e-10);
         prop_assert!(seg(&m, step(5)).unwrap().percent < 1e-8);
         let (kitti, rpe) = (kitti(&m, step(5)).unwrap(), rpe(&m));
         prop_assert!(kitti.translation_percent < 1e-8 && kitti.rotation_deg_per_100m < ARC_COSINE_DEG);
         prop_assert!(rpe.translation_rmse_m < 1e-8 && rpe.rotation_rmse_deg < 1e-8);
-    }
-
-    #[test]
-    fn the_alignment_inverts_the_motion_of_a_copy((n, bend) in any_drive(), moved_by in any_pose()) {
-        let truth = drive(n, bend);
-        let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
-        let round_trip = align(&matched(&estimate, &truth)) * moved_by;
-        prop_assert!(round_trip.translation.vector.norm() < 1e-7);
-        prop_assert!(round_trip.rotation.angle().abs() < 1e-10);
     }
 
     #[test]
@@ -126,19 +120,6 @@ proptest! {
         }
         prop_assert!(result.rotation_deg_per_100m < 1e-12);
         prop_assert!((rpe(&m).forward_ratio.unwrap() - (1.0 + percent / 100.0)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_constant_yaw_drift_is_the_rotation_error(deg_per_100m in -3.0..3.0f64) {
-        let truth: Vec<_> = (0..4000).map(|k| pose(0.25 * f64::from(k), 0.0, 0.0)).collect();
-        let per_step = (deg_per_100m / 400.0).to_radians();
-        let estimate = rechained(&truth, |_, m| m * Pose::rotation(per_step));
-        let result = kitti(&matched(&estimate, &truth), step(40)).unwrap();
-        for l in &result.by_length {
-            let expected = deg_per_100m.abs() * (l.length_m + 0.25) / l.length_m;
-            prop_assert!((l.rotation_deg_per_100m - expected).abs() < ARC_COSINE_DEG);
-        }
-        prop_assert!((result.rotation_deg_per_km - 10.0 * result.rotation_deg_per_100m).abs() < 1e-12);
     }
 
     #[test]

@@ -9,6 +9,9 @@ use super::{TrackedObject, TrueObject, distance_m, share};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Band(f64, f64);
 
+/// The band of everything.
+pub(super) const ALL: Band = Band(0.0, f64::INFINITY);
+
 /// Bands of range, m. Up to 60 m a beam of 1.8 degrees is no wider than a car, and a step of 0.9
 /// degrees no wider than half of one.
 pub(super) const RANGES_M: [Band; 3] =
@@ -99,27 +102,6 @@ impl Sums {
         self.nees += (error.transpose() * inverse * error)[0] / 2.0;
     }
 
-    pub fn recall(&self) -> f64 {
-        share(self.matched as f64, self.required)
-    }
-
-    pub fn precision(&self) -> f64 {
-        share(self.matched as f64, self.matched + self.false_positives)
-    }
-
-    pub fn position_rmse_m(&self) -> f64 {
-        share(self.position_m2, self.matched).sqrt()
-    }
-
-    pub fn velocity_rmse_mps(&self) -> f64 {
-        share(self.velocity_m2_s2, self.moving_pairs).sqrt()
-    }
-
-    pub fn heading_rmse_deg(&self) -> f64 {
-        let squares_rad2 = share(self.heading_rad2, self.moving_pairs);
-        squares_rad2.sqrt().to_degrees()
-    }
-
     pub fn velocity_nees(&self) -> f64 {
         share(self.nees, self.moving_pairs)
     }
@@ -130,11 +112,13 @@ impl Sums {
             from: band.0,
             to: Some(band.1).filter(|bound| bound.is_finite()),
             required: self.required,
-            recall: self.recall(),
-            precision: self.precision(),
-            position_rmse_m: self.position_rmse_m(),
-            velocity_rmse_mps: self.velocity_rmse_mps(),
-            heading_rmse_deg: self.heading_rmse_deg(),
+            recall: share(self.matched as f64, self.required),
+            precision: share(self.matched as f64, self.matched + self.false_positives),
+            position_rmse_m: share(self.position_m2, self.matched).sqrt(),
+            velocity_rmse_mps: share(self.velocity_m2_s2, self.moving_pairs).sqrt(),
+            heading_rmse_deg: share(self.heading_rad2, self.moving_pairs)
+                .sqrt()
+                .to_degrees(),
         }
     }
 }

@@ -33,14 +33,10 @@ pub struct Hota {
 
 impl fmt::Display for Hota {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            hota,
-            detection,
-            association,
-        } = self;
         write!(
             f,
-            "{hota:.3}: detection {detection:.3}, association {association:.3}"
+            "{:.3}: detection {:.3}, association {:.3}",
+            self.hota, self.detection, self.association
         )
     }
 }
@@ -91,12 +87,11 @@ impl Identities {
     fn of(scans: &[Compared]) -> Self {
         let mut identities = Self::default();
         for scan in scans {
-            for (ids, counts) in [
-                (&scan.truth, &mut identities.truth),
-                (&scan.tracked, &mut identities.tracked),
-            ] {
-                ids.iter()
-                    .for_each(|id| *counts.entry(*id).or_default() += 1.0);
+            for id in &scan.truth {
+                *identities.truth.entry(*id).or_default() += 1.0;
+            }
+            for id in &scan.tracked {
+                *identities.tracked.entry(*id).or_default() += 1.0;
             }
             let similarity = &scan.similarity;
             for (row, column) in scan.all() {
@@ -144,21 +139,16 @@ impl Hota {
                 let similarity = scan.similarity[row][column] + ROUNDING;
                 let reached = (similarity / LEVEL_STEP) as usize;
                 let counts = matches.entry(scan.identities(row, column)).or_default();
-                counts
-                    .iter_mut()
-                    .take(reached)
-                    .for_each(|count| *count += 1);
+                let counts = counts.iter_mut().take(reached);
+                counts.for_each(|count| *count += 1);
             }
         }
+        let both = identities.truth.values().chain(identities.tracked.values());
+        let all: f64 = both.sum();
         let mut sum = Self::default();
         for level in 0..LEVELS {
             let counts = || matches.iter().map(|(ids, counts)| (*ids, counts[level]));
             let pairs: usize = counts().map(|(_, count)| count).sum();
-            let all: f64 = identities
-                .truth
-                .values()
-                .chain(identities.tracked.values())
-                .sum();
             let overlap = |(ids, count)| count as f64 * identities.overlap(ids, count as f64);
             let detection = share(pairs as f64, all as usize - pairs);
             let association = share(counts().map(overlap).sum(), pairs);

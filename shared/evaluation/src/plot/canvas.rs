@@ -22,17 +22,13 @@ pub type Chart<'a, 'b> =
 /// everything is drawn this much larger and shown smaller.
 const UNITS_PER_PX: u32 = 8;
 
-/// The colour of the estimate and of errors.
 pub const ESTIMATE: RGBColor = RGBColor(0, 98, 178);
-/// The colour of the ground truth.
 pub const TRUTH: RGBColor = RGBColor(120, 124, 130);
 /// The colour of marks on top of lines.
 pub const MARK: RGBColor = RGBColor(213, 94, 0);
-/// The colour of text.
+/// The colours of text, of secondary text, and of grid lines.
 pub const INK: RGBColor = RGBColor(34, 38, 44);
-/// The colour of secondary text.
 pub const QUIET: RGBColor = RGBColor(96, 102, 110);
-/// The colour of grid lines.
 pub const GRID: RGBColor = RGBColor(226, 229, 233);
 
 /// Height of the header, px.
@@ -55,33 +51,22 @@ pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width))
 }
 
-/// Returns an empty diagram with its axes and their descriptions.
+/// Returns an empty diagram with margins, `bottom` px the lowest, and space for labels on the left
+/// and, `below` px, below it.
 pub fn chart<'a, 'b>(
     area: &Area<'b>,
+    [bottom, below]: [u32; 2],
     x: Range<f64>,
     y: Range<f64>,
-    [x_desc, y_desc]: [&str; 2],
 ) -> Result<Chart<'a, 'b>, PlotError> {
-    let mut chart = within_margins(area, 16.0)
-        .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
-        .build_cartesian_2d(x, y)
-        .map_err(drawing)?;
-    axes(&mut chart, [10, 5], Some(x_desc), y_desc)?;
-    Ok(chart)
-}
-
-/// Returns a diagram to be built with margins, `bottom` px the lowest, and labels on the left.
-pub fn within_margins<'a, 'b>(
-    area: &'a Area<'b>,
-    bottom: f64,
-) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
-    let mut builder = ChartBuilder::on(area);
-    builder
+    ChartBuilder::on(area)
         .margin_left(px(20.0))
         .margin_right(px(20.0))
-        .margin_bottom(px(bottom))
-        .set_label_area_size(LabelAreaPosition::Left, px(84.0));
-    builder
+        .margin_bottom(px(f64::from(bottom)))
+        .set_label_area_size(LabelAreaPosition::Left, px(84.0))
+        .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(below)))
+        .build_cartesian_2d(x, y)
+        .map_err(drawing)
 }
 
 /// Draws the grid and both axes with about so many ticks, and their descriptions.
@@ -166,22 +151,14 @@ pub fn header(
     legend: &[Entry<'_>],
 ) -> Result<(), PlotError> {
     let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
-    area.draw(&Text::new(
-        title.to_owned(),
-        at(24.0, 18.0),
-        font(20.0, INK),
-    ))
-    .map_err(drawing)?;
-    area.draw(&Text::new(
-        caption.to_owned(),
-        at(24.0, 48.0),
-        font(14.0, QUIET),
-    ))
-    .map_err(drawing)?;
-    let label = font(14.0, INK).pos(text_anchor::Pos::new(
-        text_anchor::HPos::Left,
-        text_anchor::VPos::Center,
-    ));
+    let write = |text: &str, at: (i32, i32), font: TextStyle<'static>| {
+        area.draw(&Text::new(text.to_owned(), at, font))
+            .map_err(drawing)
+    };
+    write(title, at(24.0, 18.0), font(20.0, INK))?;
+    write(caption, at(24.0, 48.0), font(14.0, QUIET))?;
+    let centre = text_anchor::Pos::new(text_anchor::HPos::Left, text_anchor::VPos::Center);
+    let label = font(14.0, INK).pos(centre);
     let width = f64::from(area.dim_in_pixel().0) / f64::from(UNITS_PER_PX);
     let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
     for entry in legend {
@@ -196,12 +173,7 @@ pub fn header(
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;
-        area.draw(&Text::new(
-            entry.label.to_owned(),
-            at(x + 33.0, 28.0),
-            label.clone(),
-        ))
-        .map_err(drawing)?;
+        write(entry.label, at(x + 33.0, 28.0), label.clone())?;
         x += entry_width(entry);
     }
     Ok(())
@@ -216,11 +188,7 @@ pub fn dot<C>(at: C) -> Circle<C, u32> {
 pub fn number(value: &f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    if text == "-0" { "0" } else { text }.to_owned()
 }
 
 /// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as
