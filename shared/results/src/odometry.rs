@@ -5,7 +5,7 @@ mod read;
 use std::fmt::Write;
 
 use gyre_evaluation::TimedMotion;
-use gyre_messages::{PoseHeader, RefinementRecord, flag, initial_guess, outcome};
+use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
 
 pub use read::read;
 
@@ -27,61 +27,41 @@ pub fn write_row(pose: &PoseHeader, text: &mut String) {
         "{},{},{},{},{}",
         item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
     );
-    for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
-        let _ = write!(text, ",{value:.9}");
-    }
-    for value in motion.covariance {
-        let _ = write!(text, ",{value:.12}");
-    }
-    let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
-    let _ = write!(
-        text,
-        ",{:.9},{:.9},{angle:.9}",
-        motion.score, motion.runner_up_score
-    );
-    let _ = write!(
-        text,
-        ",{:.12},{:.9}",
-        rotation.variance_rad2, rotation.score
-    );
-    let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
-    for value in motion.searched {
-        let _ = write!(text, ",{value:.9}");
-    }
+    add(text, &[motion.x_m, motion.y_m, motion.yaw_rad], 9);
+    add(text, &motion.covariance, 12);
+    add(text, &[motion.score, motion.runner_up_score], 9);
+    add(text, &[rotation.angle_rad], 9);
+    add(text, &[rotation.variance_rad2], 12);
+    add(text, &[rotation.score, rotation.runner_up_rad], 9);
+    add(text, &[rotation.runner_up_score], 9);
+    add(text, &motion.searched, 9);
     let refinement = &motion.refinement;
-    let _ = write!(
-        text,
-        ",{},{}",
-        outcome_name(refinement),
-        initial_guess_name(refinement)
-    );
-    let stationary = u8::from(refinement.is_stationary());
-    let _ = write!(
-        text,
-        ",{:.9},{:.9},{stationary}",
-        refinement.overlap, refinement.support
-    );
-    let _ = writeln!(text, ",{:.9},{:.9}", motion.drift_share, motion.scale_sigma);
-}
-
-fn outcome_name(refinement: &RefinementRecord) -> &'static str {
-    match refinement.outcome {
+    let outcome = match refinement.outcome {
         outcome::SEARCHED => "searched",
         outcome::REFINED => "refined",
         outcome::WEAK => "weak",
         outcome::PREDICTED => "predicted",
         _ => "unknown",
-    }
-}
-
-fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
-    match refinement.initial_guess {
+    };
+    let guess = match refinement.initial_guess {
         initial_guess::NONE => "none",
         initial_guess::PREDICTION => "prediction",
         initial_guess::SEARCH => "search",
         initial_guess::YAW_OFFSET => "yaw-offset",
         initial_guess::ALONG_WALLS => "along-walls",
         _ => "unknown",
+    };
+    let _ = write!(text, ",{outcome},{guess}");
+    add(text, &[refinement.overlap, refinement.support], 9);
+    let _ = write!(text, ",{}", u8::from(refinement.is_stationary()));
+    add(text, &[motion.drift_share, motion.scale_sigma], 9);
+    text.push('\n');
+}
+
+/// Writes values with so many decimals, a comma before each.
+pub(crate) fn add(text: &mut String, values: &[f64], decimals: usize) {
+    for value in values {
+        let _ = write!(text, ",{value:.decimals$}");
     }
 }
 
@@ -98,7 +78,7 @@ pub fn motion(pose: &PoseHeader) -> Option<TimedMotion> {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Item, MotionEstimate};
+    use gyre_messages::{Item, MotionEstimate, RefinementRecord};
 
     use super::*;
 

@@ -18,7 +18,7 @@ use thiserror::Error;
 
 use crate::{figures, judgement::Judgement, machine::Machine};
 
-pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
+pub use counts::{Counter, Counts, Course};
 pub use gnss::GnssSummary;
 pub use slam::SlamSummary;
 
@@ -69,7 +69,6 @@ impl Mask {
 /// Why the results of a run that has played all scans are unreliable.
 #[derive(Clone, Debug, Error, Serialize)]
 #[error("{0}")]
-#[serde(transparent)]
 pub struct Problem(String);
 
 impl Problem {
@@ -80,37 +79,34 @@ impl Problem {
         let scans = session.scans.unwrap_or(counts.processed as usize);
         let log = out.join("log.jsonl");
         let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
-        if session.ending != Some(Ending::Complete) {
+        let sentence = if session.ending != Some(Ending::Complete) {
             return None;
-        }
-        if poses < 2 {
-            return Some(Self(format!(
+        } else if poses < 2 {
+            format!(
                 "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
-            )));
-        }
-        if let Some(damage) = session.damage {
+            )
+        } else if let Some(damage) = session.damage {
             let missing = counts.missing;
-            return Some(Self(format!(
+            format!(
                 "{damage}; {unreadable} scans cannot be read and {missing} are missing by their times, and the results are of the others: `gyre inspect {data}` names all that is damaged"
-            )));
-        }
-        if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
-            return Some(Self(format!(
+            )
+        } else if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
+            format!(
                 "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
-            )));
-        }
-        if let Some(it) = counts.too_many_are_unsure() {
+            )
+        } else {
+            let it = counts.too_many_are_unsure()?;
             let (all, hardly_measured) = (it.refined + it.doubtful, Self::OF_MOTIONS);
             let cause = match counts.dropped {
                 0 => "The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which".to_owned(),
                 dropped => format!("{dropped} scans were dropped, and motions over dropped scans are long: `gyre stress` finds the rate that this machine keeps up with"),
             };
             let (weak, predicted) = (it.weak, it.predicted);
-            return Some(Self(format!(
+            format!(
                 "{weak} weak and {predicted} predicted motions of {all}: {hardly_measured}. {cause}"
-            )));
-        }
-        None
+            )
+        };
+        Some(Self(sentence))
     }
 }
 
@@ -204,10 +200,6 @@ impl Summary {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    pub fn counts(&self) -> &Counts {
-        &self.counts
-    }
-
     /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
@@ -234,6 +226,7 @@ impl Summary {
         let problem = Problem::of(&configuration.data(), out, session, &counts)
             .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
+        let recovery = report.into_iter().flat_map(|report| &report.recovery);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
@@ -252,20 +245,10 @@ impl Summary {
             wall_s,
             scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
             shared_memory: session.footprint.cloned(),
-            restarts: report
-                .map(|report| report.restarts.clone())
-                .unwrap_or_default(),
-            recovery_ms: report
-                .into_iter()
-                .flat_map(|r| &r.recovery)
-                .map(|time| time.as_secs_f64() * 1e3)
-                .collect(),
-            swaps: report
-                .map(|report| report.swaps.clone())
-                .unwrap_or_default(),
-            stages: report
-                .map(|report| report.counters.clone())
-                .unwrap_or_default(),
+            restarts: report.map_or_else(Default::default, |it| it.restarts.clone()),
+            recovery_ms: recovery.map(|time| time.as_secs_f64() * 1e3).collect(),
+            swaps: report.map_or_else(Default::default, |it| it.swaps.clone()),
+            stages: report.map_or_else(Default::default, |it| it.counters.clone()),
             latency,
             evaluation,
             slam,
@@ -291,10 +274,8 @@ impl fmt::Display for Summary {
             c.processed, self.wall_s, self.scans_per_s
         )?;
         let figures = self.figures();
-        for (title, rows) in figures::GROUPS
-            .iter()
-            .filter(|it| it.0 != figures::ACCURACY)
-        {
+        let groups = figures::GROUPS.iter();
+        for (title, rows) in groups.filter(|it| it.0 != figures::ACCURACY) {
             writeln!(f, "\n{title}")?;
             for row in *rows {
                 if let Some(text) = row.text(&figures) {
@@ -338,10 +319,10 @@ impl Summary {
             row(f, stage.name(), &hop.work)?;
             write!(f, "{:6.0} %", hop.busy * 100.0)?;
             let counters = self.stages.get(stage.name());
-            match counters.and_then(|counters| counters.allocations_after_five) {
-                Some(allocations) => writeln!(f, "{allocations:14}")?,
-                None => writeln!(f)?,
+            if let Some(allocations) = counters.and_then(|it| it.allocations_after_five) {
+                write!(f, "{allocations:14}")?;
             }
+            writeln!(f)?;
         }
         let bound_by = self.latency.bound_by.unwrap_or("nothing");
         writeln!(

@@ -10,19 +10,8 @@ use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
 use gyre_terminal::Failure;
 use serde::Deserialize;
 
-const COLUMNS: [&str; 11] = [
-    "stamp_ns",
-    "interval_ns",
-    "x_m",
-    "y_m",
-    "yaw_rad",
-    "cov_xx",
-    "cov_xy",
-    "cov_xyaw",
-    "cov_yy",
-    "cov_yyaw",
-    "cov_yawyaw",
-];
+const COLUMNS: &str =
+    "stamp_ns interval_ns x_m y_m yaw_rad cov_xx cov_xy cov_xyaw cov_yy cov_yyaw cov_yawyaw";
 
 /// The fields of [`COLUMNS`], and the correlation of the errors of motions: zero if it is missing.
 #[derive(Deserialize)]
@@ -86,8 +75,8 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
         .trim(csv::Trim::All)
         .from_reader(text);
     let header = reader.headers()?;
-    let missing = |name: &&&str| header.iter().all(|column| column != **name);
-    if let Some(name) = COLUMNS.iter().find(missing) {
+    let missing = |name: &&str| header.iter().all(|column| column != *name);
+    if let Some(name) = COLUMNS.split(' ').find(missing) {
         return Err(format!("not an odometry.csv: its header has no column {name}").into());
     }
     reader

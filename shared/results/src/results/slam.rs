@@ -127,12 +127,12 @@ impl Slam {
                 let [query, place] = [ends.0, ends.1].map(|keyframe| self.keyframes[keyframe].0);
                 let [x, y, yaw] = xy_yaw(&candidate.motion.motion);
                 write!(rows, "{query},{place},{x:.4},{y:.4},{yaw:.6},")?;
-                for figure in [
-                    candidate.similarity,
+                let scores = [
                     candidate.correlation,
                     candidate.searched,
                     candidate.runner_up,
-                ] {
+                ];
+                for figure in [candidate.similarity].into_iter().chain(scores) {
                     write!(rows, "{figure:.4},")?;
                 }
                 match candidate.chi_square.is_nan() {
@@ -151,10 +151,8 @@ impl Slam {
     /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that
     /// are used.
     pub fn graph_g2o(&self) -> String {
-        G2o::write(
-            self.estimator.poses(),
-            self.estimator.odometry().chain(self.used()),
-        )
+        let constraints = self.estimator.odometry().chain(self.used());
+        G2o::write(self.estimator.poses(), constraints)
     }
 
     /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.
@@ -180,13 +178,11 @@ impl Slam {
             let pose = self.estimator.pose(keyframe)?;
             let (map_from_truth, start_ns) =
                 *start.get_or_insert((pose.motion * truth.inverse(), stamp_ns));
+            let variances = pose.covariance.diagonal();
             samples.push(BandSample {
                 time_s: (stamp_ns - start_ns) as f64 * 1e-9,
                 error: pose.error(&(map_from_truth * truth)),
-                sigma: pose
-                    .covariance
-                    .diagonal()
-                    .map(|variance| variance.max(0.0).sqrt()),
+                sigma: variances.map(|variance| variance.max(0.0).sqrt()),
             });
         }
         Ok(Bands {
@@ -207,22 +203,17 @@ impl Slam {
     pub fn summary(&self) -> SlamSummary {
         let loops_used = self.used().count();
         let verified = |query: &Query| {
+            let verified = [LoopOutcome::Accepted, LoopOutcome::ContradictsOdometry];
             let candidates = query.candidates.iter();
-            let verified = |outcome| {
-                matches!(
-                    outcome,
-                    LoopOutcome::Accepted | LoopOutcome::ContradictsOdometry
-                )
-            };
-            candidates.filter(|it| verified(it.outcome)).count()
+            candidates
+                .filter(|it| verified.contains(&it.outcome))
+                .count()
         };
         SlamSummary {
             keyframes: self.keyframes.len(),
             loops_used,
             loops_rejected: self.queries.iter().map(verified).sum::<usize>() - loops_used,
-            odometry: None,
-            ground_truth: None,
-            ate_m: None,
+            ..SlamSummary::default()
         }
     }
 }

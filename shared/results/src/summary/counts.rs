@@ -104,14 +104,15 @@ pub struct GyroCounts {
 impl GyroCounts {
     fn add(&mut self, motion: &MotionEstimate) {
         let refinement = &motion.refinement;
-        if refinement.gyro != gyro::NONE {
-            self.motions += 1;
-            self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
-            self.refused += u64::from(refinement.gyro == gyro::REFUSED);
-            self.bias_radps = refinement.gyro_bias_radps;
-            self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
-            self.scale = refinement.gyro_scale;
+        if refinement.gyro == gyro::NONE {
+            return;
         }
+        self.motions += 1;
+        self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
+        self.refused += u64::from(refinement.gyro == gyro::REFUSED);
+        self.bias_radps = refinement.gyro_bias_radps;
+        self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
+        self.scale = refinement.gyro_scale;
     }
 }
 
@@ -289,10 +290,8 @@ impl Counter {
     /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan
     /// played.
     pub fn counts(self, end: Option<&Item>, first: usize, refines: bool) -> Counts {
-        let next = |of: fn(&Item) -> u64| {
-            let after_last = || self.last.as_ref().map(|last| of(last) + 1);
-            end.map(of).or_else(after_last)
-        };
+        let last = self.last.as_ref();
+        let next = |of: fn(&Item) -> u64| end.map(of).or(last.map(|last| of(last) + 1));
         let published = next(|item| item.published).unwrap_or(0);
         let seen = next(|item| item.scan).map_or(0, |next| next.saturating_sub(first as u64));
         let (mut gyro, mut wheels) = (self.gyro, self.wheels);
@@ -301,7 +300,7 @@ impl Counter {
         Counts {
             published,
             processed: self.processed,
-            dropped: end.or(self.last.as_ref()).map_or(0, Item::dropped),
+            dropped: end.or(last).map_or(0, Item::dropped),
             unreadable: seen.saturating_sub(published),
             missing: self.gaps.missing(),
             breaks: self.starts.saturating_sub(1),
@@ -323,18 +322,12 @@ struct Gaps {
     missing: u64,
 }
 
-/// The time that a motion takes, and the turns of the radar in it by the numbers of its scans.
-#[derive(Clone, Copy, Debug)]
-struct Motion {
-    interval_ns: i64,
-    turns: u64,
-}
+/// The time that a motion takes, ns, and the turns of the radar in it by the numbers of its scans.
+type Motion = (i64, u64);
 
-impl Motion {
-    fn missing(&self, period_ns: i64) -> u64 {
-        let fit = (self.interval_ns as f64 / period_ns as f64).round() as u64;
-        fit.saturating_sub(self.turns)
-    }
+fn missing_within(&(interval_ns, turns): &Motion, period_ns: i64) -> u64 {
+    let fit = (interval_ns as f64 / period_ns as f64).round() as u64;
+    fit.saturating_sub(turns)
 }
 
 impl Gaps {
@@ -343,12 +336,9 @@ impl Gaps {
             return;
         }
         let turns = pose.item.scan.saturating_sub(pose.item.previous_scan);
-        let motion = Motion {
-            interval_ns: pose.motion.interval_ns,
-            turns: turns.max(1),
-        };
+        let motion = (pose.motion.interval_ns, turns.max(1));
         match self.period_ns {
-            Some(period_ns) => self.missing += motion.missing(period_ns),
+            Some(period_ns) => self.missing += missing_within(&motion, period_ns),
             None => {
                 self.first.push(motion);
                 if self.first.len() == MOTIONS_OF_PERIOD {
@@ -360,13 +350,13 @@ impl Gaps {
 
     /// Takes the median of the first motions' periods, and counts missing scans among them.
     fn settle(&mut self) {
-        let period = |motion: &Motion| motion.interval_ns / motion.turns as i64;
+        let period = |motion: &Motion| motion.0 / motion.1 as i64;
         let mut periods: Vec<i64> = self.first.iter().map(period).collect();
         periods.sort_unstable();
         let median = periods.get(periods.len() / 2).copied();
         if let Some(period_ns) = median.filter(|period_ns| *period_ns > 0) {
-            let missing = |motion: &Motion| motion.missing(period_ns);
-            self.missing += self.first.iter().map(missing).sum::<u64>();
+            let missing = self.first.iter().map(|it| missing_within(it, period_ns));
+            self.missing += missing.sum::<u64>();
             self.period_ns = Some(period_ns);
         }
         self.first.clear();
@@ -400,28 +390,22 @@ mod tests {
 
     #[test]
     fn every_scan_is_accounted_for() {
-        let pose = |seq, published, scan| PoseHeader {
-            item: Item {
-                seq,
-                published,
-                scan,
-                ..Item::default()
-            },
-            ..PoseHeader::default()
+        let pose = |seq, published, scan| {
+            let mut pose = PoseHeader::default();
+            (pose.item.seq, pose.item.published, pose.item.scan) = (seq, published, scan);
+            pose
         };
         let end = pose(3, 9, 15).item;
         let poses = [pose(0, 0, 5), pose(1, 3, 8), pose(2, 7, 13)];
         let counts = counted(&poses).counts(Some(&end), 5, false);
-        assert_eq!(
-            counts,
-            Counts {
-                published: 9,
-                processed: 3,
-                dropped: 6,
-                unreadable: 1,
-                ..Counts::default()
-            }
-        );
+        let expected = Counts {
+            published: 9,
+            processed: 3,
+            dropped: 6,
+            unreadable: 1,
+            ..Counts::default()
+        };
+        assert_eq!(counts, expected);
     }
 
     #[test]
@@ -446,20 +430,15 @@ mod tests {
     #[test]
     fn weak_and_predicted_motions_are_doubtful() {
         let pose = |(outcome, initial_guess)| {
-            let refinement = RefinementRecord {
+            let mut pose = PoseHeader::default();
+            pose.motion.refinement = RefinementRecord {
                 outcome,
                 initial_guess,
                 stationary: u64::from(outcome == outcome::WEAK),
                 wheels: u64::from(initial_guess == initial_guess::SEARCH) * wheels::USED,
                 ..RefinementRecord::default()
             };
-            PoseHeader {
-                motion: MotionEstimate {
-                    refinement,
-                    ..MotionEstimate::default()
-                },
-                ..PoseHeader::default()
-            }
+            pose
         };
         let poses = [
             (outcome::SEARCHED, initial_guess::NONE),
@@ -486,31 +465,24 @@ mod tests {
     }
 
     fn pose(scan: u64, previous_scan: u64, interval_ms: i64) -> PoseHeader {
-        PoseHeader {
-            item: Item {
-                scan,
-                previous_scan,
-                flags: if scan == 0 { flag::BREAK } else { 0 },
-                ..Item::default()
-            },
-            motion: MotionEstimate {
-                interval_ns: interval_ms * 1_000_000,
-                ..MotionEstimate::default()
-            },
-            ..PoseHeader::default()
-        }
+        let mut pose = PoseHeader::default();
+        (pose.item.scan, pose.item.previous_scan) = (scan, previous_scan);
+        pose.item.flags = if scan == 0 { flag::BREAK } else { 0 };
+        pose.motion.interval_ns = interval_ms * 1_000_000;
+        pose
     }
 
     #[test]
     fn scans_that_the_recording_lacks_show_in_its_times_and_skipped_ones_do_not_count() {
         let missing = |poses: &[PoseHeader]| counted(poses).gaps.missing();
-        let mut poses = vec![
-            pose(0, 0, 0),
-            pose(1, 0, 251),
-            pose(2, 1, 249),
-            pose(4, 2, 500),
-            pose(5, 4, 250),
+        let poses = [
+            (0, 0, 0),
+            (1, 0, 251),
+            (2, 1, 249),
+            (4, 2, 500),
+            (5, 4, 250),
         ];
+        let mut poses = poses.map(|(a, b, ms)| pose(a, b, ms)).to_vec();
         assert_eq!(missing(&poses), 0);
         poses.extend([pose(6, 5, 500), pose(8, 6, 1_000)]);
         assert_eq!(missing(&poses), 1 + 2);
@@ -521,9 +493,8 @@ mod tests {
     fn gaps_of_a_long_run_are_counted_in_bounded_memory() {
         let scans = 3 * MOTIONS_OF_PERIOD as u64;
         let interval_ms = |scan| if scan % 1000 == 999 { 750 } else { 250 };
-        let poses: Vec<_> = (0..scans)
-            .map(|scan| pose(scan, scan.saturating_sub(1), interval_ms(scan)))
-            .collect();
+        let pose = |scan: u64| pose(scan, scan.saturating_sub(1), interval_ms(scan));
+        let poses: Vec<_> = (0..scans).map(pose).collect();
         let counter = counted(&poses);
         assert!(counter.gaps.first.is_empty());
         assert_eq!(counter.gaps.missing(), 2 * (scans / 1000));

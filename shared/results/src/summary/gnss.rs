@@ -69,14 +69,15 @@ struct EastNorth {
 impl EastNorth {
     fn of(pose: &UncertainMotion) -> Self {
         let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
-        let sigma = |axis: usize| pose.covariance[(axis, axis)].max(0.0).sqrt();
+        let variances = pose.covariance.diagonal();
+        let sigma = variances.map(|variance| variance.max(0.0).sqrt());
         Self {
             east_m,
             north_m,
             yaw_deg: yaw_rad.to_degrees(),
-            east_sigma_m: sigma(0),
-            north_sigma_m: sigma(1),
-            yaw_sigma_deg: sigma(2).to_degrees(),
+            east_sigma_m: sigma.x,
+            north_sigma_m: sigma.y,
+            yaw_sigma_deg: sigma.z.to_degrees(),
         }
     }
 }
@@ -86,9 +87,8 @@ impl GnssSummary {
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
-        let squares: Vec<f64> = used
-            .map(|it| it.chi_square * it.position.variance_m2)
-            .collect();
+        let squares = used.map(|it| it.chi_square * it.position.variance_m2);
+        let squares: Vec<f64> = squares.collect();
         let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         let frame = estimator.east_north_from_map()?;
         let origin = frame.zip(log.plane).map(|(frame, plane)| {
@@ -102,6 +102,7 @@ impl GnssSummary {
         });
         let fixes = estimator.fixes();
         let counts = fixes.counts();
+        let refusal = || fixes.refusal().map(ToString::to_string);
         Ok(Self {
             log: log.path.display().to_string(),
             topic: log.topic.clone(),
@@ -112,10 +113,7 @@ impl GnssSummary {
             far: counts.far,
             used: squares.len(),
             refused: counts.taken - squares.len(),
-            refusal: log
-                .unusable
-                .clone()
-                .or_else(|| fixes.refusal().map(ToString::to_string)),
+            refusal: log.unusable.clone().or_else(refusal),
             delay_s: fixes.clock().map(|clock| clock.delay_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
             east_north: frame.as_ref().map(EastNorth::of),
