@@ -192,12 +192,9 @@ impl CurrentPose {
     pub fn of(pose: &PoseHeader) -> Self {
         let interval_s = pose.motion.interval_ns as f64 * 1e-9;
         // The chain starts with a motion of no duration.
-        let per_s = |value: f64| {
-            if interval_s > 0.0 {
-                value / interval_s
-            } else {
-                0.0
-            }
+        let per_s = |value: f64| match interval_s > 0.0 {
+            true => value / interval_s,
+            false => 0.0,
         };
         Self {
             seq: pose.item.seq,

@@ -39,14 +39,11 @@ impl RecentDrift {
         let motion = pose.motion.motion();
         self.length_m += length_m(&motion);
         self.motions.push_back(motion);
-        while self.motions.len() > MAX_MOTIONS
-            || self
-                .motions
-                .front()
-                .is_some_and(|first| self.length_m - length_m(first) >= STRETCH_M)
+        while let Some(first) = self.motions.front()
+            && (self.motions.len() > MAX_MOTIONS || self.length_m - length_m(first) >= STRETCH_M)
         {
-            let first = self.motions.pop_front();
-            self.length_m -= first.map_or(0.0, |first| length_m(&first));
+            self.length_m -= length_m(first);
+            self.motions.pop_front();
         }
     }
 
@@ -54,14 +51,10 @@ impl RecentDrift {
     pub fn drift(&self) -> Option<Drift> {
         let first = ComposedMotion::of(self.motions.front()?);
         let rest = self.motions.iter().skip(1);
-        let covariance = rest
-            .fold(first, |all, next| all.then(next))
-            .motion()
-            .covariance;
-        let (mean, half) = (
-            0.5 * (covariance[(0, 0)] + covariance[(1, 1)]),
-            0.5 * (covariance[(0, 0)] - covariance[(1, 1)]),
-        );
+        let composed = rest.fold(first, |all, next| all.then(next)).motion();
+        let covariance = composed.covariance;
+        let (xx, yy) = (covariance[(0, 0)], covariance[(1, 1)]);
+        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
         let variance_m2 = mean + half.hypot(covariance[(0, 1)]);
         Some(Drift {
             over_m: self.length_m,
@@ -99,10 +92,7 @@ mod tests {
         }
         let drift = recent.drift().unwrap();
         assert!((drift.over_m - 60.0).abs() < 1e-9);
-        assert!(
-            (drift.position_m - (30.0f64 * 0.04).sqrt()).abs() < 1e-9,
-            "across"
-        );
+        assert!((drift.position_m - (30.0f64 * 0.04).sqrt()).abs() < 1e-9);
         assert_eq!(drift.yaw_rad, 0.0);
         for _ in 0..300 {
             recent.add(&pose(0));

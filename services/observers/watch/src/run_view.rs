@@ -8,9 +8,10 @@ use std::{
     },
 };
 
-use axum::{body::Bytes, extract::ws::Utf8Bytes};
+use axum::extract::ws::Message;
 use gyre_messages::{
-    ObjectsHeader, PoseHeader, RefinementRecord, SampleRates, ScanHeader, WitnessCounts, flag,
+    Message as _, Objects, ObjectsHeader, Pose, PoseHeader, RefinementRecord, SampleRates, Scan,
+    ScanHeader, WitnessCounts, flag,
 };
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
@@ -20,8 +21,7 @@ use crate::{
     delays::Delays,
     histograms::Histograms,
     messages::{
-        CurrentPose, HealthReport, Layer, Missed, NewPoses, ObjectsReport, RunCounts, RunInfo,
-        RunState,
+        CurrentPose, HealthReport, Layer, NewPoses, ObjectsReport, RunCounts, RunInfo, RunState,
     },
     pictures::PackedPoints,
     processes::Process,
@@ -36,6 +36,7 @@ const LAST_MOTIONS: usize = 40;
 const RECENT: usize = 256;
 
 /// The view of the run.
+#[derive(Default)]
 pub struct RunView {
     state: Mutex<ViewState>,
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
@@ -46,21 +47,25 @@ pub struct RunView {
     pub histograms: Histograms,
 }
 
+/// The newest message of a kind to a browser.
+pub type Newest = watch::Sender<Option<Message>>;
+
 /// The newest of each kind of message to a browser.
+#[derive(Default)]
 pub struct Updates {
-    pub run: watch::Sender<Utf8Bytes>,
+    pub run: Newest,
     /// Counts and delays.
-    pub health: watch::Sender<Utf8Bytes>,
-    /// The newest scan.
-    pub scan: watch::Sender<Bytes>,
-    /// The newest raster.
-    pub raster: watch::Sender<Bytes>,
-    /// The newest points.
-    pub points: watch::Sender<Bytes>,
-    /// The newest objects.
-    pub objects: watch::Sender<Utf8Bytes>,
+    pub health: Newest,
+    /// The layers, by their numbers.
+    pub layers: [Newest; 4],
     /// True when the program ends.
     pub stop: watch::Sender<bool>,
+}
+
+impl Updates {
+    pub fn of(&self, layer: Layer) -> &Newest {
+        &self.layers[layer as usize]
+    }
 }
 
 #[derive(Default)]
@@ -86,20 +91,7 @@ struct ViewState {
 impl RunView {
     /// Creates an empty view of the run that writes to `out`.
     pub fn new(out: &str) -> Self {
-        let view = Self {
-            state: Mutex::default(),
-            updates: Updates {
-                run: watch::Sender::default(),
-                health: watch::Sender::default(),
-                scan: watch::Sender::default(),
-                raster: watch::Sender::default(),
-                points: watch::Sender::default(),
-                objects: watch::Sender::default(),
-                stop: watch::Sender::new(false),
-            },
-            wanted: Default::default(),
-            histograms: Histograms::default(),
-        };
+        let view = Self::default();
         view.update_run(|run| out.clone_into(&mut run.out));
         view
     }
@@ -123,8 +115,8 @@ impl RunView {
                 ..ViewState::default()
             };
         }
-        for layer in [Layer::Scan, Layer::Raster, Layer::Points, Layer::Objects] {
-            self.clear_pictures(layer);
+        for layer in &self.updates.layers {
+            layer.send_replace(None);
         }
         self.update_run(|run| {
             run.id.clone_from(&manifest.prefix);
@@ -135,20 +127,6 @@ impl RunView {
             run.window = manifest.window.scans;
             run.objects = manifest.window.objects;
         });
-    }
-
-    /// Removes the newest picture of a layer, so that a later browser is not shown an old one.
-    pub fn clear_pictures(&self, layer: Layer) {
-        let pictures = match layer {
-            Layer::Scan => &self.updates.scan,
-            Layer::Raster => &self.updates.raster,
-            Layer::Points => &self.updates.points,
-            Layer::Objects => {
-                self.updates.objects.send_replace(Utf8Bytes::default());
-                return;
-            }
-        };
-        pictures.send_replace(Bytes::new());
     }
 
     /// Ends the run, and its processes with it.
@@ -236,13 +214,14 @@ impl RunView {
 
     fn send_points(&self, points: &PackedPoints, place: [f64; 3], seq: u64) {
         if let Ok(message) = points.at(place, seq) {
-            self.updates.points.send_replace(message);
+            let points = self.updates.of(Layer::Points);
+            points.send_replace(Some(Message::Binary(message)));
         }
     }
 
     /// Shows the objects of a scan.
     pub fn set_objects(&self, header: &ObjectsHeader) {
-        send_json(&self.updates.objects, &ObjectsReport::of(header));
+        send_json(self.updates.of(Layer::Objects), &ObjectsReport::of(header));
     }
 
     /// Sets the supervisor's status of the run, and the processes.
@@ -261,9 +240,16 @@ impl RunView {
         self.state().processes.clone()
     }
 
-    /// Changes the counts of missed messages.
-    pub fn set_missed(&self, change: impl FnOnce(&mut Missed)) {
-        change(&mut self.state().counts.missed);
+    /// Counts more missed messages of a topic.
+    pub fn add_missed(&self, topic: &str, missed: u64) {
+        let mut state = self.state();
+        let counts = &mut state.counts.missed;
+        *match topic {
+            Pose::TOPIC => &mut counts.pose,
+            Scan::TOPIC => &mut counts.scan,
+            Objects::TOPIC => &mut counts.objects,
+            _ => &mut counts.masked,
+        } += missed;
     }
 
     /// Sets the reason why something is not shown; `None`: all is.
@@ -299,7 +285,7 @@ impl RunView {
 
     /// Returns the message of new poses for a browser that has received those up to `last`; `None`
     /// if there are no new poses.
-    pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Utf8Bytes> {
+    pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Message> {
         let state = self.state();
         let seq = state.latest.map(|latest| latest.seq);
         let (vertices, replace) = state.track.since(cursor);
@@ -313,7 +299,7 @@ impl RunView {
             pose: state.latest,
             drift: state.drift.drift(),
         };
-        serde_json::to_string(&poses).ok().map(Utf8Bytes::from)
+        json(&poses)
     }
 
     /// Returns the trajectory: x, y (m), yaw (rad).
@@ -370,9 +356,14 @@ fn others(state: &ViewState) -> Option<String> {
     (!words.is_empty()).then(|| words.join("; "))
 }
 
-fn send_json(channel: &watch::Sender<Utf8Bytes>, message: &impl Serialize) {
-    if let Ok(text) = serde_json::to_string(message) {
-        channel.send_replace(text.into());
+fn json(message: &impl Serialize) -> Option<Message> {
+    let text = serde_json::to_string(message).ok()?;
+    Some(Message::Text(text.into()))
+}
+
+fn send_json(channel: &Newest, message: &impl Serialize) {
+    if let Some(message) = json(message) {
+        channel.send_replace(Some(message));
     }
 }
 
@@ -407,20 +398,29 @@ mod tests {
         pictures::points(&[point], &MaskedHeader::default())
     }
 
+    fn parsed(message: &Message) -> Value {
+        serde_json::from_str(message.to_text().unwrap()).unwrap()
+    }
+
+    fn newest(channel: &Newest) -> Value {
+        parsed(channel.borrow().as_ref().unwrap())
+    }
+
     #[test]
     fn points_are_sent_with_the_pose_of_their_scan_whichever_comes_first() {
         let view = RunView::new("out");
         let sent = || {
-            let message = view.updates.points.borrow().clone();
-            frame::decode(&message).map(|(header, _)| header["pose"][0].as_f64())
+            let message = view.updates.of(Layer::Points).borrow().clone()?;
+            let (header, _) = frame::decode(&message.into_data())?;
+            header["pose"][0].as_f64()
         };
         view.add_pose(&pose(3));
         view.add_points(points(), 4);
         assert_eq!(sent(), None);
         view.add_pose(&pose(4));
-        assert_eq!(sent(), Some(Some(4.0)));
+        assert_eq!(sent(), Some(4.0));
         view.add_points(points(), 3);
-        assert_eq!(sent(), Some(Some(3.0)));
+        assert_eq!(sent(), Some(3.0));
     }
 
     #[test]
@@ -429,23 +429,19 @@ mod tests {
         let (mut cursor, mut last) = (Cursor::default(), None);
         let mut next = || -> Option<Value> {
             let message = view.poses(&mut cursor, &mut last)?;
-            Some(serde_json::from_str(&message).unwrap())
+            Some(parsed(&message))
         };
         let first = next().unwrap();
-        assert_eq!(
-            (&first["kind"], &first["pose"]),
-            (&"poses".into(), &Value::Null)
-        );
+        assert_eq!(first["kind"], "poses");
+        assert_eq!(first["pose"], Value::Null);
         assert_eq!(next(), None);
         view.add_to_track(&pose(0));
         view.add_to_track(&pose(1));
         view.add_pose(&pose(1));
         let second = next().unwrap();
         assert_eq!(second["vertices"].as_array().unwrap().len(), 2);
-        assert_eq!(
-            (&second["replace"], &second["pose"]["seq"]),
-            (&false.into(), &1.into())
-        );
+        assert_eq!(second["replace"], false);
+        assert_eq!(second["pose"]["seq"], 1);
         assert_eq!(next(), None);
     }
 
@@ -471,7 +467,7 @@ mod tests {
             ..ListedObject::default()
         };
         view.set_objects(&header);
-        let sent: Value = serde_json::from_str(&view.updates.objects.borrow()).unwrap();
+        let sent = newest(view.updates.of(Layer::Objects));
         let expected = serde_json::json!({
             "kind": "objects", "seq": 0, "pose": [7.0, 0.0, 0.0], "count": 1,
             "objects": [{
@@ -480,8 +476,6 @@ mod tests {
             }],
         });
         assert_eq!(sent, expected);
-        view.clear_pictures(Layer::Objects);
-        assert!(view.updates.objects.borrow().is_empty());
     }
 
     #[test]
@@ -489,11 +483,9 @@ mod tests {
         let view = RunView::new("out");
         view.add_pose(&pose(6));
         view.report();
-        let health: Value = serde_json::from_str(&view.updates.health.borrow()).unwrap();
-        assert_eq!(
-            (&health["kind"], &health["poses"]),
-            (&"health".into(), &7.into())
-        );
+        let health = newest(&view.updates.health);
+        assert_eq!(health["kind"], "health");
+        assert_eq!(health["poses"], 7);
         assert_eq!(health["delays"]["samples"], 1);
         assert_eq!(health["processes"], serde_json::json!([]));
     }

@@ -68,17 +68,9 @@ pub fn latency_schema() -> Value {
 pub fn health_schema() -> Value {
     let counts = ["published", "poses", "dropped", "in_flight"];
     let missed = object(numbers(["pose", "scan", "masked", "objects"]));
-    let process = [
-        ("name".to_owned(), json!({"type": "string"})),
-        ("state".to_owned(), json!({"type": "string"})),
-    ];
-    let process = process.into_iter().chain(numbers([
-        "pid",
-        "restarts",
-        "processor_share",
-        "cpu_s",
-        "own_bytes",
-    ]));
+    let words = ["name", "state"].map(|name| (name.to_owned(), json!({"type": "string"})));
+    let usage = ["pid", "restarts", "processor_share", "cpu_s", "own_bytes"];
+    let process = words.into_iter().chain(numbers(usage));
     let processes = json!({"type": "array", "items": object(process)});
     let own = numbers(counts).chain(numbers(["scans_per_s", "distance_m"]));
     object(own.chain([

@@ -150,16 +150,14 @@ impl Viewer {
             .collect();
         self.advertised = of_run;
         if !gone.is_empty() {
-            self.send_json(&json!({"op": "unadvertise", "channelIds": gone}))
-                .await?;
+            let message = json!({"op": "unadvertise", "channelIds": gone});
+            self.send_json(&message).await?;
         }
-        match new.is_empty() {
-            true => Ok(()),
-            false => {
-                self.send_json(&json!({"op": "advertise", "channels": new}))
-                    .await
-            }
+        if !new.is_empty() {
+            let message = json!({"op": "advertise", "channels": new});
+            self.send_json(&message).await?;
         }
+        Ok(())
     }
 
     /// Sends a message of a channel, and before it the time.
@@ -185,10 +183,8 @@ impl Viewer {
     }
 
     async fn warn_of_skipped(&mut self) -> Result<(), Disconnected> {
-        if self
-            .last_warning
-            .is_some_and(|at| at.elapsed() < SENTENCE_PERIOD)
-        {
+        let is_recent = |at: Instant| at.elapsed() < SENTENCE_PERIOD;
+        if self.last_warning.is_some_and(is_recent) {
             return Ok(());
         }
         let skipped = self.member.queue.skipped();
@@ -221,10 +217,7 @@ impl Viewer {
 
     async fn send(&mut self, message: Message) -> Result<(), Disconnected> {
         let sent = time::timeout(MAX_SEND, self.socket.send(message)).await;
-        match sent {
-            Ok(Ok(())) => Ok(()),
-            _ => Err(Disconnected),
-        }
+        sent.map_err(|_| Disconnected)?.map_err(|_| Disconnected)
     }
 }
 
