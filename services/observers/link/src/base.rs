@@ -28,7 +28,7 @@ use crate::{
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
-    replay_buffer::{MemoryBuffer, PoseBuffer, PoseLog, ReplayBuffer},
+    replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
     serve::{LAST_ANSWERS, Offer, Server},
     waker::Waker,
 };
@@ -87,7 +87,7 @@ struct Base<'a> {
 
 /// The topics that are offered to the robot, and its requests to start.
 struct ToRobot {
-    poses: Arc<PoseBuffer>,
+    poses: Arc<LogBuffer>,
     pose_offer: Arc<Offer>,
     motions: Arc<MemoryBuffer>,
     starts: Receiver<Query>,
@@ -198,7 +198,7 @@ impl Base<'_> {
         let manifest = &self.launch.manifest;
         let prefix = handshake::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
-        let poses = Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out)));
+        let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
         let motions = Arc::new(MemoryBuffer::of(Motion::sizes(&manifest.window).buffer));
         let (sender, starts) = channel();
         let waker = self.waker.clone();
@@ -245,18 +245,20 @@ impl Base<'_> {
 
     /// Returns the number of the item that is published next.
     fn next(&self) -> u64 {
-        let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
-        let newest = self.published.or(resumed);
+        let newest = self.published.or(self.resumed_at());
         newest.map_or(0, |newest| newest.saturating_add(1))
+    }
+
+    /// Returns the number of the newest pose when this process started.
+    fn resumed_at(&self) -> Option<u64> {
+        (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
     }
 
     /// Offers the new poses and motions.
     fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
-        let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
-        let newest = self.stages.newest_pose().max(resumed);
-        to_robot
-            .poses
-            .set_published(newest.map_or(0, |newest| newest.saturating_add(1)));
+        let newest = self.stages.newest_pose().max(self.resumed_at());
+        let published = newest.map_or(0, |newest| newest.saturating_add(1));
+        to_robot.poses.set_published(published);
         while let Some(motion) = self.stages.next_motion()? {
             to_robot.motions.add(&motion);
         }
@@ -266,9 +268,7 @@ impl Base<'_> {
     /// Answers a robot that starts; true if it is admitted.
     fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
-        let bytes = query
-            .payload()
-            .map(|payload| payload.to_bytes().into_owned());
+        let bytes = query.payload().map(|payload| payload.to_bytes());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
         let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
         let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
@@ -342,7 +342,7 @@ impl Base<'_> {
                 self.next()
             )));
         }
-        let is_resumed = item.seq == self.resumed.seq && !self.resumed.is(flag::BASE);
+        let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
             true => Err(LinkError::Refused(format!(
                 "the robot's scan {} is not the one that this run has a pose of: it plays another drive; begin both anew with --fresh",

@@ -1,6 +1,6 @@
 //! Why a link fails.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use gyre_journal::JournalError;
 use gyre_stage::StageError;
@@ -24,11 +24,6 @@ pub enum LinkError {
     Supervise(#[from] SuperviseError),
     #[error(transparent)]
     Journal(#[from] JournalError),
-    #[error("{path}: {source}")]
-    File {
-        path: PathBuf,
-        source: std::io::Error,
-    },
 }
 
 impl LinkError {
@@ -37,6 +32,11 @@ impl LinkError {
         Self::Refused(format!(
             "{other} is another version of gyre: install the same on both"
         ))
+    }
+
+    /// Creates the error of a file.
+    pub(crate) fn file(path: &Path, source: &std::io::Error) -> Self {
+        Self::Refused(format!("{}: {source}", path.display()))
     }
 
     /// Creates an error of the network layer.

@@ -40,6 +40,7 @@ pub(crate) struct Fetcher {
     thread: Option<JoinHandle<()>>,
 }
 
+#[derive(Default)]
 struct State {
     stop: AtomicBool,
     /// True if the thread informs the sender, at the stop, that it needs no more messages.
@@ -71,12 +72,7 @@ pub(crate) struct Request {
 
 impl Request {
     fn selector(&self) -> String {
-        let Self {
-            key,
-            from,
-            receiver,
-            ..
-        } = self;
+        let (key, from, receiver) = (&self.key, self.from, &self.receiver);
         let selector = format!("{key}?{FROM}={from};{RECEIVER}={receiver}");
         match self.generation {
             Some(generation) => format!("{selector};{GENERATION}={generation}"),
@@ -90,14 +86,9 @@ impl Fetcher {
     pub fn start(session: &Session, request: Request, waker: Waker) -> Self {
         let (sender, messages) = channel();
         let state = Arc::new(State {
-            stop: AtomicBool::new(false),
-            leaves: AtomicBool::new(false),
-            again: AtomicBool::new(false),
-            is_connected: AtomicBool::new(false),
-            has_ended: AtomicBool::new(false),
             requested: AtomicU64::new(request.from),
-            answered: AtomicU64::new(0),
             confirmed: AtomicU64::new(request.from),
+            ..State::default()
         });
         let requests = RequestLoop {
             session: session.clone(),
@@ -125,19 +116,15 @@ impl Fetcher {
         &self,
         header_bytes: usize,
     ) -> Result<Option<RecordedMessage>, LinkError> {
-        let Some(bytes) = self.next() else {
+        let Some(mut header) = self.next() else {
             return Ok(None);
         };
-        match bytes.split_at_checked(header_bytes) {
-            Some((header, payload)) => Ok(Some(RecordedMessage {
-                header: header.to_vec(),
-                payload: payload.to_vec(),
-            })),
-            None => {
-                let reason = format!("a message of {} bytes is too short", bytes.len());
-                Err(LinkError::Refused(reason))
-            }
+        if header.len() < header_bytes {
+            let reason = format!("a message of {} bytes is too short", header.len());
+            return Err(LinkError::Refused(reason));
         }
+        let payload = header.split_off(header_bytes);
+        Ok(Some(RecordedMessage { header, payload }))
     }
 
     /// Confirms to the other side that all before message `next` has arrived, by a request from
@@ -312,14 +299,13 @@ impl RequestLoop {
 
     /// Goes back to the first item that a later generation numbers again.
     fn go_back_to(&mut self, item: &Item) {
-        let Request {
-            from, generation, ..
-        } = &mut self.request;
-        if let Some(known) = generation
-            .as_mut()
-            .filter(|known| item.generation > **known)
+        let request = &mut self.request;
+        if request
+            .generation
+            .is_some_and(|known| item.generation > known)
         {
-            (*known, *from) = (item.generation, item.numbered_from.min(*from));
+            request.generation = Some(item.generation);
+            request.from = item.numbered_from.min(request.from);
             self.has_end = false;
         }
     }
@@ -330,12 +316,8 @@ impl RequestLoop {
     }
 
     fn set_connected(&self, is_connected: bool) {
-        if self
-            .state
-            .is_connected
-            .swap(is_connected, Ordering::Relaxed)
-            != is_connected
-        {
+        let state = &self.state.is_connected;
+        if state.swap(is_connected, Ordering::Relaxed) != is_connected {
             self.waker.wake();
         }
     }

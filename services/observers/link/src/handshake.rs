@@ -42,15 +42,9 @@ pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
     format!("{}/scans", prefix(config, Side::Robot))
 }
 
-/// The size of a robot's scans.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ScanSize {
-    /// The bytes of the largest scan.
-    pub bytes: usize,
-}
-
-/// Waits for the robot and asks for the size of its scans, which a base needs that receives them.
-pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
+/// Waits for the robot and asks for the bytes of its largest scan, which a base needs that receives
+/// scans.
+pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
     let pause = || {
         thread::sleep(PAUSE);
         Ok(false)
@@ -59,9 +53,9 @@ pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
     let failed = || LinkError::zenoh(ASK_FOR_SCANS.action, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
-        if let Some(size) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
+        if let Some(bytes) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
             let _ = session.close().wait();
-            return Ok(size);
+            return Ok(bytes);
         }
         thread::sleep(PAUSE);
     }
@@ -101,6 +95,7 @@ impl Agreement {
             let version = topic(name).map_or("", |topic| topic.header.name);
             ((*name).to_owned(), version.to_owned())
         };
+        let topics = topics.iter().chain(&["motion", "pose"]);
         Self {
             cut: config.cut.name().to_owned(),
             live: manifest.live,
@@ -108,11 +103,7 @@ impl Agreement {
             window: manifest.window.scans,
             look_back: manifest.window.look_back,
             limits: manifest.limits,
-            topics: topics
-                .iter()
-                .chain(&["motion", "pose"])
-                .map(versioned)
-                .collect(),
+            topics: topics.map(versioned).collect(),
             drive: drive(&manifest.out),
         }
     }
@@ -121,6 +112,7 @@ impl Agreement {
     fn properties(&self) -> [(&'static str, String); 9] {
         let limits = &self.limits;
         let mode = if self.live { "live" } else { "lossless" };
+        let look_back = self.look_back.to_string();
         [
             ("link.cut", self.cut.clone()),
             ("run.mode", mode.to_owned()),
@@ -130,10 +122,7 @@ impl Agreement {
             ("points.capacity", limits.points.to_string()),
             ("the number of scans of a mask", limits.rasters.to_string()),
             ("refinement", self.refines.to_string()),
-            (
-                "the scans that stages look back",
-                self.look_back.to_string(),
-            ),
+            ("the scans that stages look back", look_back),
         ]
     }
 

@@ -86,23 +86,16 @@ fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
 impl RemoteRun {
     /// Returns the manifest of the copy of this run that writes to `out`.
     pub fn manifest(&self, out: &Path) -> Manifest {
-        let RunOffer {
-            window,
-            limits,
-            live,
-            refines,
-            rate,
-            ..
-        } = self.offer;
+        let offer = &self.offer;
         Manifest {
             prefix: String::new(),
             root: PathBuf::new(),
             out: out.to_owned(),
-            window,
-            limits,
-            live,
-            refines,
-            rate,
+            window: offer.window,
+            limits: offer.limits,
+            live: offer.live,
+            refines: offer.refines,
+            rate: offer.rate,
             build: String::new(),
         }
     }
@@ -140,12 +133,9 @@ pub fn receive(
     }
     let received = mirror.run();
     // All at the same time: each may wait for a sender that does not answer.
-    let topics = mirror.topics.iter();
-    topics.for_each(|topic| topic.fetcher.begin_to_leave());
-    mirror
-        .topics
-        .into_iter()
-        .for_each(|topic| topic.fetcher.leave());
+    let topics = mirror.topics;
+    topics.iter().for_each(|it| it.fetcher.begin_to_leave());
+    topics.into_iter().for_each(|it| it.fetcher.leave());
     let _ = session.close().wait();
     received
 }
@@ -154,16 +144,12 @@ pub fn receive(
 /// that has written to the folder.
 fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
     let path = out.join("journal/receiver");
-    let failed = |source| LinkError::File {
-        path: path.clone(),
-        source,
-    };
     match fs::read_to_string(&path) {
         Ok(name) if !name.is_empty() && name.chars().all(|c| c.is_ascii_hexdigit()) => Ok(name),
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(failed(error)),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(LinkError::file(&path, &error)),
         _ => {
             let name = session.zid().to_string();
-            fs::write(&path, &name).map_err(failed)?;
+            fs::write(&path, &name).map_err(|error| LinkError::file(&path, &error))?;
             Ok(name)
         }
     }
@@ -185,7 +171,7 @@ fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, Lin
 }
 
 /// Returns the time of the first pose in a folder, ns since 1970.
-fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
     let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
     Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }

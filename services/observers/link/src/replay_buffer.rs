@@ -2,14 +2,13 @@
 
 use std::{
     collections::VecDeque,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
-use bytemuck::Pod;
 use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_messages::{Hop, LoopHeader, MotionHeader, PoseHeader, StageId, flag};
+use gyre_messages::{Hop, MotionHeader, PoseHeader, StageId, flag};
 use gyre_stage::{StageError, source::RecordedMessage};
 
 use crate::LinkError;
@@ -154,11 +153,14 @@ impl ReplayBuffer for MemoryBuffer {
 }
 
 /// The messages in a log of a run: all of them, however long the receiver was away.
-pub(crate) struct LogBuffer<L> {
-    log: Mutex<L>,
+pub(crate) struct LogBuffer {
+    read: Mutex<ReadLog>,
     published: Mutex<Published>,
     changed: Condvar,
 }
+
+/// Returns the header of a message in a log by its number, if it is there.
+type ReadLog = Box<dyn FnMut(u64) -> Result<Option<Vec<u8>>, LinkError> + Send>;
 
 #[derive(Clone, Copy, Default)]
 struct Published {
@@ -166,59 +168,36 @@ struct Published {
     has_ended: bool,
 }
 
-/// A log on the disk.
-pub(crate) trait Log: Send {
-    /// The header of its messages.
-    type Header: Pod;
-
-    /// Returns a message by its number, if it is there.
-    fn read(&mut self, seq: u64) -> Result<Option<Self::Header>, LinkError>;
-}
-
-/// The poses in the journal of a run.
-pub(crate) type PoseBuffer = LogBuffer<PoseLog>;
-/// The loops in the log of a run.
-pub(crate) type LoopBuffer = LogBuffer<LoggedLoops>;
-
-/// The journal of a run.
-pub(crate) struct PoseLog(PathBuf);
-
-impl PoseLog {
-    /// Returns the journal of the run that writes to `out`.
-    pub fn of(out: &Path) -> Self {
-        Self(journal::path(out))
-    }
-}
-
-impl Log for PoseLog {
-    type Header = PoseHeader;
-
-    fn read(&mut self, seq: u64) -> Result<Option<PoseHeader>, LinkError> {
-        let Some(mut records) = journal::records_from(&self.0, seq)? else {
-            return Ok(None);
-        };
-        let pose = records.next().transpose()?;
-        Ok(pose.filter(|pose| !pose.item.is(flag::END)))
-    }
-}
-
-impl Log for LoggedLoops {
-    type Header = LoopHeader;
-
-    fn read(&mut self, seq: u64) -> Result<Option<LoopHeader>, LinkError> {
-        let loops = self.refresh().map_err(StageError::from)?;
-        Ok(loops.get(seq as usize).copied())
-    }
-}
-
-impl<L: Log> LogBuffer<L> {
+impl LogBuffer {
     /// Creates a buffer of those messages of a log that have been published.
-    pub fn of(log: L) -> Self {
+    fn of(read: ReadLog) -> Self {
         Self {
-            log: Mutex::new(log),
+            read: Mutex::new(read),
             published: Mutex::default(),
             changed: Condvar::new(),
         }
+    }
+
+    /// Creates a buffer of the poses in the journal of the run that writes to `out`.
+    pub fn of_poses(out: &Path) -> Self {
+        let path = journal::path(out);
+        Self::of(Box::new(move |seq| {
+            let Some(mut records) = journal::records_from(&path, seq)? else {
+                return Ok(None);
+            };
+            let pose = records.next().transpose()?;
+            let pose = pose.filter(|pose| !pose.item.is(flag::END));
+            Ok(pose.map(|pose| bytemuck::bytes_of(&pose).to_vec()))
+        }))
+    }
+
+    /// Creates a buffer of the loops in the log of a run.
+    pub fn of_loops(mut log: LoggedLoops) -> Self {
+        Self::of(Box::new(move |seq| {
+            let loops = log.refresh().map_err(StageError::from)?;
+            let found = loops.get(seq as usize);
+            Ok(found.map(|found| bytemuck::bytes_of(found).to_vec()))
+        }))
     }
 
     /// Sets the number of messages that have been published.
@@ -227,18 +206,14 @@ impl<L: Log> LogBuffer<L> {
         self.changed.notify_all();
     }
 
-    /// Returns a message of the log.
-    pub fn read(&self, seq: u64) -> Result<Option<L::Header>, LinkError> {
-        lock(&self.log).read(seq)
+    fn read(&self, seq: u64) -> Result<Option<Vec<u8>>, LinkError> {
+        (lock(&self.read))(seq)
     }
+}
 
-    /// Returns message `seq` with the header that `header` makes of the log's.
-    fn next_as<H: Pod>(
-        &self,
-        seq: u64,
-        limit: Duration,
-        header: impl Fn(L::Header) -> H,
-    ) -> Result<Next, LinkError> {
+impl ReplayBuffer for LogBuffer {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
+        let seq = place.seq;
         let is_decided =
             |it: &Published| (seq < it.messages || it.has_ended).then_some(it.messages);
         let Some(published) = wait(&self.published, &self.changed, limit, is_decided) else {
@@ -247,21 +222,15 @@ impl<L: Log> LogBuffer<L> {
         if seq >= published {
             return Ok(Next::Ended);
         }
-        let message = |logged| {
+        let message = |bytes: Vec<u8>| {
             Next::Message(Message {
                 seq,
                 // A message in a log is never void.
                 generation: 0,
-                bytes: bytemuck::bytes_of(&header(logged)).into(),
+                bytes: bytes.into(),
             })
         };
         Ok(self.read(seq)?.map_or(Next::Nothing, message))
-    }
-}
-
-impl<L: Log> ReplayBuffer for LogBuffer<L> {
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
-        self.next_as(place.seq, limit, |header| header)
     }
 
     fn add(&self, message: &RecordedMessage) {
@@ -285,18 +254,18 @@ impl<L: Log> ReplayBuffer for LogBuffer<L> {
 
 /// The motions of the poses in a journal, as in the topic that poses are composed from. They come
 /// and end with the poses.
-pub(crate) struct MotionBuffer(pub Arc<PoseBuffer>);
+pub(crate) struct MotionBuffer(pub Arc<LogBuffer>);
 
 impl ReplayBuffer for MotionBuffer {
     fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
-        self.0.next_as(place.seq, limit, |pose| {
-            let mut motion = MotionHeader {
-                item: pose.item,
-                motion: pose.motion,
-            };
+        let mut next = self.0.next(place, limit)?;
+        if let Next::Message(message) = &mut next {
+            let PoseHeader { item, motion, .. } = bytemuck::pod_read_unaligned(&message.bytes);
+            let mut motion = MotionHeader { item, motion };
             *motion.item.hop_mut(StageId::PoseIntegration) = Hop::default();
-            motion
-        })
+            message.bytes = bytemuck::bytes_of(&motion).into();
+        }
+        Ok(next)
     }
 
     fn add(&self, _: &RecordedMessage) {}

@@ -154,7 +154,7 @@ impl Snapshot {
         let by_basis = Basis::ALL.iter().zip(of.by_basis).map(|(basis, count)| (basis.name(), count));
         let used = |used, other, count| vec![("used", used), (other, count)];
         let missed = [("pose", missed.pose), ("scan", missed.scan), ("masked", missed.masked), ("objects", missed.objects)];
-        let mut labelled = vec![
+        let mut labelled: Vec<Labelled> = vec![
             ("motions", "Motions by what they rest on.", "basis", by_basis.collect()),
             ("gyro_turns", "Turns that the gyro has measured: used, or refused since the radar contradicts.", "state", used(of.gyro_used, "refused", of.gyro_refused)),
             ("wheel_distances", "Distances that the wheels have measured: used, or slipping.", "state", used(of.wheels_used, "slip", of.wheel_slips)),

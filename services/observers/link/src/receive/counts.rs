@@ -31,13 +31,11 @@ impl Received {
 impl fmt::Display for Received {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |number: fn(&ReceivedCount) -> u64| {
-            let topics = self.topics.iter().filter(|(_, count)| number(count) > 0);
-            let topics: Vec<String> = topics
-                .map(|(topic, count)| format!("{} {topic}", number(count)))
-                .collect();
-            match topics.is_empty() {
-                true => "nothing".to_owned(),
-                false => topics.join(", "),
+            let topics = self.topics.iter().filter(|it| number(it.1) > 0);
+            let topics = topics.map(|(topic, count)| format!("{} {topic}", number(count)));
+            match &topics.collect::<Vec<String>>()[..] {
+                [] => "nothing".to_owned(),
+                topics => topics.join(", "),
             }
         };
         let (received, missed) = (list(|it| it.received), list(|it| it.missed));

@@ -146,10 +146,7 @@ impl Mirror<'_> {
         let continues = match began_ns {
             Some(_) => other.began_ns == began_ns,
             // Without a pose of the drive nothing of it may be there.
-            None => self
-                .topics
-                .iter()
-                .all(|topic| topic.sequence.next.is_none()),
+            None => self.topics.iter().all(|it| it.sequence.next.is_none()),
         };
         Ok(properties(&self.offer) == properties(other) && continues)
     }
@@ -185,11 +182,8 @@ impl Mirror<'_> {
             for feed in &feeds {
                 feed.answer_handshakes()?;
             }
-            let descriptor = self.waker.descriptor();
-            if self
-                .rig
-                .sleep_until_readable(&feeds, descriptor, MAX_WAIT)?
-            {
+            let (rig, descriptor) = (&self.rig, self.waker.descriptor());
+            if rig.sleep_until_readable(&feeds, descriptor, MAX_WAIT)? {
                 return Ok(self.received(true));
             }
         }
@@ -197,11 +191,10 @@ impl Mirror<'_> {
 
     fn received(&self, is_interrupted: bool) -> Received {
         let topics = self.topics.iter();
+        let counts = topics.map(|topic| (topic.name.to_owned(), topic.count));
         Received {
             is_interrupted,
-            topics: topics
-                .map(|topic| (topic.name.to_owned(), topic.count))
-                .collect(),
+            topics: counts.collect(),
         }
     }
 }

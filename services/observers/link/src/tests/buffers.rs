@@ -7,7 +7,7 @@ use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
 
 use super::{add, add_item, item};
 use crate::replay_buffer::{
-    MemoryBuffer, Message, MotionBuffer, Next, Place, PoseBuffer, PoseLog, ReplayBuffer,
+    LogBuffer, MemoryBuffer, Message, MotionBuffer, Next, Place, ReplayBuffer,
 };
 
 fn message(seq: u64) -> Message {
@@ -81,7 +81,7 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
         ..PoseHeader::default()
     };
     (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
-    let poses = Arc::new(PoseBuffer::of(PoseLog::of(out.path())));
+    let poses = Arc::new(LogBuffer::of_poses(out.path()));
     let motions = MotionBuffer(poses.clone());
     let next = next_of;
     // Journalled before it is published, a pose is not sent before.
