@@ -65,8 +65,18 @@ impl Bridge {
 
     /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
     pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
-        self.mounting.send(mounted(&self.shared));
         let shared = &self.shared;
+        let (frames, radar) = (&shared.frames, shared.mounting.radar());
+        let now_ns = clock::since_1970_ns();
+        // The place of the radar on the vehicle.
+        self.mounting.send(TFMessage {
+            transforms: vec![frames::transform(
+                now_ns,
+                &frames.base,
+                &frames.radar,
+                radar,
+            )],
+        });
         thread::scope(|threads| {
             threads.spawn(|| follow_poses(shared, self.poses, say));
             threads.spawn(|| follow_corrections(shared));
@@ -75,28 +85,12 @@ impl Bridge {
             if let Some(settings) = self.map_settings {
                 threads.spawn(move || follow_maps(shared, settings, self.maps));
             }
-            let stopped = loop {
-                match signals.sleep(POLL_INTERVAL) {
-                    Ok(false) => {}
-                    Ok(true) => break Ok(()),
-                    Err(error) => break Err(error),
-                }
-            };
+            let mut stopped = Ok(false);
+            while let Ok(false) = stopped {
+                stopped = signals.sleep(POLL_INTERVAL);
+            }
             shared.stop();
-            stopped
+            stopped.map(drop)
         })
-    }
-}
-
-/// Returns the transform of the radar on the vehicle.
-fn mounted(shared: &Shared) -> TFMessage {
-    let (frames, radar) = (&shared.frames, shared.mounting.radar());
-    TFMessage {
-        transforms: vec![frames::transform(
-            clock::since_1970_ns(),
-            &frames.base,
-            &frames.radar,
-            radar,
-        )],
     }
 }

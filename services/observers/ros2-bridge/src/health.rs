@@ -54,17 +54,14 @@ fn array(
     status: Option<Status>,
     before: &mut LastCounts,
 ) -> DiagnosticArray {
-    let mut parts = vec![run(state, status.as_ref(), before)];
+    let mut array = DiagnosticArray::default();
+    array.header.stamp = Time::from_ns(clock::since_1970_ns());
+    array.status.push(run(state, status.as_ref(), before));
     let processes = status.iter().flat_map(|status| &status.processes);
-    parts.extend(processes.map(process));
-    for part in &mut parts {
+    array.status.extend(processes.map(process));
+    for part in &mut array.status {
         out.clone_into(&mut part.hardware_id);
     }
-    let mut array = DiagnosticArray {
-        status: parts,
-        ..DiagnosticArray::default()
-    };
-    array.header.stamp = Time::from_ns(clock::since_1970_ns());
     array
 }
 
@@ -73,20 +70,16 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
     let dropped = status.map(|status| status.dropped);
     let lost = state.lost();
     let drops = before.dropped.zip(dropped);
-    let fell = [
-        (
-            drops.is_some_and(|(before, now)| now > before),
-            "scans are dropped",
-        ),
-        (lost > before.lost, "the bridge loses messages"),
-    ];
+    let trouble = match drops.is_some_and(|(before, now)| now > before) {
+        true => Some("scans are dropped"),
+        false => (lost > before.lost).then_some("the bridge loses messages"),
+    };
     let poses = state.poses.published.saturating_sub(before.poses);
     *before = LastCounts {
         poses: state.poses.published,
         dropped: dropped.or(before.dropped),
         lost,
     };
-    let trouble = fell.iter().find(|(is_so, _)| *is_so).map(|(_, what)| *what);
     let (level, message) = match (state.phase, trouble, &state.notice) {
         (RunPhase::Waiting, ..) => (STALE, "there is no run yet".to_owned()),
         (RunPhase::Ended, ..) => (STALE, "the run has ended".to_owned()),
@@ -204,12 +197,8 @@ mod tests {
     fn levels_follow_the_run_and_its_processes() {
         let (mut before, mut state) = (LastCounts::default(), RunState::default());
         let mut levels = |state: &RunState, status| {
-            let array = array("out", state, status, &mut before);
-            array
-                .status
-                .iter()
-                .map(|part| part.level)
-                .collect::<Vec<_>>()
+            let parts = array("out", state, status, &mut before).status;
+            parts.iter().map(|part| part.level).collect::<Vec<_>>()
         };
         assert_eq!(levels(&state, None), [STALE]);
         // Drops from before the bridge began, or while the supervisor did not answer, do not count

@@ -11,7 +11,6 @@ use std::{
 
 use gyre_geometry::Pose;
 use gyre_ros2_messages::frames::Frames;
-use gyre_stage::Manifest;
 
 use crate::{Mounting, clock::Clock};
 
@@ -132,11 +131,7 @@ impl Shared {
     }
 
     /// Begins with a run, or returns its state if another thread has begun.
-    pub fn begin(&self, manifest: &Manifest) -> SharedRunState {
-        self.begin_named(&manifest.prefix, manifest.window.slam)
-    }
-
-    fn begin_named(&self, name: &str, slam: bool) -> SharedRunState {
+    pub fn begin(&self, name: &str, slam: bool) -> SharedRunState {
         let mut runs = locked(&self.runs);
         if let Some((_, state)) = runs.iter().find(|(run, _)| run == name) {
             return state.clone();
@@ -195,14 +190,14 @@ mod tests {
     #[test]
     fn a_thread_at_an_earlier_run_does_not_touch_the_next_one() {
         let shared = shared();
-        let earlier = shared.begin_named("a", false);
+        let earlier = shared.begin("a", false);
         shared.show(&earlier);
         assert!(earlier.lock().poses.count(7));
-        let next = shared.begin_named("b", true);
+        let next = shared.begin("b", true);
         assert!(earlier.lock().poses.count(8));
         earlier.lock().phase = RunPhase::Ended;
         // A thread that begins with the earlier run late gets its state.
-        assert_eq!(shared.begin_named("a", false).lock().poses.published, 2);
+        assert_eq!(shared.begin("a", false).lock().poses.published, 2);
         assert_eq!(next.lock().phase, RunPhase::Working);
         let is_new = next.lock().poses.count(0);
         assert!(is_new, "a pose of another run is none before");
@@ -216,11 +211,11 @@ mod tests {
     #[test]
     fn threads_that_follow_one_run_share_its_state() {
         let shared = shared();
-        let of_maps = shared.begin_named("a", true);
-        shared.begin_named("a", true).lock().maps += 1;
+        let of_maps = shared.begin("a", true);
+        shared.begin("a", true).lock().maps += 1;
         assert_eq!(of_maps.lock().maps, 1);
         for later in 0..MAX_RUNS {
-            shared.begin_named(&later.to_string(), true);
+            shared.begin(&later.to_string(), true);
         }
         assert_eq!(locked(&shared.runs).len(), MAX_RUNS);
     }
