@@ -101,9 +101,7 @@ impl State {
         scan.check()?;
         scan.check_times()?;
         let stamp_ns = scan.geometry.stamp_ns;
-        let follows = self
-            .last
-            .filter(|(_, last_ns)| continues(*last_ns, stamp_ns));
+        let follows = self.last.filter(|last| continues(last.1, stamp_ns));
         if follows.is_none() {
             self.finder.reset();
         }
@@ -118,10 +116,8 @@ impl State {
         let twist = self.masker.mask(&sweep, follows, raster, previous)?;
         self.last = Some((sweep.number, stamp_ns));
         let count = self.masker.points(&scan, twist, points)?;
-        Ok((
-            count,
-            self.masker.factors(0).map(|factors| factors.to_owned()),
-        ))
+        let factors = self.masker.factors(0);
+        Ok((count, factors.map(|factors| factors.to_owned())))
     }
 }
 
@@ -131,9 +127,8 @@ impl Masker {
     #[pyo3(signature = (config=None))]
     fn new(py: Python<'_>, config: Option<&Bound<'_, Config>>) -> PyResult<Self> {
         let config = Config::method(config).odometry;
-        let masker = py
-            .detach(|| gyre_masking::Masker::new(&config.raster, &config.points, &config.masking));
-        let masker = masker.map_err(errors::config)?;
+        let make = || gyre_masking::Masker::new(&config.raster, &config.points, &config.masking);
+        let masker = py.detach(make).map_err(errors::config)?;
         Ok(Self {
             n: config.raster.n,
             capacity: config.points.capacity,
@@ -179,10 +174,8 @@ impl Masker {
             let mut raster = raster.readwrite();
             let mut previous = previous.as_ref().map(|previous| previous.readwrite());
             let mut fields = fields.readwrite();
-            let (raster, previous) = (
-                raster.as_array_mut(),
-                previous.as_mut().map(|previous| previous.as_array_mut()),
-            );
+            let raster = raster.as_array_mut();
+            let previous = previous.as_mut().map(|previous| previous.as_array_mut());
             let points = bytemuck::cast_slice_mut(fields.as_slice_mut()?);
             let masked = self.masker.with(py, |state| {
                 state.mask(&scan, twist, raster, previous, points)

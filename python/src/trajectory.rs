@@ -142,10 +142,7 @@ impl Trajectory {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "<gyre.Trajectory {} poses, {:.1} m>",
-            self.0.len(),
-            self.path_m()
-        )
+        let (poses, path_m) = (self.0.len(), self.path_m());
+        format!("<gyre.Trajectory {poses} poses, {path_m:.1} m>")
     }
 }
