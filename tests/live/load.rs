@@ -125,29 +125,3 @@ fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
     assert_eq!(run.summary()["dropped"], 0);
     assert_eq!(live, lossless);
 }
-
-#[test]
-fn a_recording_that_repeats_goes_on_in_numbers_and_times() {
-    let scans = 2 * recording::SCANS + 3;
-    let run = Run::of_recording()
-        .set("source.repeat=true")
-        .set(&format!("source.scans={scans}"));
-    let rows = odometry::rows(&run.complete());
-    odometry::assert_unbroken(&rows);
-    assert_eq!(rows.len(), scans - 1);
-    assert_eq!(run.summary()["published"], scans as u64);
-    assert_eq!(run.summary()["missing"], 0);
-}
-
-#[test]
-fn scans_of_a_burst_become_due_at_once() {
-    let run = Run::of_recording()
-        .rate(RATE)
-        .set("source.burst=4")
-        .set("run.window=8");
-    run.complete();
-    // The first three scans wait for the fourth, at a rate that the pipeline sustains otherwise.
-    let latency = run.summary()["latency"]["sensor_to_pose"]["p50_us"].clone();
-    assert!(latency.as_f64() > Some(0.0), "{latency}");
-    assert_eq!(run.summary()["published"], recording::SCANS as u64);
-}

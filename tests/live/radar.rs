@@ -184,33 +184,6 @@ fn datagrams_give_the_motions_of_the_recording() {
 }
 
 #[test]
-fn lost_doubled_and_swapped_datagrams_are_lost_azimuths_at_most() {
-    let faults = [
-        "--lose",
-        "0.005",
-        "--double",
-        "0.01",
-        "--swap",
-        "0.01",
-        "--garbage-every",
-        "5",
-        "--repeat",
-    ];
-    let radar = Radar::sending(&group(2), recording::small(), &faults);
-    let run = radar.received(20);
-    run.complete();
-    let summary = run.summary();
-    let source = &summary["stages"]["radar-replay"];
-    let count = |key: &str| source[key].as_u64().unwrap();
-    // A two-hundredth of the parts of 20 x 400 azimuths, and those parts that came after the next
-    // azimuth.
-    assert!((20..1000).contains(&count("missing_azimuths")), "{source}");
-    assert!((2..10).contains(&count("damaged_messages")), "{source}");
-    assert_eq!(count("reconnections"), 0, "{source}");
-    assert_eq!(summary["published"], 20);
-}
-
-#[test]
 fn datagrams_without_scans_are_named_in_a_sentence() {
     let to = group(3);
     let run = Run::small()

@@ -11,7 +11,7 @@ use std::{
 
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::{
     common::{
@@ -277,19 +277,13 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
         process(&status, "recorder").clone()
     };
     let first = recorder("a heartbeat", &|it| it["activity"] == "waiting");
-    assert_eq!(
-        (&first["restarts"], &first["missed"]),
-        (&json!(0), &json!(0))
-    );
+    assert!(first["restarts"] == 0 && first["missed"] == 0, "{first}");
     assert!(ask(&run, &["ps"]).stdout.contains("\n  recorder "));
     assert!(ask(&run, &["top", "--once"]).stdout.contains("\nrecorder "));
     ask(&run, &["restart", "recorder"]).succeeded();
     let second = recorder("a restart", &|it| it["activity"] == "waiting");
     assert_ne!(first["pid"], second["pid"]);
-    assert_eq!(
-        (&second["restarts"], &second["last_death"]),
-        (&json!(1), &Value::Null)
-    );
+    assert!(second["restarts"] == 1 && second["last_death"].is_null());
     send(second["pid"].as_u64().unwrap() as u32, Signal::KILL);
     recorder("a restart after its death", &|it| {
         it["restarts"] == 2 && it["last_death"] == "signal 9"
@@ -306,33 +300,22 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
 /// The logs of the sensors are not there any more, and their delays are in the samples already.
 #[test]
 fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
-    let without_doppler: fn() -> Run = configurations::without_doppler;
-    for (configuration, setting, without) in [
-        (
-            configurations::gyro_and_wheels(),
-            "wheels.kind=none",
-            configurations::with_gyro as fn() -> Run,
-        ),
-        (
-            configurations::doppler(),
-            "doppler.kind=none",
-            without_doppler,
-        ),
+    let of_gyro = (
+        configurations::gyro_and_wheels(),
+        configurations::with_gyro(),
+    );
+    let of_radar = (configurations::doppler(), configurations::without_doppler());
+    for ((configuration, without), setting) in [
+        (of_gyro, "wheels.kind=none"),
+        (of_radar, "doppler.kind=none"),
     ] {
         let run = recorded(&configuration.run()).set(WINDOW);
         let odometry = run.complete();
         assert_eq!(replay(&file(&run), &[]), odometry);
-        let alone = without().complete();
+        let alone = without.complete();
         assert_eq!(replay(&file(&run), &["--set", setting]), alone);
         assert_ne!(alone, odometry);
     }
-}
-
-#[test]
-fn a_recording_of_a_part_of_a_drive_replays_under_its_own_numbers() {
-    let run = recorded(&played()).set("source.first=5");
-    let odometry = run.complete();
-    assert_eq!(replay(&file(&run), &[]), odometry);
 }
 
 #[test]
@@ -341,9 +324,8 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     let mut running = run.start();
     running.await_poses(SCANS / 3);
     let mut record = gyre();
+    record.arg("record").arg(run.out());
     record
-        .arg("record")
-        .arg(run.out())
         .args(["--topics", "scan,masked", "--to"])
         .arg(file(&run));
     let mut recorder = record.spawn().unwrap();
@@ -413,17 +395,6 @@ fn inspect_reports_a_recording_as_a_dataset() {
     assert_eq!(report["format"], "mcap");
     assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
-    // A bit of the length of the last chunk with scans.
-    let mut bytes = fs::read(file(&run)).unwrap();
-    let signature = [0x28, 0xb5, 0x2f, 0xfd];
-    let mut places = (0..bytes.len() - 4).rev();
-    let content = places.find(|at| bytes[*at..*at + 4] == signature).unwrap();
-    // The head of a chunk before its content: opcode, lengths, times, sizes, `zstd`.
-    bytes[content - 53 + 3] ^= 4;
-    fs::write(file(&run), bytes).unwrap();
-    let again = Run::configured("").data(&file(&run));
-    let named = format!("is damaged at byte {}", content - 53);
-    again.finish().failed_with(&[&named]);
 }
 
 #[test]

@@ -180,26 +180,3 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
     running.finish().succeeded();
     assert_lacks_little(&run);
 }
-
-#[test]
-#[ignore = ".ci/nightly: kills at many moments"]
-fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
-{
-    assert_goes_on(&played());
-    let radar = radar();
-    assert_goes_on(&slow(radar.run(SCANS)));
-}
-
-/// A recorder that is killed with the run may lack the last half second, and reports it.
-fn assert_goes_on(run: &Run) {
-    let mut running = run.start();
-    running.await_poses(8);
-    running.signal(Signal::INT);
-    running.end();
-    let mut running = run.start();
-    running.await_poses(18);
-    running.kill_supervisor();
-    run.finish().succeeded();
-    assert_eq!(parts(&file(run)).len(), 3);
-    assert!(!assert_is_of(run).contains_key("masked"));
-}

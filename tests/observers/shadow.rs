@@ -388,23 +388,16 @@ fn refused(run: &Run, arguments: &[&str], words: &[&str]) {
 #[test]
 fn what_cannot_have_a_shadow_is_refused_in_a_sentence() {
     let run = Run::of_recording();
-    refused(&run, &["radar-replay"], &["radar-replay", "is a source"]);
-    refused(
-        &run,
-        &["pose-integration"],
-        &["pose-integration", "journal"],
-    );
-    refused(&run, &["trajectory"], &["trajectory", "logs"]);
-    refused(&run, &["steering"], &["no stage `steering`", "masking"]);
-    refused(&run, &["masking"], &["no run is writing to"]);
-    refused(
-        &run,
-        &["masking", "--command", "python3 'x"],
-        &["--command", "quotes"],
-    );
-    refused(
-        &run,
-        &["masking", "--patience-s", "nan"],
-        &["--patience-s", "0 or more"],
-    );
+    for (arguments, words) in [
+        ("radar-replay", "is a source"),
+        ("pose-integration", "journal"),
+        ("trajectory", "logs"),
+        ("steering", "no stage `steering`"),
+        ("masking", "no run is writing to"),
+        ("masking --command 'x", "quotes"),
+        ("masking --patience-s nan", "0 or more"),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        refused(&run, &arguments, &[words]);
+    }
 }

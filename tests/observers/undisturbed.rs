@@ -13,8 +13,6 @@ use crate::common::{
 /// Places for observers of each topic, by default.
 const PLACES: usize = 8;
 
-/// The recording's thirty seconds in four.
-const MODERATE: &str = "8";
 /// In ten: two dozen observers start one after the other meanwhile.
 const SLOW: &str = "3";
 
@@ -59,21 +57,6 @@ fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
     assert!(missed > 0, "{resumed:?}");
     never_resumed.kill().assert_consistent(scans);
     assert_nothing_left(run.out());
-}
-
-#[test]
-fn an_observer_sees_each_item_once_although_the_publisher_is_restarted() {
-    let run = around().rate(MODERATE);
-    let mut running = run.start();
-    running.await_stage("pose-integration");
-    let watches = ["masked", "motion"].map(|topic| Watch::start(&run, topic).await_message());
-    running.await_poses(20).kill("masking");
-    running.await_poses(60).kill("translation-search");
-    running.finish().succeeded();
-    for watch in watches {
-        let watched = watch.finish();
-        assert!(watched.assert_consistent(SCANS as u64).total.is_some());
-    }
 }
 
 #[test]
