@@ -86,7 +86,6 @@ pub fn registration(error: OdometryError) -> PyErr {
     }
 }
 
-/// Warns that a scan of a recording is skipped.
 pub fn warn_of_skipped(py: Python<'_>, reason: impl Display) -> PyResult<()> {
     let class = py.import("gyre.errors")?.getattr("SkippedScanWarning")?;
     let sentence = CString::new(format!("skipped: {reason}").replace('\0', ""))?;

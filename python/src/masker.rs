@@ -16,7 +16,6 @@ use crate::{
     scan::Scan,
 };
 
-/// The fields of a point.
 pub const FIELDS: [&str; 5] = ["x_m", "y_m", "time_s", "weight", "doppler_s"];
 
 /// Rasterises and masks scans, and extracts their sparse points.
@@ -64,7 +63,6 @@ pub fn points<'py>(
     fields.get_item(used)?.call_method1("view", (dtype,))
 }
 
-/// Returns the fields of points, one after the other.
 pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let py = points.py();
     let none = self::points(&PyArray1::from_vec(py, Vec::new()), 0)?;

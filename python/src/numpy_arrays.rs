@@ -12,7 +12,6 @@ use pyo3::{
     types::{IntoPyDict, PyDict},
 };
 
-/// Returns an object as an array of elements `T` in `D` dimensions.
 pub fn given<'py, T: Element, D: Dimension>(
     array: &Bound<'py, PyAny>,
     name: &str,

@@ -122,7 +122,6 @@ impl Scan {
         &self.samples
     }
 
-    /// Borrows the memory, for [`Borrowed::view`].
     pub fn borrowed<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
         Ok(Borrowed {
             geometry: self.geometry,
@@ -154,7 +153,6 @@ impl Scan {
     }
 }
 
-/// The memory of a scan, borrowed from numpy.
 pub struct Borrowed<'py> {
     geometry: SweepGeometry,
     bytes: PyReadonlyArrayDyn<'py, u8>,
@@ -176,7 +174,6 @@ impl Borrowed<'_> {
     }
 }
 
-/// Returns the powers in the bytes of a scan: a view, whose bounds numpy checks.
 fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<Bound<'py, PyAny>> {
     let py = bytes.py();
     let keywords = PyDict::new(py);
@@ -204,7 +201,6 @@ fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<
 /// Times, ns, and values, as a keyword of this name has them.
 type Pairs = (&'static str, Vec<(i64, f64)>);
 
-/// Returns the samples of a gyro and of wheels.
 fn samples((gyro, rates): Pairs, (wheels, speeds): Pairs) -> PyResult<Vec<Sample>> {
     let rates = rates.into_iter().map(|(ns, of)| Sample::yaw_rate(ns, of));
     let speeds = speeds.into_iter().map(|(ns, of)| Sample::speed(ns, of));
@@ -229,7 +225,6 @@ fn checked(name: &str, samples: Vec<Sample>, expected: &str) -> PyResult<Vec<Sam
     }
 }
 
-/// The pairs of samples of a kind: times, ns, and one of their values.
 fn pairs(samples: &[Sample], kind: SampleKind, value: usize) -> Vec<(i64, f64)> {
     let of_kind = samples.iter().filter(|sample| sample.is(kind));
     let pair = |sample: &Sample| (sample.stamp_ns, sample.values[value]);

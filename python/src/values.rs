@@ -15,7 +15,6 @@ use crate::errors;
 /// Maximum depth of nested sections; a deeper value contains itself.
 const MAX_DEPTH: usize = 8;
 
-/// Returns a mapping of sections as TOML.
 pub fn table(sections: &Bound<'_, PyMapping>) -> PyResult<Table> {
     table_within(sections, MAX_DEPTH)
 }

@@ -20,7 +20,6 @@ pub struct TimedPoses<'a> {
 }
 
 impl<'a> TimedPoses<'a> {
-    /// The poses with their stamps.
     pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
         Self { stamps_ns, poses }
     }
@@ -61,7 +60,6 @@ impl Default for Association {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
-    /// Associated by time.
     Time {
         /// Estimated poses with a ground-truth pose.
         matched: usize,
@@ -69,10 +67,8 @@ pub enum Coverage {
         outside_span: usize,
         /// Estimated poses in gaps of the ground truth wider than allowed: left out.
         in_gaps: usize,
-        /// The widest gap allowed, ns.
         max_gap_ns: i64,
     },
-    /// Associated by index.
     Index {
         /// Estimated poses with a ground-truth pose.
         matched: usize,
@@ -106,8 +102,6 @@ impl Coverage {
     }
 }
 
-/// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have
-/// none.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
@@ -279,7 +273,6 @@ mod tests {
         s.iter().map(|s| (s * SECOND as f64) as i64).collect()
     }
 
-    /// Associates drives along a line at these times, ns.
     fn by_time(
         estimate_ns: &[i64],
         truth_ns: &[i64],

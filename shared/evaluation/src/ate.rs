@@ -14,7 +14,6 @@ use crate::MatchedPoses;
 pub struct Ate {
     /// Root of the mean squared distance, m: the figure that papers give.
     pub rmse_m: f64,
-    /// Mean distance, m.
     pub mean_m: f64,
     /// Largest distance, m.
     pub max_m: f64,

@@ -8,7 +8,6 @@ use crate::MatchedPoses;
 /// al., Fig. 3, its last sample).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndError {
-    /// Distance between the last positions, m.
     pub position_m: f64,
     /// The same as a share of the path length, %; `None` if the ground truth does not move.
     pub percent: Option<f64>,

@@ -16,7 +16,6 @@ use crate::{MatchedPoses, ate::aligned_rmse_m};
 pub struct Axes {
     /// y was negated: the path was mirrored.
     pub y_negated: bool,
-    /// yaw was negated.
     pub heading_negated: bool,
     /// Set if only one of the two was negated: then heading and path of one of the trajectories
     /// contradict each other.
@@ -59,7 +58,6 @@ pub enum HeadingFault {
 /// The sign of an axis that fits clearly better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sign {
-    /// The sign as given.
     AsGiven,
     /// The opposite sign.
     Negated,
@@ -71,7 +69,6 @@ enum Sign {
 const CLEAR_SHARE: f64 = 0.5;
 /// ...and the other's misfit is more than rounding: for positions, m.
 const MIN_MISFIT_M: f64 = 0.01;
-/// For headings, rad.
 const MIN_MISFIT_RAD: f64 = 1e-3;
 /// A heading that varies by less than this is constant, rad (TUM files have nine decimals).
 const CONSTANT_RAD: f64 = 1e-6;
@@ -115,7 +112,6 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     )
 }
 
-/// Returns whether to negate y and heading, by the votes of both.
 fn decide(y: Sign, heading: Sign, mirror_no_worse: bool) -> (bool, bool) {
     use Sign::{AsGiven, Negated, Open};
     match (y, heading) {

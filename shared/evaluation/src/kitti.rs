@@ -19,7 +19,6 @@ use crate::{
 pub struct Kitti {
     /// Translation error, % of the segment length.
     pub translation_percent: f64,
-    /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
     /// The same in degrees per km: 1000 times the "deg/m" of the KITTI leaderboard.
     pub rotation_deg_per_km: f64,
@@ -30,13 +29,11 @@ pub struct Kitti {
     pub by_length: Vec<KittiLength>,
 }
 
-/// The KITTI errors of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KittiLength {
     pub length_m: f64,
     /// Translation error, % of the segment length.
     pub translation_percent: f64,
-    /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
     pub segments: usize,
 }
@@ -72,7 +69,6 @@ pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
     })
 }
 
-/// Returns the translation error (%) and the rotation error (deg/100 m) of one segment.
 fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
     let estimated = Motion::within(matched.estimate(), segment);
     let error = estimated.to(&Motion::within(matched.truth(), segment));
@@ -101,12 +97,10 @@ impl Motion {
         }
     }
 
-    /// inverse(first pose) * last pose.
     fn within(poses: &[Pose], segment: Segment) -> Self {
         Self::of(&poses[segment.first]).to(&Self::of(&poses[segment.last]))
     }
 
-    /// inverse(self) * other.
     fn to(&self, other: &Self) -> Self {
         Self {
             rotation: other.rotation / self.rotation,

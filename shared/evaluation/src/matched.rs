@@ -16,7 +16,6 @@ pub struct MatchedPoses {
 }
 
 impl MatchedPoses {
-    /// Associates the poses one by one.
     pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
         let (n, m) = (estimate.len(), truth.len());
         if n != m {
@@ -64,7 +63,6 @@ impl MatchedPoses {
             .collect()
     }
 
-    /// Applies `change`, which must keep poses valid, to each estimated pose.
     pub(crate) fn map_estimate(self, change: impl FnMut(&Pose) -> Pose) -> Self {
         Self {
             estimate: self.estimate.iter().map(change).collect(),
@@ -98,14 +96,12 @@ pub(crate) fn require_poses(side: &str, poses: &[Pose]) -> Result<(), Evaluation
     Ok(())
 }
 
-/// The distances from pose to pose, m.
 fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
     poses
         .windows(2)
         .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
 }
 
-/// The length of the path, m.
 pub fn path_m(poses: &[Pose]) -> f64 {
     steps_m(poses).sum()
 }

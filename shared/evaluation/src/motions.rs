@@ -60,7 +60,6 @@ impl Part {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedMotions {
     pub(crate) chains: Vec<Chain>,
-    /// Motions given.
     pub motions: usize,
     /// Motions without ground truth at both ends.
     pub without_truth: usize,
@@ -145,7 +144,6 @@ impl MatchedMotions {
 }
 
 impl Chain {
-    /// Returns the composed motions from node `first` to nodes `first + 1`, `first + 2`, ...
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()

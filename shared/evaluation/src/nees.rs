@@ -39,7 +39,6 @@ impl Default for NeesOptions {
 /// of the drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Nees {
-    /// Motions given.
     pub motions: usize,
     /// Motions left out because an end has no ground truth.
     pub without_truth: usize,
@@ -51,7 +50,6 @@ pub struct Nees {
     pub by_length: Vec<NeesLength>,
 }
 
-/// The NEES of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesLength {
     /// Segment length, in motions.
@@ -60,7 +58,6 @@ pub struct NeesLength {
     pub all: NeesFigures,
     /// Segments that start in the first half of the drive's duration.
     pub first_half: Option<NeesFigures>,
-    /// Segments that start in the second half.
     pub second_half: Option<NeesFigures>,
 }
 
@@ -122,7 +119,6 @@ pub fn nees(matched: &MatchedMotions, options: &NeesOptions) -> Nees {
     }
 }
 
-/// The NEES of one segment.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     from_ns: i64,
@@ -185,7 +181,6 @@ fn figures(samples: &[Sample]) -> Option<NeesFigures> {
     })
 }
 
-/// Returns the quantile `p` of the chi-square distribution with `freedom` > 0 degrees of freedom.
 fn chi_square_quantile(p: f64, freedom: usize) -> f64 {
     ChiSquared::new(freedom as f64).map_or(f64::NAN, |chi_square| chi_square.inverse_cdf(p))
 }

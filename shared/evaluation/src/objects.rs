@@ -44,26 +44,22 @@ pub struct TrackedObject {
     pub position: Point2<f64>,
     /// Velocity over ground, m/s.
     pub velocity: Vector2<f64>,
-    /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
     pub yaw_rad: f64,
     /// True if it is reported as moving. The others are not judged.
     pub moving: bool,
 }
 
-/// The objects of a scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjectScan {
     /// The true ones.
     pub truth: Vec<TrueObject>,
-    /// The tracked ones.
     pub tracked: Vec<TrackedObject>,
 }
 
 /// Which objects are required and what matches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectOptions {
-    /// Largest range of a required object, m.
     pub max_range_m: f64,
     /// Lowest speed of a required object, m/s.
     pub min_speed_mps: f64,
@@ -90,9 +86,7 @@ pub struct ObjectErrors {
     pub scans: usize,
     /// Required objects, each once.
     pub objects: usize,
-    /// Required objects, once for each scan.
     pub required: usize,
-    /// Those that were matched.
     pub matched: usize,
     /// Tracked objects that move, once for each scan, where nothing is.
     pub false_positives: usize,
@@ -107,7 +101,6 @@ pub struct ObjectErrors {
     /// Detection and association in one figure, and each.
     #[serde(flatten)]
     pub hota: Hota,
-    /// Switches for each required object.
     pub switches_per_object: f64,
     /// Root mean square of the distance of the centres, m.
     pub position_rmse_m: f64,
@@ -156,7 +149,6 @@ impl fmt::Display for ObjectErrors {
     }
 }
 
-/// Compares the tracked objects of a drive, scan by scan, with the true ones.
 pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErrors {
     let mut count = Count::default();
     for scan in scans {
@@ -170,7 +162,6 @@ pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErr
 struct Count {
     /// Scans that show each true object within the range.
     seen: BTreeMap<u64, usize>,
-    /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,
     objects: BTreeSet<u64>,
     switches: usize,
@@ -211,7 +202,6 @@ impl Count {
             .push(Compared::new(&required, &judged, options.gate_m));
     }
 
-    /// Splits the true objects into those that are required and the others.
     fn split(
         &mut self,
         scan: &ObjectScan,
@@ -268,7 +258,6 @@ impl Count {
         pairs
     }
 
-    /// Adds a required object, and what matches it.
     fn add_required(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
         self.objects.insert(truth.id);
         if let Some(found) = found {
@@ -281,7 +270,6 @@ impl Count {
         }
     }
 
-    /// Adds a tracked object where nothing is.
     fn add_false(&mut self, found: &TrackedObject) {
         let (range_m, speed_mps) = (range_m(&found.position), found.velocity.norm());
         for sums in self.sums_of(range_m, Some(speed_mps)) {
@@ -289,7 +277,6 @@ impl Count {
         }
     }
 
-    /// Returns the sums that an object at a range and of a speed counts in.
     fn sums_of(&mut self, range_m: f64, speed_mps: Option<f64>) -> impl Iterator<Item = &mut Sums> {
         let by_range = RANGES_M.iter().position(|band| band.contains(range_m));
         let speed_of = |mps| SPEEDS_MPS.iter().position(|band| band.contains(mps));

@@ -11,7 +11,6 @@ use crate::{
     mounting::heading_offset_rad, rpe, seg,
 };
 
-/// The options of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Poses from the start of a segment of KITTI and seg to the start of the next; published

@@ -10,7 +10,6 @@ pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.
 pub(crate) struct Segment {
     pub first: usize,
     pub last: usize,
-    /// Index into [`SEGMENT_LENGTHS_M`].
     pub length: usize,
 }
 
@@ -44,7 +43,6 @@ pub(crate) fn segments(
     (0..distance_m.len()).step_by(step.get()).flat_map(ends)
 }
 
-/// Sums and counts for each of [`SEGMENT_LENGTHS_M`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PerLength<const N: usize> {
     sums: [[f64; N]; SEGMENT_LENGTHS_M.len()],

@@ -9,7 +9,6 @@ use serde::Serialize;
 pub struct TruthSigma {
     /// Of x, and of y, m.
     pub position_m: f64,
-    /// Of the heading, rad.
     pub yaw_rad: f64,
 }
 

@@ -139,7 +139,6 @@ fn judged_motions(
 /// Trajectories may be written in microseconds.
 const ROUNDING_NS: i64 = 1_000;
 
-/// Returns whether every motion ends at a pose of the trajectory.
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     motions.iter().all(|motion| {

@@ -44,7 +44,6 @@ pub enum Holds {
     Complete,
 }
 
-/// The programs of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programs {
@@ -83,8 +82,6 @@ impl Programs {
 }
 
 impl Identity {
-    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
-    /// in `dataset`.
     pub fn of(
         configuration: &Configuration,
         programs: &Programs,
@@ -108,7 +105,6 @@ impl Identity {
         Ok(storage::write(&out.join(BEGUN_WITH), text)?)
     }
 
-    /// Reads the identity of the run in the folder.
     pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -149,7 +145,6 @@ impl Identity {
         }
     }
 
-    /// Checks that this configuration and these programs continue the run.
     pub fn require(
         &self,
         configuration: &Configuration,

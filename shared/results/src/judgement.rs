@@ -128,7 +128,6 @@ pub fn judge(
     gyre_evaluation::evaluate(timed(estimate), timed(truth), &options)
 }
 
-/// Compares motions with the truth against which their trajectory was evaluated.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,

@@ -9,7 +9,6 @@ use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
 
 pub use read::read;
 
-/// The header line of `odometry.csv`.
 pub const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\

@@ -124,7 +124,6 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     storage::write(&file, page).map_err(|error| unwritable(to)(error.source))
 }
 
-/// Returns the error of a path for the reason of the system.
 fn unwritable(path: &Path) -> impl Fn(io::Error) -> OutError {
     move |source| OutError::Unwritable {
         path: path.to_owned(),
@@ -199,7 +198,6 @@ impl Out {
         }
     }
 
-    /// Returns the absolute path.
     pub fn path(&self) -> &Path {
         &self.path
     }

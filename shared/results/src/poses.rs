@@ -6,7 +6,6 @@ use gyre_messages::PoseHeader;
 
 use crate::odometry;
 
-/// The header line of `poses.csv`.
 pub const HEADER: &str =
     "scan,stamp_ns,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
 

@@ -38,7 +38,6 @@ pub use map::map_options;
 /// The files that were written.
 #[derive(Debug)]
 pub struct Results {
-    /// Poses in the journal that have results.
     pub poses: usize,
     /// True if the journal has its end.
     pub ended: bool,
@@ -122,7 +121,6 @@ pub fn write(
     })
 }
 
-/// Returns the ground truth of the run of this configuration, where there is one.
 pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {
     let given = configuration.run.ground_truth.clone();
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));

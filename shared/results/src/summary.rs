@@ -22,7 +22,6 @@ pub use counts::{Counter, Counts, Course};
 pub use gnss::GnssSummary;
 pub use slam::SlamSummary;
 
-/// This session of a run.
 pub struct Session<'a> {
     /// Scans to play; `None`: without end.
     pub scans: Option<usize>,
@@ -42,10 +41,8 @@ pub struct Session<'a> {
     pub report: Option<&'a Report>,
 }
 
-/// The network that makes the masks.
 #[derive(Debug, Serialize)]
 struct Mask {
-    /// The model card.
     model: String,
     /// The SHA-256 of the network's file.
     sha256: String,
@@ -54,7 +51,6 @@ struct Mask {
 }
 
 impl Mask {
-    /// From a resolved configuration.
     fn of(masking: &MaskingConfig) -> Option<Self> {
         let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
         let mask = Self {
@@ -110,7 +106,6 @@ impl Problem {
     }
 }
 
-/// The measurements of a run.
 #[derive(Debug)]
 pub struct Measured {
     /// Scans and motions.
@@ -120,9 +115,7 @@ pub struct Measured {
     pub latency: Latency,
     /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
-    /// The loops, with SLAM.
     pub slam: Option<SlamSummary>,
-    /// The fixes of GNSS, where there are some.
     pub gnss: Option<GnssSummary>,
 }
 
@@ -173,19 +166,16 @@ pub struct Summary {
     gnss: Option<GnssSummary>,
 }
 
-/// The forms of a summary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Five lines.
     Brief,
     /// All figures.
     Table,
-    /// All figures as JSON.
     Json,
 }
 
 impl Summary {
-    /// Returns it in a form.
     pub fn text(&self, form: Form) -> serde_json::Result<String> {
         match form {
             Form::Brief => Ok(self.in_brief()),
@@ -194,7 +184,6 @@ impl Summary {
         }
     }
 
-    /// Returns the figures as `summary.json` has them.
     fn figures(&self) -> serde_json::Value {
         // A figure that JSON cannot hold is null there.
         serde_json::to_value(self).unwrap_or_default()

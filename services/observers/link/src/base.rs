@@ -160,7 +160,6 @@ impl Base<'_> {
         thread::sleep(LAST_ANSWERS);
     }
 
-    /// Confirms to the robot that this side has the end in its journal.
     fn confirm(&self, end: Option<&Item>, topics: &[FromRobot]) {
         if let Some(end) = end.filter(|_| self.stages.has_ended()) {
             let next = end.seq.saturating_add(1);
@@ -254,7 +253,6 @@ impl Base<'_> {
         (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
     }
 
-    /// Offers the new poses and motions.
     fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
         let newest = self.stages.newest_pose().max(self.resumed_at());
         let published = newest.map_or(0, |newest| newest.saturating_add(1));

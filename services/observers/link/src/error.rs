@@ -27,14 +27,12 @@ pub enum LinkError {
 }
 
 impl LinkError {
-    /// Creates the error for a side of another version.
     pub(crate) fn other_version(other: &str) -> Self {
         Self::Refused(format!(
             "{other} is another version of gyre: install the same on both"
         ))
     }
 
-    /// Creates the error of a file.
     pub(crate) fn file(path: &Path, source: &std::io::Error) -> Self {
         Self::Refused(format!("{}: {source}", path.display()))
     }

@@ -59,7 +59,6 @@ struct State {
 
 /// A request for the messages of a topic.
 pub(crate) struct Request {
-    /// The key of the topic.
     pub key: String,
     pub from: u64,
     /// The generation of the messages before, 0 without any; `None` if no number is given twice.
@@ -82,7 +81,6 @@ impl Request {
 }
 
 impl Fetcher {
-    /// Receives the messages of a topic, and wakes `waker` for each.
     pub fn start(session: &Session, request: Request, waker: Waker) -> Self {
         let (sender, messages) = channel();
         let state = Arc::new(State {
@@ -111,7 +109,6 @@ impl Fetcher {
         self.messages.try_recv().ok()
     }
 
-    /// Returns the next message that has arrived, as its header of so many bytes and its payload.
     pub fn next_with_payload(
         &self,
         header_bytes: usize,

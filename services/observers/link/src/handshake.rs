@@ -23,7 +23,6 @@ const ASK_FOR_START: Question = Question {
     other: "the base",
 };
 
-/// Returns the prefix of the keys of what one side sends.
 pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     let side = match sender {
         Side::Robot => "robot",
@@ -37,7 +36,6 @@ pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
 
-/// Returns the key where a robot reports the size of its scans.
 pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
     format!("{}/scans", prefix(config, Side::Robot))
 }
@@ -76,7 +74,6 @@ pub(crate) struct Agreement {
     pub drive: Option<String>,
 }
 
-/// The answer to a robot that starts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StartAnswer {

@@ -22,7 +22,6 @@ pub struct Network {
     pub name: String,
     /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,
-    /// Endpoints that it connects to.
     pub connect: Vec<String>,
     /// Certificate of the authority, PEM.
     pub ca: PathBuf,

@@ -37,7 +37,6 @@ const ASK_FOR_RUN: Question = Question {
     other: "the sender",
 };
 
-/// The options of a receiver.
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
     /// The folder of the received run.
@@ -50,7 +49,6 @@ pub struct ReceiveOptions {
     pub topics: Vec<String>,
 }
 
-/// A run of another machine that can be received.
 pub struct RemoteRun {
     session: Session,
     offer: RunOffer,
@@ -74,7 +72,6 @@ pub fn ask(network: &Network, signals: &Signals) -> Result<Option<RemoteRun>, Li
     }
 }
 
-/// Checks that a topic has the same version here.
 fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
     let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
@@ -84,7 +81,6 @@ fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
 }
 
 impl RemoteRun {
-    /// Returns the manifest of the copy of this run that writes to `out`.
     pub fn manifest(&self, out: &Path) -> Manifest {
         let offer = &self.offer;
         Manifest {
@@ -155,7 +151,6 @@ fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
     }
 }
 
-/// Returns the number of the next pose of a journal, which is of this drive or empty.
 fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, LinkError> {
     let (last, ended) = journal.last(1)?;
     let Some(last) = last.first() else {

@@ -25,7 +25,6 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// Creates the message to send.
     pub fn of(message: &RecordedMessage) -> Self {
         let item = message.item().unwrap_or_default();
         Self {
@@ -58,7 +57,6 @@ impl Place {
     }
 }
 
-/// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Message(Message),
@@ -169,7 +167,6 @@ struct Published {
 }
 
 impl LogBuffer {
-    /// Creates a buffer of those messages of a log that have been published.
     fn of(read: ReadLog) -> Self {
         Self {
             read: Mutex::new(read),
@@ -178,7 +175,6 @@ impl LogBuffer {
         }
     }
 
-    /// Creates a buffer of the poses in the journal of the run that writes to `out`.
     pub fn of_poses(out: &Path) -> Self {
         let path = journal::path(out);
         Self::of(Box::new(move |seq| {
@@ -191,7 +187,6 @@ impl LogBuffer {
         }))
     }
 
-    /// Creates a buffer of the loops in the log of a run.
     pub fn of_loops(mut log: LoggedLoops) -> Self {
         Self::of(Box::new(move |seq| {
             let loops = log.refresh().map_err(StageError::from)?;
@@ -200,7 +195,6 @@ impl LogBuffer {
         }))
     }
 
-    /// Sets the number of messages that have been published.
     pub fn set_published(&self, messages: u64) {
         lock(&self.published).messages = messages;
         self.changed.notify_all();

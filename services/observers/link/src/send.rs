@@ -45,7 +45,6 @@ const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
 
-/// The options of a sender.
 #[derive(Clone, Debug)]
 pub struct SendOptions {
     /// The folder of the run's results.
@@ -96,7 +95,6 @@ pub(crate) struct RunOffer {
     pub topics: Vec<OfferedTopic>,
 }
 
-/// A topic that is sent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct OfferedTopic {
     pub name: String,
@@ -106,12 +104,10 @@ pub(crate) struct OfferedTopic {
     pub is_lossless: bool,
 }
 
-/// Returns the prefix of the keys of the topics that one sender offers.
 pub(crate) fn prefix(name: &str, sender: &str) -> String {
     format!("gyre/view/{name}/from/{sender}")
 }
 
-/// Returns the key where any sender of a link describes its run.
 pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
@@ -240,7 +236,6 @@ impl SentTopic<'_> {
     }
 }
 
-/// The logs of a run.
 struct Logs {
     poses: Arc<LogBuffer>,
     /// `None` in a run without SLAM.

@@ -26,7 +26,6 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 /// Time without a message after which an empty message shows the receiver that this end is still
 /// there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
-/// Time to send the last answers.
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
 /// Time between two checks whether a request is still wanted.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
@@ -54,7 +53,6 @@ pub(crate) struct Server {
     queryables: Vec<Queryable<()>>,
 }
 
-/// A topic that is offered.
 pub(crate) struct Offer {
     buffer: Arc<dyn ReplayBuffer>,
     key: String,
@@ -72,7 +70,6 @@ pub(crate) struct Offer {
     stop: Arc<AtomicBool>,
 }
 
-/// The state of a receiver of a topic.
 struct ReceiverState {
     /// The number of its newest request.
     request: u64,
@@ -81,7 +78,6 @@ struct ReceiverState {
 }
 
 impl Server {
-    /// Creates a server of topics with this prefix of keys. Each request wakes `waker`.
     pub fn new(session: &Session, prefix: &str, waker: Option<Waker>) -> Self {
         Self {
             session: session.clone(),

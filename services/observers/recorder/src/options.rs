@@ -9,7 +9,6 @@ pub(crate) const LOG: &str = "log";
 /// The topic of the run's health.
 pub(crate) const HEALTH: &str = "health";
 
-/// The options of a recording.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The folder of the run's results.

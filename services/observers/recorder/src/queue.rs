@@ -15,7 +15,6 @@ use gyre_recording::{Incoming, LogLine};
 /// second, should the disk stand still.
 pub(crate) const LIMIT_BYTES: usize = 128 << 20;
 
-/// An entry of the recording.
 #[derive(Debug)]
 pub(crate) enum Entry {
     Message(Incoming),

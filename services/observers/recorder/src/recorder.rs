@@ -43,7 +43,6 @@ const DEFAULT: [&str; 8] = [
 /// Time between two sentences about missed messages in the log.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 
-/// A recording that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     pub path: PathBuf,
@@ -148,7 +147,6 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     Ok(recorded)
 }
 
-/// Returns the topics to record.
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RecorderError> {
     if named.is_empty() {
         let has = |name: &&str| match topic(name).map(|topic| topic.sender) {

@@ -126,7 +126,6 @@ impl<'run> Tap<'run> {
         }
     }
 
-    /// Returns whether the stream has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.observer.has_ended()
     }

@@ -19,7 +19,6 @@ use crate::{
     run_state::Shared,
 };
 
-/// The name of the node.
 const NODE: &str = "gyre";
 /// Messages that are kept for slow readers: 25 s at four turns a second.
 const DEPTH: usize = 100;

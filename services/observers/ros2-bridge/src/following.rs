@@ -24,14 +24,12 @@ use crate::{
 /// Time between two polls for a run, and for a request to stop.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
-/// The topics that each pose is published on.
 pub struct PoseTopics {
     pub odometry: Outlet<Odometry>,
     /// `None` where another program provides the transforms.
     pub transforms: Option<Outlet<TFMessage>>,
 }
 
-/// The topics that the objects of each scan are published on.
 pub struct ObjectTopics {
     pub detections: Outlet<Detection3DArray>,
     /// The same to look at.
@@ -91,7 +89,6 @@ pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
     });
 }
 
-/// Returns the counts of a run in a sentence.
 fn sentence(state: &RunState) -> String {
     let (poses, first) = (state.poses.published, state.poses.first.unwrap_or_default());
     let (objects, maps, unsent) = (state.objects.published, state.maps, state.unsent);

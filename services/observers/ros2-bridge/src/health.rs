@@ -19,7 +19,6 @@ use crate::{
 
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// The counts of the last report.
 #[derive(Default)]
 struct LastCounts {
     poses: u64,
@@ -65,7 +64,6 @@ fn array(
     array
 }
 
-/// Returns the diagnostics of the run as a whole.
 fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> DiagnosticStatus {
     let dropped = status.map(|status| status.dropped);
     let lost = state.lost();
@@ -103,7 +101,6 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
     part
 }
 
-/// Returns the values of the supervisor.
 fn figures(status: &Status) -> Vec<KeyValue> {
     let mut figures = vec![
         value("phase", status.phase.name()),

@@ -56,7 +56,6 @@ impl Keep {
 }
 
 impl Node {
-    /// Joins a domain as a node of this name in this namespace, such as `/` or `/robot`.
     pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, NodeError> {
         let node_name = NodeName::new(namespace, name)
             .map_err(|reason| name_error(&format!("{namespace} {name}"), &reason))?;
@@ -67,7 +66,6 @@ impl Node {
         })
     }
 
-    /// Returns the name on DDS of a topic, absolute or relative to the namespace.
     pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }

@@ -14,7 +14,6 @@ use gyre_ros2_messages::frames::Frames;
 
 use crate::{Mounting, clock::Clock};
 
-/// The state that the threads share.
 pub struct Shared {
     /// The folder of the results of the run.
     pub out: PathBuf,
@@ -51,7 +50,6 @@ pub struct RunState {
     pub phase: RunPhase,
     /// The clock of its stamps, from its first pose on.
     pub clock: Option<Clock>,
-    /// The odometry frame in the map frame, both of the radar, in a run with SLAM.
     pub map_from_odometry: Option<Pose>,
     pub poses: Counts,
     /// The scans whose objects are published, in a run that tracks them.
@@ -68,7 +66,6 @@ pub struct RunState {
 pub struct Counts {
     /// The number of the first one that was published: those before it came before the bridge.
     pub first: Option<u64>,
-    /// The number of the newest one.
     pub newest: Option<u64>,
     pub published: u64,
     /// Those that came too fast for the bridge.
@@ -118,7 +115,6 @@ pub enum RunPhase {
 }
 
 impl Shared {
-    /// Creates the state before the first run.
     pub fn new(out: PathBuf, frames: Frames, mounting: Mounting) -> Self {
         Self {
             out,
@@ -150,7 +146,6 @@ impl Shared {
         state
     }
 
-    /// Makes a run the one that is shown.
     pub fn show(&self, state: &SharedRunState) {
         *locked(&self.shown) = state.clone();
     }

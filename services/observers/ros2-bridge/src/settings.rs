@@ -13,7 +13,6 @@ use crate::Mounting;
 pub struct Settings {
     /// The folder of the results of the run, and of the next one.
     pub out: PathBuf,
-    /// The domain and the network.
     pub domain: Domain,
     /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
     pub namespace: String,
@@ -26,7 +25,6 @@ pub struct Settings {
     pub map: Option<MapSettingsOf>,
 }
 
-/// Returns the settings of the map of the run in a folder, or why it has none.
 pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 
 #[derive(Clone, Debug, PartialEq)]

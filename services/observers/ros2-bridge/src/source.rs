@@ -32,7 +32,6 @@ const FIX: &str = "/fix";
 /// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The domain and the network.
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
@@ -70,7 +69,6 @@ impl Settings {
         })
     }
 
-    /// The topic of the configuration, beside the topic of the azimuths.
     fn configuration_topic(&self) -> String {
         match self.topic.rsplit_once('/') {
             Some((place, _)) => format!("{place}/configuration_data"),

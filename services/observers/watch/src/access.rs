@@ -11,7 +11,6 @@ use std::{
 use axum::http::{HeaderMap, Uri, header};
 use subtle::ConstantTimeEq;
 
-/// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
 /// The minimum length of a token in a file.
 const MIN_TOKEN: usize = 16;
@@ -42,7 +41,6 @@ pub enum Verdict {
     Granted,
     /// It may read, and gave the token in its address: a cookie replaces it from here on.
     GrantedByAddress,
-    /// It lacks the token.
     NoToken,
     /// It names a host that is not this machine: another site's name may have been pointed here
     /// (DNS rebinding).
@@ -52,7 +50,6 @@ pub enum Verdict {
 }
 
 impl Token {
-    /// Creates a random one.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; TOKEN_BYTES];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
@@ -108,7 +105,6 @@ impl Access {
         }
     }
 
-    /// Judges a request.
     pub fn judge(&self, uri: &Uri, headers: &HeaderMap) -> Verdict {
         let host = text(headers, header::HOST).unwrap_or_default();
         let origin = text(headers, header::ORIGIN);
@@ -165,7 +161,6 @@ fn in_address(uri: &Uri) -> Option<&str> {
     pairs.find_map(|pair| pair.strip_prefix("token="))
 }
 
-/// Returns whether a page of this origin was served under this host.
 fn is_of(origin: &str, host: &str) -> bool {
     let authority = origin.split_once("://").map(|(_, authority)| authority);
     !host.is_empty() && authority == Some(host)

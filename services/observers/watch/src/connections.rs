@@ -21,7 +21,6 @@ use tokio::{
 
 use stream::Timed;
 
-/// The limits of connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// The most connections with requests at once. Streams have permits of their own.

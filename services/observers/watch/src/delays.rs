@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use gyre_messages::{Item, StageId};
 use serde::Serialize;
 
-/// Length of the window.
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
@@ -42,7 +41,6 @@ pub struct SecondDelays {
     max_ms: f64,
 }
 
-/// The delays of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageDelays {
     stage: &'static str,

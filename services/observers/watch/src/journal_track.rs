@@ -9,10 +9,8 @@ use gyre_messages::{PoseHeader, flag};
 /// Poses that are read between two looks at the newest ones: about a megabyte.
 const SLICE: usize = 2000;
 
-/// The place in the track.
 pub(crate) struct JournalTrack {
     journal: PathBuf,
-    /// The number of the next pose of the track.
     next: u64,
     /// The newest pose that was seen.
     newest: u64,
@@ -21,7 +19,6 @@ pub(crate) struct JournalTrack {
 }
 
 impl JournalTrack {
-    /// Begins the track of the run that writes to `out`.
     pub fn of(out: &Path) -> Self {
         Self {
             journal: journal::path(out),

@@ -12,20 +12,14 @@ use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track:
 pub enum Layer {
     /// Powers as measured.
     Scan,
-    /// Masked rasters.
     Raster,
-    /// Sparse points.
     Points,
-    /// Moving objects.
     Objects,
 }
 
-/// The missed messages of the observed topics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Missed {
-    /// Poses that were missed.
     pub pose: u64,
-    /// Scans that were missed.
     pub scan: u64,
     /// Masked scans that were missed.
     pub masked: u64,
@@ -33,14 +27,12 @@ pub struct Missed {
     pub objects: u64,
 }
 
-/// The state of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
     /// The run has not started yet.
     #[default]
     Waiting,
-    /// It works.
     Working,
     /// The last scan has its pose; results are being written.
     Finishing,
@@ -74,7 +66,6 @@ pub struct RunInfo {
     pub window: usize,
     /// True if it tracks objects.
     pub objects: bool,
-    /// The version of the program.
     pub version: &'static str,
 }
 
@@ -100,13 +91,11 @@ pub struct HealthReport {
 pub struct RunCounts {
     /// Scans that the source has published.
     pub published: u64,
-    /// Poses of the trajectory.
     pub poses: u64,
     /// Scans that live mode has dropped.
     pub dropped: u64,
     /// Scans that were published and have no pose yet.
     pub in_flight: u64,
-    /// The messages that this observer has missed.
     pub missed: Missed,
     /// The basis of the motions, from the first of the run on.
     pub witnesses: WitnessCounts,
@@ -150,7 +139,6 @@ pub struct ObjectReport {
 }
 
 impl ObjectsReport {
-    /// Reports the objects of a message.
     pub fn of(header: &ObjectsHeader) -> Self {
         let report = |object: &ListedObject| ObjectReport {
             id: object.id,
@@ -168,7 +156,6 @@ impl ObjectsReport {
     }
 }
 
-/// The newest pose.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CurrentPose {
     pub seq: u64,

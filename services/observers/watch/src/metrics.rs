@@ -79,10 +79,8 @@ impl Collector for Snapshot {
     }
 }
 
-/// A name, a help, a unit and a type.
 type Description<'a> = (&'a str, &'a str, Option<Unit>, MetricType);
 
-/// Encodes the values of a metric, each with the value of a label.
 fn family<'a, N: EncodeCounterValue + EncodeGaugeValue>(
     encoder: &mut DescriptorEncoder<'_>,
     (name, help, unit, kind): Description<'_>,
@@ -147,7 +145,6 @@ impl Snapshot {
         numbers
     }
 
-    /// Returns the counters with a label.
     #[rustfmt::skip]
     fn labelled(&self) -> Vec<Labelled> {
         let (of, missed, samples) = (&self.counts.witnesses, &self.counts.missed, &self.counts.samples);

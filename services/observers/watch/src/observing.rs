@@ -31,13 +31,11 @@ const PICTURE_INTERVAL: Duration = Duration::from_millis(180);
 /// Time between two reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The run to follow.
 pub struct Followed {
     /// The folder of its results.
     pub out: PathBuf,
     /// Returns whether a run that has ended in this folder has reached the end of its recording.
     pub is_complete: fn(&Path) -> bool,
-    /// The view of the run.
     pub view: Arc<RunView>,
 }
 
@@ -104,8 +102,6 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
     }
 }
 
-/// Follows the poses to their end. The track begins with the poses of the journal, and continues
-/// with the published ones.
 fn follow_poses(
     followed: &Followed,
     run: &ObservedRun,

@@ -17,7 +17,6 @@ const MAX_BINS: usize = 256;
 const MAX_SIDE: usize = 256;
 /// Bits of a power that are dropped: 32 shades remain, and a scan compresses to a third.
 const DROPPED_BITS: u32 = 3;
-/// Share of the cells of a scan that are taken for noise.
 const NOISE_SHARE: f64 = 0.6;
 /// Unit of the coordinates of points, m: 16 bits reach 655 m.
 const POINT_UNIT_M: f64 = 0.02;
@@ -108,7 +107,6 @@ fn column_of(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
 struct RasterPicture {
     seq: u64,
     side: usize,
-    /// Width of the picture, m.
     width_m: f64,
 }
 

@@ -9,17 +9,14 @@ use gyre_stage::{
 use gyre_supervise::Usage;
 use serde::Serialize;
 
-/// The name of the supervisor among the processes.
 const SUPERVISOR: &str = "supervisor";
 
 /// Reads the states of a run's processes, and measures their usage between two reads.
 #[derive(Debug, Default)]
 pub struct ProcessMeter {
-    /// The last usage of each process, and its time.
     before: BTreeMap<u32, (Instant, Usage)>,
 }
 
-/// A process of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Process {
     /// The stage or follower.
@@ -30,7 +27,6 @@ pub struct Process {
     /// The rating of the activity: `good`, `warn`, or `bad`.
     pub level: &'static str,
     pub restarts: usize,
-    /// The cause of its last death.
     pub last_death: Option<String>,
     /// The counts of a live radar; `None` if the process receives none.
     pub received: Option<Received>,

@@ -7,7 +7,6 @@ use gyre_geometry::{ComposedMotion, OdometryMotion};
 use gyre_messages::{PoseHeader, flag};
 use serde::Serialize;
 
-/// Length of the stretch, m.
 const STRETCH_M: f64 = 100.0;
 /// Motions that are kept at most: a vehicle that stands or creeps fills the stretch with them.
 const MAX_MOTIONS: usize = 2048;
@@ -24,7 +23,6 @@ pub struct RecentDrift {
 pub struct Drift {
     /// Length of the stretch, m.
     pub over_m: f64,
-    /// Of the position along its worst direction, m.
     pub position_m: f64,
     pub yaw_rad: f64,
 }

@@ -35,7 +35,6 @@ const LAST_MOTIONS: usize = 40;
 /// The number of poses that are kept for scans whose points come later.
 const RECENT: usize = 256;
 
-/// The view of the run.
 #[derive(Default)]
 pub struct RunView {
     state: Mutex<ViewState>,
@@ -47,7 +46,6 @@ pub struct RunView {
     pub histograms: Histograms,
 }
 
-/// The newest message of a kind to a browser.
 pub type Newest = watch::Sender<Option<Message>>;
 
 /// The newest of each kind of message to a browser.
@@ -56,7 +54,6 @@ pub struct Updates {
     pub run: Newest,
     /// Counts and delays.
     pub health: Newest,
-    /// The layers, by their numbers.
     pub layers: [Newest; 4],
     /// True when the program ends.
     pub stop: watch::Sender<bool>,
@@ -89,7 +86,6 @@ struct ViewState {
 }
 
 impl RunView {
-    /// Creates an empty view of the run that writes to `out`.
     pub fn new(out: &str) -> Self {
         let view = Self::default();
         view.update_run(|run| out.clone_into(&mut run.out));
@@ -104,7 +100,6 @@ impl RunView {
         self.state().run.clone()
     }
 
-    /// Begins with a run, and removes all of an earlier one.
     pub fn begin(&self, manifest: &Manifest) {
         {
             let mut state = self.state();
@@ -140,7 +135,6 @@ impl RunView {
         self.report();
     }
 
-    /// Changes the state of the run.
     pub fn set_state(&self, state: RunState) {
         self.update_run(|run| run.state = state);
     }
@@ -196,7 +190,6 @@ impl RunView {
         }
     }
 
-    /// Counts the samples that come with a scan.
     pub fn add_samples(&self, scan: &ScanHeader, bytes: &[u8]) {
         let mut state = self.state();
         state.rates.add(scan, bytes);
@@ -224,7 +217,6 @@ impl RunView {
         send_json(self.updates.of(Layer::Objects), &ObjectsReport::of(header));
     }
 
-    /// Sets the supervisor's status of the run, and the processes.
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
         let mut state = self.state();
         let with_pose = status.poses + status.dropped;
@@ -240,7 +232,6 @@ impl RunView {
         self.state().processes.clone()
     }
 
-    /// Counts more missed messages of a topic.
     pub fn add_missed(&self, topic: &str, missed: u64) {
         let mut state = self.state();
         let counts = &mut state.counts.missed;
@@ -318,7 +309,6 @@ impl RunView {
         self.state().latest.map(|latest| latest.stamp_ns)
     }
 
-    /// Counts one more or one less browser that wants a layer.
     pub fn want(&self, layer: Layer, more: bool) {
         let wanted = &self.wanted[layer as usize];
         match more {
@@ -327,7 +317,6 @@ impl RunView {
         };
     }
 
-    /// Returns whether a browser wants a layer that the run has.
     pub fn is_wanted(&self, layer: Layer) -> bool {
         if layer == Layer::Objects && !self.state().run.objects {
             return false;

@@ -47,7 +47,6 @@ const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A failure of the server.
 #[derive(Debug, Error)]
 pub enum WatchError {
     #[error("cannot serve at {address}: {source}; choose another address")]
@@ -121,7 +120,6 @@ impl Endpoint {
 }
 
 impl Server {
-    /// Creates a server of the page and the metrics.
     pub fn new(page: Endpoint) -> Self {
         Self {
             page,
@@ -129,7 +127,6 @@ impl Server {
         }
     }
 
-    /// Serves Foxglove too.
     pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
         Self { foxglove, ..self }
     }

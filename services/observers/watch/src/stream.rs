@@ -26,7 +26,6 @@ const LAYERS: [(&str, Layer); 4] = [
     ("objects", Layer::Objects),
 ];
 
-/// The layers that a browser wants. Dropped, it wants none.
 struct Wanted {
     view: Arc<RunView>,
     layers: [bool; 4],

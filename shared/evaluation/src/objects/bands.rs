@@ -9,7 +9,6 @@ use super::{TrackedObject, TrueObject, distance_m, share};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Band(f64, f64);
 
-/// The band of everything.
 pub(super) const ALL: Band = Band(0.0, f64::INFINITY);
 
 /// Bands of range, m. Up to 60 m a beam of 1.8 degrees is no wider than a car, and a step of 0.9
@@ -21,7 +20,6 @@ pub(super) const SPEEDS_MPS: [Band; 3] =
     [Band(0.0, 5.0), Band(5.0, 10.0), Band(10.0, f64::INFINITY)];
 
 impl Band {
-    /// Returns whether a value is in it.
     pub fn contains(&self, value: f64) -> bool {
         (self.0..self.1).contains(&value)
     }
@@ -35,7 +33,6 @@ pub struct ObjectBand {
     pub from: f64,
     /// The upper bound, m or m/s; `None`: the band has no end.
     pub to: Option<f64>,
-    /// Required objects, once for each scan.
     pub required: usize,
     /// Share of them that were matched.
     pub recall: f64,
@@ -50,7 +47,6 @@ pub struct ObjectBand {
 }
 
 impl ObjectBand {
-    /// Returns the figures in a line.
     pub(super) fn line(&self, unit: &str) -> String {
         let band = match self.to {
             Some(to) => format!("{} to {to} {unit}", self.from),
@@ -68,7 +64,6 @@ impl ObjectBand {
     }
 }
 
-/// Sums over required objects.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     pub required: usize,

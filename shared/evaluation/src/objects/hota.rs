@@ -41,7 +41,6 @@ impl fmt::Display for Hota {
     }
 }
 
-/// The objects of a scan that are compared.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Compared {
     truth: Vec<u64>,
@@ -169,7 +168,6 @@ impl Hota {
 mod tests {
     use super::*;
 
-    /// A scan with one true object, and one tracked one that is so similar.
     fn scan(tracked: u64, similarity: f64) -> Compared {
         Compared {
             truth: vec![1],

@@ -11,7 +11,6 @@ use plotters::{
 
 use super::PlotError;
 
-/// An area of the SVG.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A diagram with two axes.
@@ -24,7 +23,6 @@ const UNITS_PER_PX: u32 = 8;
 
 pub const ESTIMATE: RGBColor = RGBColor(0, 98, 178);
 pub const TRUTH: RGBColor = RGBColor(120, 124, 130);
-/// The colour of marks on top of lines.
 pub const MARK: RGBColor = RGBColor(213, 94, 0);
 /// The colours of text, of secondary text, and of grid lines.
 pub const INK: RGBColor = RGBColor(34, 38, 44);
@@ -34,7 +32,6 @@ pub const GRID: RGBColor = RGBColor(226, 229, 233);
 /// Height of the header, px.
 pub const HEADER: u32 = 84;
 
-/// Returns a length in px of the shown document in canvas units.
 pub fn px(length: f64) -> u32 {
     (length * f64::from(UNITS_PER_PX)).round() as u32
 }
@@ -46,7 +43,6 @@ pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
         .color(&colour)
 }
 
-/// Returns the style of a line of `width` px.
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width))
 }
@@ -104,7 +100,6 @@ pub fn curve(
     chart.draw_series(series).map(drop).map_err(drawing)
 }
 
-/// Returns a white document of `size` px with what `draw` draws.
 pub fn document(
     size: (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
@@ -125,7 +120,6 @@ pub fn document(
     Ok(svg.replacen(&as_drawn, &as_shown, 1))
 }
 
-/// One entry of a legend.
 pub struct Entry<'a> {
     /// The text.
     pub label: &'a str,
@@ -135,9 +129,7 @@ pub struct Entry<'a> {
 
 /// The symbol of a legend entry.
 pub enum Symbol {
-    /// A piece of a line.
     Line(ShapeStyle),
-    /// A filled area.
     Area(RGBColor),
     /// A dot of [`MARK`]'s colour.
     Dot,
@@ -197,7 +189,6 @@ fn entry_width(entry: &Entry<'_>) -> f64 {
     33.0 + 7.6 * entry.label.len() as f64 + 14.0
 }
 
-/// Converts an error of the drawing library.
 pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
     PlotError::Draw(error.to_string())
 }

@@ -10,7 +10,6 @@ use crate::{
     matched::{path_m, require_poses},
 };
 
-/// Largest plotting area, px.
 const LARGEST: (f64, f64) = (900.0, 720.0);
 /// Smallest plotting area, px: the header needs the width.
 const SMALLEST: (f64, f64) = (600.0, 260.0);
@@ -20,7 +19,6 @@ const BELOW: u32 = 48;
 const MARGIN: u32 = 20;
 /// Border around the paths, as a share of the larger extent.
 const BORDER: f64 = 0.06;
-/// Smallest extent shown, m.
 const MIN_EXTENT_M: f64 = 1.0;
 
 /// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or

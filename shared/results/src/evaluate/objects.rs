@@ -17,7 +17,6 @@ use serde::de::DeserializeOwned;
 /// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
 
-/// A row of a run's `objects.csv`.
 #[derive(Deserialize)]
 struct TrackedRow {
     scan: u64,
@@ -47,7 +46,6 @@ struct TrueRow {
     counts: f64,
 }
 
-/// A row of a run's `poses.csv`.
 #[derive(Deserialize)]
 struct PoseRow {
     scan: u64,

@@ -8,7 +8,6 @@ use gyre_objects::Object;
 use gyre_slam::RecordReader;
 use gyre_terminal::Failure;
 
-/// The header line of `objects.csv`.
 const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,moving,age,\
     cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy\n";
 

@@ -25,7 +25,6 @@ pub struct Pass<'a, 'b> {
     read: Read,
 }
 
-/// The data that was read.
 #[derive(Debug, Default)]
 pub struct Read {
     /// The end of the stream, if it came to that.

@@ -14,7 +14,6 @@ pub struct Sketch {
     /// How often the path was thinned.
     halvings: u32,
     poses: usize,
-    /// Length of the path, m.
     pub length_m: f64,
     last: Option<Pose>,
 }

@@ -34,7 +34,6 @@ pub struct Slam {
     queries: Vec<Query>,
     /// The scan and the time of each keyframe.
     keyframes: Vec<(u64, i64)>,
-    /// The log of the fixes, where there is one.
     gnss: Option<GnssLog>,
 }
 
@@ -93,7 +92,6 @@ impl Slam {
         }))
     }
 
-    /// Corrects the pose of scan `seq`.
     pub fn correct(&self, seq: u64, pose: &Pose) -> Pose {
         self.correction.correct(seq, pose)
     }
@@ -191,7 +189,6 @@ impl Slam {
         })
     }
 
-    /// Compares the loops that are used with a trajectory.
     pub fn errors_of(&self, trajectory: &Trajectory) -> Option<LoopErrors> {
         let at = |keyframe: usize| trajectory.at(self.keyframes[keyframe].1);
         loop_errors(self.used().filter_map(|it| {

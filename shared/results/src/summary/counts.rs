@@ -51,7 +51,6 @@ pub struct Counts {
 /// The path that was driven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Course {
-    /// Length, m.
     pub path_m: f64,
     /// Time from the first pose to the last one, s.
     pub duration_s: f64,
@@ -60,12 +59,10 @@ pub struct Course {
     pub period_s: Option<f64>,
 }
 
-/// Counts of lost azimuths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LostCounts {
     /// Scans with lost azimuths.
     pub scans: u64,
-    /// Azimuths that were lost in all.
     pub azimuths: u64,
     /// Azimuths in bursts at unknown places.
     pub unplaced: u64,
@@ -80,7 +77,6 @@ impl LostCounts {
     }
 }
 
-/// The contribution of a gyro.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GyroCounts {
     /// Motions whose turn it measured; the radar alone measured the others.
@@ -116,7 +112,6 @@ impl GyroCounts {
     }
 }
 
-/// The contribution of wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WheelCounts {
     /// Motions whose distance they measured.
@@ -181,7 +176,6 @@ impl DopplerCounts {
     }
 }
 
-/// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
     pub refined: u64,
@@ -256,7 +250,6 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Counts a pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         self.processed += 1;
         self.starts += u64::from(pose.item.is(flag::BREAK));
@@ -276,7 +269,6 @@ impl Counter {
         self.wheel_clock.add(pose, motion.x_m, distance);
     }
 
-    /// Returns the path, which is so long.
     pub fn course(&mut self, path_m: f64) -> Course {
         let span_ns = |(first_ns, last): (i64, Item)| last.stamp_ns - first_ns;
         let duration_ns = self.first_ns.zip(self.last).map_or(0, span_ns);
@@ -316,7 +308,6 @@ impl Counter {
 /// Counts the scans that a recording lacks, by the intervals between those that it has.
 #[derive(Debug, Default)]
 struct Gaps {
-    /// The first motions, which determine the period.
     first: Vec<Motion>,
     period_ns: Option<i64>,
     missing: u64,

@@ -13,14 +13,11 @@ const LEAST_WEIGHT: f64 = 0.25;
 /// The fixes of GNSS in the summary, and the place of the run on the earth.
 #[derive(Debug, Serialize)]
 pub struct GnssSummary {
-    /// The log, or the bag.
     log: String,
-    /// The topic in the bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     topic: Option<String>,
     /// Fixes of the log without the faulty ones.
     fixes: usize,
-    /// The faults of the log.
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
     outside: usize,
@@ -56,7 +53,6 @@ pub struct GnssSummary {
 /// A pose in the plane of the fixes, with its standard deviations.
 #[derive(Debug, Serialize)]
 struct EastNorth {
-    /// Place, m.
     east_m: f64,
     north_m: f64,
     /// Direction of the x axis, counter-clockwise from east, degrees.
@@ -83,7 +79,6 @@ impl EastNorth {
 }
 
 impl GnssSummary {
-    /// Summarises the fixes of a log by the last solution.
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);

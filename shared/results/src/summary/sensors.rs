@@ -111,7 +111,6 @@ fn cause(section: &str, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
     }
 }
 
-/// Returns whether contradictions are more than chance, and more than this share of all motions.
 pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
     contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
 }

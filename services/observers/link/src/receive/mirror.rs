@@ -19,9 +19,7 @@ use crate::{
 /// The copy of a run of another machine.
 pub(super) struct Mirror<'a> {
     pub session: Session,
-    /// The name of the link.
     pub link: String,
-    /// The identity of this receiver.
     pub receiver: String,
     pub offer: RunOffer,
     /// The answers to the question for another sender, while nothing arrives.
@@ -34,7 +32,6 @@ pub(super) struct Mirror<'a> {
     pub rig: Rig<'a>,
 }
 
-/// A topic of the copy.
 pub(super) struct MirroredTopic {
     name: &'static str,
     header_bytes: usize,
@@ -45,7 +42,6 @@ pub(super) struct MirroredTopic {
 }
 
 impl Mirror<'_> {
-    /// Opens a topic for publishing, and requests its messages.
     pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
         let other_version = || LinkError::other_version(ASK_FOR_RUN.other);
         let topic = topic(&offered.name).ok_or_else(other_version)?;
@@ -217,7 +213,6 @@ impl MirroredTopic {
     }
 }
 
-/// Journals a valid pose, and returns the number of the next one.
 fn append(
     journal: &mut Journal,
     message: &RecordedMessage,

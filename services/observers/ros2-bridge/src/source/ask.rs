@@ -59,7 +59,6 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     })
 }
 
-/// Waits for the configuration that the driver publishes.
 fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuration>, AskError> {
     let started = Instant::now();
     while started.elapsed() < MAX_WAIT {
@@ -79,7 +78,6 @@ fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuratio
     Err(AskError::of(reason, true))
 }
 
-/// Estimates the configuration from azimuths.
 fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
     let Some(resolution_m) = settings.constants.range_resolution_m else {
         let topic = settings.configuration_topic();

@@ -9,7 +9,6 @@ const MAX_AZIMUTHS: usize = 4_000;
 /// Whole turns that are needed.
 const TURNS: usize = 2;
 
-/// The estimate of a radar's configuration.
 #[derive(Clone, Debug, Default)]
 pub struct ConfigurationEstimate {
     /// The last encoder count.
@@ -37,7 +36,6 @@ impl ConfigurationEstimate {
         }
     }
 
-    /// Adds a turn of so many rows, which arrived when it had ended.
     fn add_turn(&mut self, rows: usize, bins: usize, arrival_ns: i64) {
         if let Ok(rows @ 1..) = u16::try_from(rows) {
             self.azimuths = Some(rows);
@@ -46,7 +44,6 @@ impl ConfigurationEstimate {
         }
     }
 
-    /// Adds an azimuth that arrived at this time, ns.
     fn add(&mut self, encoder: u16, bins: usize, arrival_ns: i64) {
         self.bins = self.bins.max(bins);
         let Some(last) = self.last.replace(encoder) else {

@@ -18,7 +18,6 @@ use ros2_client::{Gid, ReadError, Subscription};
 use super::{Settings, fixes::Fixes, wakeups::Wakeups};
 use crate::{NodeError, node::Node};
 
-/// The name of the node.
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
 const AZIMUTHS: usize = 4_000;
@@ -51,7 +50,6 @@ pub enum PacketMessage {
 }
 
 impl PacketMessage {
-    /// Returns the driver's header.
     pub fn header(&self) -> &Header {
         match self {
             Self::Azimuth(message) => &message.header,
@@ -89,13 +87,10 @@ enum Azimuths {
 pub struct Driver {
     node: Node,
     topic: String,
-    /// The name of the azimuths' topic on DDS.
     dds_name: String,
     wakeups: Wakeups,
-    /// The name of the configurations' topic on DDS.
     configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
-    /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
     azimuths: Option<Azimuths>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
@@ -107,7 +102,6 @@ pub struct Driver {
     fixes: Option<Fixes>,
 }
 
-/// The radar's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
     pub radar: Configuration,
@@ -227,7 +221,6 @@ impl Driver {
         }
     }
 
-    /// Passes the fixes of GNSS on that have arrived.
     pub fn pass_fixes_on(&mut self) {
         if let Some(fixes) = &mut self.fixes {
             fixes.pass_on();

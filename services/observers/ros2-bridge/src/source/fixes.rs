@@ -16,7 +16,6 @@ const FIXES: usize = 200;
 /// Where fixes come from, and where they go to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FixSettings {
-    /// The topic of a receiver.
     pub topic: String,
     /// Who takes them: where the corrected trajectory receives datagrams.
     pub listen: String,
@@ -72,7 +71,6 @@ impl Fixes {
     }
 }
 
-/// Returns a socket that can send to an address.
 fn socket_to(address: &str) -> io::Result<(UdpSocket, SocketAddr)> {
     let first = address.to_socket_addrs()?.next();
     let to = first.ok_or(io::ErrorKind::AddrNotAvailable)?;

@@ -71,7 +71,6 @@ impl Radar {
         })
     }
 
-    /// Takes the newest configuration.
     fn take_configuration(&mut self, room: usize) -> Result<(), StageError> {
         for _ in 0..MAX_MESSAGES {
             match self.driver.configuration() {

@@ -29,7 +29,6 @@ impl Channel {
         })
     }
 
-    /// Returns a channel of JSON.
     fn measured(name: &'static str, topic: Option<&'static str>, schema: &Value) -> Self {
         let advertised = json!({
             "topic": name,

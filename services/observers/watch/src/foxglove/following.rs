@@ -188,7 +188,6 @@ fn report(followed: &Followed, hub: &Hub) {
     }
 }
 
-/// Announces the channels of the run, and returns the path of its log.
 fn announce(followed: &Followed, hub: &Hub) -> Option<PathBuf> {
     let run = ObservedRun::writing_to(&followed.out).ok()?;
     let channels = hub.channels.iter().enumerate();

@@ -16,7 +16,6 @@ use super::{
 pub struct Hub {
     /// All channels that a run can have.
     pub channels: Vec<Channel>,
-    /// The numbers of those that this run has.
     pub of_run: watch::Sender<Vec<usize>>,
     /// The newest sentence about a topic that is not shown.
     pub notice: watch::Sender<String>,

@@ -56,7 +56,6 @@ fn key(stage: StageId) -> String {
     stage.name().replace('-', "_")
 }
 
-/// Returns the schema of [`latency`].
 pub fn latency_schema() -> Value {
     let hop = object(numbers(["transport_ms", "wait_ms", "work_ms"]));
     let stages = StageId::ALL.map(|stage| (key(stage), hop.clone()));

@@ -51,7 +51,6 @@ struct Viewer {
     socket: WebSocket,
     hub: Arc<Hub>,
     member: HubMember,
-    /// The advertised channels.
     advertised: Vec<usize>,
     /// The viewer's clock: the newest time of the sensor that it was sent, ns.
     time_ns: i64,
@@ -59,7 +58,6 @@ struct Viewer {
     last_warning: Option<Instant>,
 }
 
-/// The viewer has disconnected, or takes too long.
 struct Disconnected;
 
 /// Serves a viewer until it disconnects, is too slow, or the program ends.
@@ -160,7 +158,6 @@ impl Viewer {
         Ok(())
     }
 
-    /// Sends a message of a channel, and before it the time.
     async fn send_data(
         &mut self,
         subscription: u32,
@@ -200,7 +197,6 @@ impl Viewer {
         self.send_status(WARNING, "skipped", &sentence).await
     }
 
-    /// Sends a status sentence, which replaces the one before with the same name.
     async fn send_status(
         &mut self,
         level: u8,

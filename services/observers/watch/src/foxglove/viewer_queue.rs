@@ -20,7 +20,6 @@ pub struct ViewerQueue {
     added: Notify,
 }
 
-/// An encoded message, which all viewers share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodedMessage {
     /// The channel's number.
@@ -35,7 +34,6 @@ pub struct EncodedMessage {
 
 #[derive(Default)]
 struct Queue {
-    /// The viewer's number of each subscription, by channel.
     subscriptions: BTreeMap<usize, u32>,
     messages: VecDeque<EncodedMessage>,
     bytes: usize,
@@ -69,7 +67,6 @@ impl ViewerQueue {
         Some(channel)
     }
 
-    /// Returns the channels that are subscribed to.
     pub fn subscribed(&self) -> Vec<usize> {
         self.queue().subscriptions.keys().copied().collect()
     }
@@ -122,7 +119,6 @@ impl Queue {
         Some((subscription, message))
     }
 
-    /// Removes the messages of a channel, and returns their number.
     fn remove(&mut self, channel: usize) -> u64 {
         let before = self.messages.len();
         self.messages.retain(|message| message.channel != channel);
