@@ -32,15 +32,8 @@ fn assert_exact(summary: &Value, rows: &[ChainRow]) {
     let chains = count("breaks") + 1;
     assert_eq!(count("processed"), rows.len() as u64 + chains, "{summary}");
     assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert!(
-        count("dropped") > 0,
-        "masking is too slow for every scan: {summary}"
-    );
-    assert_eq!(
-        rows.last().unwrap().scan,
-        recording::SCANS as u64 - 1,
-        "the last scan is nobody's to drop"
-    );
+    assert!(count("dropped") > 0);
+    assert_eq!(rows.last().unwrap().scan, recording::SCANS as u64 - 1);
 }
 
 /// Scans that the chain stepped over.

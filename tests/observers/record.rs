@@ -88,6 +88,14 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
         let odometry = replay(&file(&run), &["--from", topic]);
         assert_eq!(odometry, undisturbed(), "from {topic}");
     }
+    let mut inspect = gyre();
+    inspect.args(["inspect", "--json"]).arg(file(&run));
+    let report: Value = serde_json::from_str(&Ended::of(inspect).succeeded().stdout).unwrap();
+    assert_eq!(
+        (&report["format"], &report["scans"]),
+        (&"mcap".into(), &SCANS.into())
+    );
+    assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
 }
 
 #[test]
@@ -104,17 +112,10 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
     assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 2);
     let recording = open_recording(&file(&run)).unwrap();
-    assert_eq!(
-        recording.damages().count(),
-        1,
-        "the part of the killed one has no end"
-    );
+    assert_eq!(recording.damages().count(), 1);
     let first = Recording::open(&[file(&run)]).unwrap();
     let of_first = seqs(&first, "scan");
-    assert!(
-        !of_first.is_empty(),
-        "what was written before the kill can be read"
-    );
+    assert!(!of_first.is_empty());
     assert_eq!(seqs(&recording, "scan").len(), SCANS);
     assert_eq!(replay(&file(&run), &[]), undisturbed());
 }
@@ -233,26 +234,6 @@ fn a_recorder_that_dies_right_before_the_end_is_reported() {
     );
 }
 
-#[test]
-fn a_recording_holds_the_health_of_the_run() {
-    let run = recorded(&played()).rate("1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4).kill("masking");
-    running.finish().succeeded();
-    let health = health(&file(&run));
-    let restarts = |health: &Value| {
-        let processes = health["status"]["processes"].as_array().unwrap();
-        let masking = processes.iter().find(|it| it["name"] == "masking").unwrap();
-        masking["restarts"].as_u64().unwrap()
-    };
-    assert!(
-        health.len() >= 2,
-        "once a second for six seconds: {}",
-        health.len()
-    );
-    assert_eq!(restarts(health.last().unwrap()), 1);
-}
-
 /// The messages on `/health`.
 fn health(recording: &Path) -> Vec<Value> {
     let bytes = fs::read(recording).unwrap();
@@ -266,10 +247,10 @@ fn health(recording: &Path) -> Vec<Value> {
 }
 
 #[test]
-fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
+fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_request() {
     let run = recorded(&played()).rate("1");
     let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    running.await_poses(SCANS / 4).kill("masking");
     let recorder = |what, is_as_wanted: &dyn Fn(&Value) -> bool| {
         let status = await_status(&run, what, |status| {
             is_as_wanted(process(status, "recorder"))
@@ -290,11 +271,14 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
     });
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
-    assert_eq!(parts(&file(&run)).len(), 3);
-    assert_eq!(
-        seqs(&open_recording(&file(&run)).unwrap(), "scan").len(),
-        SCANS
-    );
+    let parts = parts(&file(&run));
+    assert_eq!(parts.len(), 3);
+    let scans = seqs(&open_recording(&file(&run)).unwrap(), "scan");
+    assert_eq!(scans.len(), SCANS);
+    let health: Vec<Value> = parts.iter().flat_map(|part| health(part)).collect();
+    assert!(health.len() >= 2, "once a second for six seconds");
+    let processes = &health.last().unwrap()["status"];
+    assert_eq!(process(processes, "masking")["restarts"], 1);
 }
 
 /// The logs of the sensors are not there any more, and their delays are in the samples already.
@@ -386,18 +370,6 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
 }
 
 #[test]
-fn inspect_reports_a_recording_as_a_dataset() {
-    let run = recorded(&played());
-    run.complete();
-    let mut command = gyre();
-    command.arg("inspect").arg(file(&run)).arg("--json");
-    let report: Value = serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
-    assert_eq!(report["format"], "mcap");
-    assert_eq!(report["scans"], SCANS);
-    assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
-}
-
-#[test]
 fn real_scans_replay_to_the_same_bytes() {
     let Some(data) = real_data("radiate-2019-02-12") else {
         return;
@@ -412,11 +384,7 @@ fn real_scans_replay_to_the_same_bytes() {
     assert_eq!(replay(&file(&run), &[]), odometry);
     assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
     let configured = Run::of_file(&configuration).data(&file(&run));
-    assert_eq!(
-        configured.complete(),
-        odometry,
-        "constants that are the recorded ones"
-    );
+    assert_eq!(configured.complete(), odometry);
     let other = configured.set("dataset.range_offset_m=0.5");
     other
         .finish()

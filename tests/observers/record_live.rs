@@ -158,10 +158,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
             );
         }
         let lacks = (scans.len() - entries.len()) as u64;
-        assert!(
-            lacks > 0,
-            "{topic}: nothing was given anew while no recorder was there"
-        );
+        assert!(lacks > 0);
         assert!(lacks <= recording.missed()[topic], "{topic} lacks {lacks}");
     }
 }

@@ -42,71 +42,41 @@ pub fn with_python(run: Run) -> Run {
     run.set(&format!("stages.masking.command=['{python}', '{script}']"))
 }
 
-/// The size and the offsets of a message.
-type Layout = (usize, BTreeMap<&'static str, usize>);
-
-macro_rules! layout {
-    ($message:ty: $($field:ident),*) => {
-        (size_of::<$message>(), BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]))
+/// The names of messages with their sizes and the offsets of their fields.
+macro_rules! layouts {
+    ($($name:ident $message:ty: $($field:ident)*;)*) => {
+        [$((
+            stringify!($name),
+            size_of::<$message>(),
+            BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]),
+        )),*]
     };
 }
 
-fn layouts() -> [(&'static str, Layout); 12] {
-    [
-        (
-            "gyre_hop_v1",
-            layout!(Hop: received_ns, started_ns, finished_ns, published_ns),
-        ),
-        (
-            "gyre_item_v6",
-            layout!(Item: seq, scan, previous_scan, published, numbered_from, stamp_ns, due_ns, generation,
-                flags, lost, hops),
-        ),
-        (
-            "gyre_scan_header_v7",
-            layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
-                doppler_s, samples, samples_left_out, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
-        ),
-        (
-            "gyre_masked_header_v9",
-            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2, gyro, has_gyro,
-                wheels, has_wheels, doppler, has_doppler),
-        ),
-        (
-            "gyre_gyro_turn_v1",
-            layout!(GyroTurn: yaw_rad, variance_rad2, interval_s, sweep_rate_radps),
-        ),
-        (
-            "gyre_wheel_distance_v1",
-            layout!(WheelDistance: distance_m, variance_m2, side_variance_m2, interval_s),
-        ),
-        (
-            "gyre_doppler_velocity_v1",
-            layout!(DopplerVelocity: velocity_mps, covariance, bearings),
-        ),
-        (
-            "gyre_rotation_estimate_v1",
-            layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
-        ),
-        (
-            "gyre_refinement_v6",
-            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_turn_rad, gyro_scale,
-                gyro_bias_radps, gyro_bias_sigma_radps, wheels, wheel_distance_m, wheel_scale, wheel_scale_sigma, doppler, doppler_scale, doppler_scale_sigma),
-        ),
-        (
-            "gyre_motion_estimate_v8",
-            layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
-                runner_up_score, rotation, searched, refinement),
-        ),
-        (
-            "gyre_motion_header_v11",
-            layout!(MotionHeader: item, motion),
-        ),
-        (
-            "gyre_pose_header_v11",
-            layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
-        ),
-    ]
+fn layouts() -> [(&'static str, usize, BTreeMap<&'static str, usize>); 12] {
+    layouts! {
+        gyre_hop_v1 Hop: received_ns started_ns finished_ns published_ns;
+        gyre_item_v6 Item: seq scan previous_scan published numbered_from stamp_ns due_ns generation
+            flags lost hops;
+        gyre_scan_header_v7 ScanHeader: item azimuths bins stride first_byte range_resolution_m
+            range_offset_m clockwise doppler_s samples samples_left_out azimuth_stamp_ns azimuth_rad
+            azimuth_flags;
+        gyre_masked_header_v9 MaskedHeader: item n rasters cell_m mask twist compensated points
+            azimuth_variance_rad2 gyro has_gyro wheels has_wheels doppler has_doppler;
+        gyre_gyro_turn_v1 GyroTurn: yaw_rad variance_rad2 interval_s sweep_rate_radps;
+        gyre_wheel_distance_v1 WheelDistance: distance_m variance_m2 side_variance_m2 interval_s;
+        gyre_doppler_velocity_v1 DopplerVelocity: velocity_mps covariance bearings;
+        gyre_rotation_estimate_v1 RotationEstimate: angle_rad variance_rad2 score runner_up_rad
+            runner_up_score;
+        gyre_refinement_v6 RefinementRecord: outcome initial_guess overlap support stationary gyro
+            gyro_turn_rad gyro_scale gyro_bias_radps gyro_bias_sigma_radps wheels wheel_distance_m
+            wheel_scale wheel_scale_sigma doppler doppler_scale doppler_scale_sigma;
+        gyre_motion_estimate_v8 MotionEstimate: x_m y_m yaw_rad covariance drift_share scale_sigma
+            interval_ns score runner_up_score rotation searched refinement;
+        gyre_motion_header_v11 MotionHeader: item motion;
+        gyre_pose_header_v11 PoseHeader: item motion x_m y_m yaw_rad covariance
+            accumulated_covariance trajectory_version;
+    }
 }
 
 #[test]
@@ -122,7 +92,7 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
         String::from_utf8_lossy(&output.stderr)
     );
     let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
-    for (name, (size, offsets)) in layouts() {
+    for (name, size, offsets) in layouts() {
         let of_python = &printed[name];
         assert_eq!(of_python["size"], size, "{name}");
         let fields = serde_json::to_value(&offsets).unwrap();

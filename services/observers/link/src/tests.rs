@@ -252,11 +252,7 @@ fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
         Fetcher::start(&ends.there, request, Waker::new().unwrap())
     };
     let fetcher = again(8, 3);
-    assert_eq!(
-        take_of_generations(&fetcher, 3),
-        [(3, 8), (3, 9), (3, 10)],
-        "of its own generation"
-    );
+    assert_eq!(take_of_generations(&fetcher, 3), [(3, 8), (3, 9), (3, 10)]);
     fetcher.leave();
     let fetcher = again(8, 2);
     let received = take_of_generations(&fetcher, 5);
