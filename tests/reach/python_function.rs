@@ -168,49 +168,24 @@ fn what_cannot_be_loaded_or_returned_is_said() {
     if !python_has("numpy") {
         return;
     }
-    let spread = "neither a standard deviation nor a covariance";
-    for (stage, text, sentence) in [
-        ("masking", "def mask(scan)", "line 1: SyntaxError"),
-        ("masking", "masks = 1", "there is no function `mask`"),
-        ("masking", "mask = lambda s: s.power[:, :3]", "shape"),
-        (
-            "masking",
-            "mask = lambda s: s.raster + 2.0",
-            "not all from 0 to 1",
-        ),
-        ("masking", "mask = lambda s: 1j * s.raster", "complex"),
-        (
-            "masking",
-            "from numpy.ma import *\nmask = lambda s: masked_all(9)",
-            "masked",
-        ),
-        (
-            "masking",
-            "import os\nmask = lambda s: os._exit(3)",
-            "Python has ended",
-        ),
-        (
-            "rotation-search",
-            "rotation = lambda *s: (7.0, 0.1)",
-            "at most half a turn",
-        ),
-        ("rotation-search", "rotation = lambda *s: 0.1", "TypeError"),
-        (
-            "rotation-search",
-            "rotation = lambda *s: (float('nan'), 0)",
-            "not finite",
-        ),
-        (
-            "translation-search",
-            "translation = lambda *s: (1, 0, -0.1)",
-            spread,
-        ),
-        (
-            "translation-search",
-            "translation = lambda *s: (1, 0, [[1, 5], [0, 1]])",
-            spread,
-        ),
+    for row in [
+        "masking | def mask(scan) | line 1: SyntaxError",
+        "masking | masks = 1 | there is no function `mask`",
+        "masking | mask = lambda s: s.power[:, :3] | shape",
+        "masking | mask = lambda s: s.raster + 2.0 | not all from 0 to 1",
+        "masking | mask = lambda s: 1j * s.raster | complex",
+        "masking | from numpy.ma import *\nmask = lambda s: masked_all(9) | masked",
+        "masking | import os\nmask = lambda s: os._exit(3) | Python has ended",
+        "rotation-search | rotation = lambda *s: (7.0, 0.1) | at most half a turn",
+        "rotation-search | rotation = lambda *s: 0.1 | TypeError",
+        "rotation-search | rotation = lambda *s: (float('nan'), 0) | not finite",
+        "translation-search | translation = lambda *s: (1, 0, -0.1) | neither a standard deviation",
+        "translation-search | translation = lambda *s: (1, 0, [[1, 5], [0, 1]]) | nor a covariance",
     ] {
+        let row: Vec<&str> = row.split(" | ").collect();
+        let [stage, text, sentence] = row[..] else {
+            panic!("{row:?}");
+        };
         let (_folder, file) = file(text);
         let run = failing(stage, &file);
         run.finish().failed_with(&["mine.py", sentence]);

@@ -363,6 +363,15 @@ mod tests {
         }
     }
 
+    /// The errors where each object is required from its first scan on.
+    fn at_once(scans: &[ObjectScan]) -> ObjectErrors {
+        let options = ObjectOptions {
+            min_scans: 1,
+            ..ObjectOptions::default()
+        };
+        object_errors(scans, &options)
+    }
+
     #[test]
     fn an_object_is_required_from_its_third_scan_on() {
         let scans = vec![scan(&[truth(1, 20.0)], &[]); 5];
@@ -378,21 +387,15 @@ mod tests {
 
     #[test]
     fn a_pair_is_kept_while_it_fits_and_another_identity_is_a_switch() {
-        let options = ObjectOptions {
-            min_scans: 1,
-            ..ObjectOptions::default()
-        };
         let scans = [
             scan(&[truth(1, 20.0)], &[tracked(5, 21.0)]),
             // A nearer one comes, and is false as long as the first one fits.
             scan(&[truth(1, 20.0)], &[tracked(5, 21.0), tracked(6, 20.0)]),
             scan(&[truth(1, 20.0)], &[tracked(6, 20.0)]),
         ];
-        let errors = object_errors(&scans, &options);
-        assert_eq!(
-            (errors.matched, errors.false_positives, errors.switches),
-            (3, 1, 1)
-        );
+        let errors = at_once(&scans);
+        let counts = (errors.matched, errors.false_positives, errors.switches);
+        assert_eq!(counts, (3, 1, 1));
         assert!((errors.mota - (1.0 - 2.0 / 3.0)).abs() < 1e-12, "{errors}");
         assert!((errors.velocity_rmse_mps - 1.0).abs() < 1e-12);
         assert!((errors.velocity_nees - 0.5).abs() < 1e-12);
@@ -401,22 +404,18 @@ mod tests {
 
     #[test]
     fn what_is_there_but_not_required_excuses_and_what_is_far_too() {
-        let options = ObjectOptions {
-            min_scans: 1,
-            ..ObjectOptions::default()
-        };
         let walker = TrueObject {
             is_vehicle: false,
             ..truth(2, -20.0)
         };
         let found = [tracked(1, -21.0), tracked(2, 70.0), tracked(3, 20.0)];
-        let errors = object_errors(&[scan(&[walker], &found)], &options);
+        let errors = at_once(&[scan(&[walker], &found)]);
         assert_eq!((errors.required, errors.false_positives), (0, 1));
         let standing = TrackedObject {
             moving: false,
             ..tracked(3, 20.0)
         };
-        let errors = object_errors(&[scan(&[], &[standing])], &options);
+        let errors = at_once(&[scan(&[], &[standing])]);
         assert_eq!(errors.false_positives, 0);
     }
 }

@@ -123,12 +123,8 @@ mod tests {
             association: Association::Index,
             ..Options::default()
         };
-        evaluate(
-            TimedPoses::untimed(estimate),
-            TimedPoses::untimed(truth),
-            &options,
-        )
-        .unwrap()
+        let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
+        evaluate(estimate, truth, &options).unwrap()
     }
 
     #[test]

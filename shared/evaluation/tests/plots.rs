@@ -1,8 +1,8 @@
 //! The SVG documents.
 
-use crate::common::drive;
+use crate::common::{by_index, drive};
 use gyre_evaluation::{
-    Association, Evaluation, Options, PlotError, TimedPoses, evaluate,
+    Evaluation, PlotError,
     plot::{errors_svg, trajectory_svg},
 };
 use gyre_geometry::{Pose, pose};
@@ -11,16 +11,7 @@ fn evaluation(n: usize) -> Evaluation {
     let truth = drive(n, 120.0);
     let moved_by = pose(50.0, 20.0, 1.0);
     let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
-    let options = Options {
-        association: Association::Index,
-        ..Options::default()
-    };
-    evaluate(
-        TimedPoses::untimed(&estimate),
-        TimedPoses::untimed(&truth),
-        &options,
-    )
-    .unwrap()
+    by_index(&estimate, &truth, 10)
 }
 
 /// Returns the points of the longest polyline of a colour, in canvas units.

@@ -1,8 +1,20 @@
 //! Drives for tests.
 #![allow(dead_code)] // No test uses all of it.
 
+use std::num::NonZeroUsize;
+
+use gyre_evaluation::{Association, Evaluation, Options, TimedPoses, evaluate};
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
+
+pub fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
+    let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
+    let options = Options {
+        step: NonZeroUsize::new(step).unwrap(),
+        association: Association::Index,
+    };
+    evaluate(estimate, truth, &options).unwrap()
+}
 
 /// Returns the poses of motions from `start`.
 pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> {
