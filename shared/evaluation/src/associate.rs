@@ -15,7 +15,6 @@ use crate::{
 pub struct TimedPoses<'a> {
     /// One stamp a pose, ns, in order. Association by index ignores them.
     pub stamps_ns: &'a [i64],
-    /// Poses of the sensor in one fixed frame.
     pub poses: &'a [Pose],
 }
 
@@ -61,7 +60,6 @@ impl Default for Association {
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
     Time {
-        /// Estimated poses with a ground-truth pose.
         matched: usize,
         /// Estimated poses before the first or after the last stamp of the ground truth: left out.
         outside_span: usize,
@@ -70,7 +68,6 @@ pub enum Coverage {
         max_gap_ns: i64,
     },
     Index {
-        /// Estimated poses with a ground-truth pose.
         matched: usize,
         /// Estimated poses beyond the end of the ground truth: left out.
         estimate_surplus: usize,
@@ -210,7 +207,6 @@ pub(crate) fn require_stamps(
     Ok(stamps.first().copied().zip(stamps.last().copied()))
 }
 
-/// The ground truth at one instant.
 pub(crate) enum At {
     Pose(Pose),
     Outside,

@@ -16,7 +16,6 @@ pub struct Bands {
     pub truth_sigma: TruthSigma,
 }
 
-/// The error of one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandSample {
     /// Time since the first motion began, s.

@@ -69,7 +69,6 @@ impl Evaluation {
         }
     }
 
-    /// Writes a line for each length that has segments.
     fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(seg) = &self.seg else { return Ok(()) };
         write!(f, "\n\n  length  segments  translation    rotation     seg")?;

@@ -55,7 +55,6 @@ pub enum HeadingFault {
     Unclear,
 }
 
-/// The sign of an axis that fits clearly better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sign {
     AsGiven,

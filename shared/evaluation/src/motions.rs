@@ -16,7 +16,6 @@ pub struct TimedMotion {
     pub from_ns: i64,
     /// Stamp of the later frame, ns.
     pub to_ns: i64,
-    /// The later frame in the earlier one.
     pub estimate: OdometryMotion,
 }
 

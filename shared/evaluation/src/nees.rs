@@ -18,7 +18,6 @@ use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeesOptions {
-    /// Segment lengths, in motions.
     pub lengths: Vec<NonZeroUsize>,
     /// The uncertainty of the ground truth, which is added to each covariance.
     pub truth_sigma: TruthSigma,
@@ -44,7 +43,6 @@ pub struct Nees {
     pub without_truth: usize,
     /// Motions left out because they have no positive definite covariance.
     pub without_covariance: usize,
-    /// The uncertainty of the ground truth.
     pub truth_sigma: TruthSigma,
     /// The figures for each length that has segments, in the order given.
     pub by_length: Vec<NeesLength>,
@@ -52,27 +50,21 @@ pub struct Nees {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesLength {
-    /// Segment length, in motions.
     pub motions: usize,
-    /// All segments.
     pub all: NeesFigures,
     /// Segments that start in the first half of the drive's duration.
     pub first_half: Option<NeesFigures>,
     pub second_half: Option<NeesFigures>,
 }
 
-/// The NEES of a set of segments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesFigures {
     pub segments: usize,
-    /// x, y and yaw together.
     pub pose: NeesFigure,
-    /// x and y.
     pub translation: NeesFigure,
     pub yaw: NeesFigure,
 }
 
-/// The mean NEES relative to its expectation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NeesFigure {
     /// The mean NEES divided by its degrees of freedom. Above 1 the covariances are overconfident,
@@ -122,7 +114,6 @@ pub fn nees(matched: &MatchedMotions, options: &NeesOptions) -> Nees {
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     from_ns: i64,
-    /// Of pose, translation and yaw.
     squared: [f64; 3],
 }
 

@@ -52,12 +52,10 @@ pub struct TrackedObject {
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjectScan {
-    /// The true ones.
     pub truth: Vec<TrueObject>,
     pub tracked: Vec<TrackedObject>,
 }
 
-/// Which objects are required and what matches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectOptions {
     pub max_range_m: f64,
@@ -80,11 +78,9 @@ impl Default for ObjectOptions {
     }
 }
 
-/// The figures of a drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
     pub scans: usize,
-    /// Required objects, each once.
     pub objects: usize,
     pub required: usize,
     pub matched: usize,
@@ -157,7 +153,6 @@ pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErr
     count.errors(scans.len())
 }
 
-/// The sums over the scans so far.
 #[derive(Default)]
 struct Count {
     /// Scans that show each true object within the range.

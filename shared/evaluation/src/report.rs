@@ -16,7 +16,6 @@ pub struct Options {
     /// Poses from the start of a segment of KITTI and seg to the start of the next; published
     /// figures use 10 or 4.
     pub step: NonZeroUsize,
-    /// The rule that associates poses.
     pub association: Association,
 }
 
@@ -34,7 +33,6 @@ impl Default for Options {
 /// length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// The numbers of poses that were compared.
     pub coverage: Coverage,
     /// The axes that were negated in the estimate.
     pub axes: Axes,
@@ -51,7 +49,6 @@ pub struct Evaluation {
     pub truth_stands: bool,
     /// KITTI odometry errors; `None` for a path up to 100 m or a trajectory without heading.
     pub kitti: Option<Kitti>,
-    /// Absolute trajectory error.
     pub ate: Ate,
     /// Segment error; `None` for a path up to 100 m.
     pub seg: Option<Seg>,

@@ -25,7 +25,6 @@ pub struct Seg {
     pub by_length: Vec<SegLength>,
 }
 
-/// The segment error of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SegLength {
     pub length_m: f64,

@@ -24,7 +24,6 @@ enum Kind {
     Unusual,
 }
 
-/// Figures under a title.
 pub type Group = (&'static str, &'static [Figure]);
 
 const fn count(name: &'static str, place: &'static str) -> Figure {

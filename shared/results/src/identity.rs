@@ -18,7 +18,6 @@ use crate::out::Out;
 
 const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
 
-/// The identity that a run was begun with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {

@@ -33,7 +33,6 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// Adds the consistency of the motions' covariances.
     pub fn new(
         evaluation: Evaluation,
         motions: Option<&MatchedMotions>,

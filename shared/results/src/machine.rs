@@ -10,7 +10,6 @@ use serde::Serialize;
 /// The properties of a computer that times depend on.
 #[derive(Debug, Serialize)]
 pub struct Machine {
-    /// The processor's model.
     pub processor: String,
     /// Hardware threads that this process may use.
     pub cores: usize,

@@ -173,7 +173,6 @@ pub fn absolute(out: &Path) -> io::Result<PathBuf> {
 }
 
 impl Out {
-    /// Creates and locks the folder for a run.
     pub fn lock(path: &Path) -> Result<Self, OutError> {
         Self::lock_for(path, Content::RUN)
     }
@@ -202,7 +201,6 @@ impl Out {
         &self.path
     }
 
-    /// Returns the path of a file in the folder.
     pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
         self.path.join(name)
     }

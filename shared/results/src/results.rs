@@ -35,11 +35,9 @@ use slam::Slam;
 
 pub use map::map_options;
 
-/// The files that were written.
 #[derive(Debug)]
 pub struct Results {
     pub poses: usize,
-    /// True if the journal has its end.
     pub ended: bool,
     pub summary: Summary,
 }

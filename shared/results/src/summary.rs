@@ -25,7 +25,6 @@ pub use slam::SlamSummary;
 pub struct Session<'a> {
     /// Scans to play; `None`: without end.
     pub scans: Option<usize>,
-    /// Poses that were in the journal before.
     pub resumed: usize,
     /// A sentence about damaged or missing parts of the recording.
     pub damage: Option<&'a str>,
@@ -46,7 +45,6 @@ struct Mask {
     model: String,
     /// The SHA-256 of the network's file.
     sha256: String,
-    /// The library that computes it.
     backend: Backend,
 }
 
@@ -108,12 +106,9 @@ impl Problem {
 
 #[derive(Debug)]
 pub struct Measured {
-    /// Scans and motions.
     pub counts: Counts,
-    /// The path.
     pub course: Course,
     pub latency: Latency,
-    /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
     pub slam: Option<SlamSummary>,
     pub gnss: Option<GnssSummary>,
@@ -189,7 +184,6 @@ impl Summary {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }

@@ -35,7 +35,6 @@ use crate::{
 
 /// Time after which a message reports that the base is waiting for the robot at the end.
 const QUIET: Duration = Duration::from_secs(1);
-/// Time between two checks whether the robot has confirmed the end.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
@@ -75,9 +74,7 @@ struct Base<'a> {
     /// The topics that cross the link, the cut last.
     topics: Vec<&'static str>,
     stages: FirstStages<'a>,
-    /// The newest item that was published here.
     published: Option<u64>,
-    /// The newest pose when this process started.
     resumed: Item,
     /// The drive of the robot that was admitted last.
     drive: Option<String>,
@@ -95,7 +92,6 @@ struct ToRobot {
     _server: Server,
 }
 
-/// A topic that comes from the robot.
 struct FromRobot {
     fetcher: Fetcher,
     header_bytes: usize,
@@ -352,7 +348,6 @@ impl Base<'_> {
 }
 
 impl FromRobot {
-    /// Takes the message about an item, if it has arrived.
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
         let first = self.messages.front()?.item();
         first

@@ -37,7 +37,6 @@ impl LinkError {
         Self::Refused(format!("{}: {source}", path.display()))
     }
 
-    /// Creates an error of the network layer.
     pub(crate) fn zenoh(action: &str, error: &dyn std::fmt::Display) -> Self {
         // zenoh appends the place in its sources.
         let text = error.to_string();

@@ -28,12 +28,9 @@ use crate::{
 /// Time for the answer to the message that nothing more is wanted, and the number of attempts.
 const DONE_TIMEOUT: Duration = Duration::from_secs(1);
 const DONE_ATTEMPTS: usize = 3;
-/// Time between two checks whether to continue.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// Pauses between unanswered requests, from the first to the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
-/// A topic that a thread receives.
 pub(crate) struct Fetcher {
     messages: Receiver<Vec<u8>>,
     state: Arc<State>,
@@ -49,7 +46,6 @@ struct State {
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
-    /// The first message of the newest request.
     requested: AtomicU64,
     /// The first message of the newest request that was answered.
     answered: AtomicU64,
@@ -57,7 +53,6 @@ struct State {
     confirmed: AtomicU64,
 }
 
-/// A request for the messages of a topic.
 pub(crate) struct Request {
     pub key: String,
     pub from: u64,
@@ -104,7 +99,6 @@ impl Fetcher {
         }
     }
 
-    /// Returns the next message that has arrived.
     pub fn next(&self) -> Option<Vec<u8>> {
         self.messages.try_recv().ok()
     }
@@ -153,12 +147,10 @@ impl Fetcher {
         }
     }
 
-    /// Returns whether no message follows those that have arrived.
     pub fn has_ended(&self) -> bool {
         self.state.has_ended.load(Ordering::Acquire)
     }
 
-    /// Returns whether the other side answers.
     pub fn is_connected(&self) -> bool {
         self.state.is_connected.load(Ordering::Relaxed)
     }
@@ -170,7 +162,6 @@ impl Drop for Fetcher {
     }
 }
 
-/// The requests of a thread, one after the other.
 struct RequestLoop {
     session: Session,
     request: Request,

@@ -86,7 +86,6 @@ pub(crate) enum StartAnswer {
 }
 
 impl Agreement {
-    /// Returns the description of this side.
     pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
         let versioned = |name: &&'static str| {
             let version = topic(name).map_or("", |topic| topic.header.name);

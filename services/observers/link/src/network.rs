@@ -15,7 +15,6 @@ pub const ONE_THREAD: (&str, &str) = (
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
 );
 
-/// The endpoints and certificates of one side.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Network {
     /// The name of the link, the same on both sides.
@@ -23,11 +22,8 @@ pub struct Network {
     /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,
     pub connect: Vec<String>,
-    /// Certificate of the authority, PEM.
     pub ca: PathBuf,
-    /// Certificate of this side, PEM.
     pub certificate: PathBuf,
-    /// Private key of the certificate, PEM.
     pub key: PathBuf,
 }
 
@@ -44,7 +40,6 @@ impl From<&LinkConfig> for Network {
     }
 }
 
-/// Why a network cannot be used, a sentence.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{0}")]
 pub struct NetworkError(String);
@@ -103,7 +98,6 @@ impl Network {
     }
 }
 
-/// Returns whether an endpoint that may be used has certificates.
 fn is_tls(endpoint: &str) -> Result<bool, NetworkError> {
     let malformed = || {
         NetworkError(format!(

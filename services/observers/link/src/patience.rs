@@ -32,7 +32,6 @@ impl Patience {
         }
     }
 
-    /// Notes that a message took so long.
     pub fn received(&mut self, after: Duration) {
         self.0 = (after * MARGIN).clamp(SHORTEST, LONGEST);
     }

@@ -29,7 +29,6 @@ use mirror::Mirror;
 
 /// The name of this process in the log.
 const NAME: &str = "link";
-/// Time between two questions for the sender.
 const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_RUN: Question = Question {
@@ -39,11 +38,9 @@ const ASK_FOR_RUN: Question = Question {
 
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
-    /// The folder of the received run.
     pub out: PathBuf,
     /// The endpoints and certificates for the sender.
     pub network: Network,
-    /// The program of the guardian.
     pub gyre: String,
     /// Topics to receive of those that are sent; empty: all.
     pub topics: Vec<String>,

@@ -16,7 +16,6 @@ use crate::LinkError;
 /// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
-    /// The number of the message in its topic.
     pub seq: u64,
     /// See [`Item::generation`](gyre_messages::Item::generation).
     pub generation: u32,
@@ -38,7 +37,6 @@ impl Message {
 /// The place behind the messages that a receiver has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
-    /// The number of the next message.
     pub seq: u64,
     /// The generation of the newest one: messages of a later generation are wanted whatever their
     /// numbers. `None`: no number is given twice.
@@ -66,19 +64,16 @@ pub(crate) enum Next {
     Ended,
 }
 
-/// The messages of a topic.
 pub(crate) trait ReplayBuffer: Send + Sync {
     /// Returns the first message from a place on, and waits for it at most `limit`.
     fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError>;
 
-    /// Adds a message that the run has published.
     fn add(&self, message: &RecordedMessage);
 
     /// Ends the stream: no message follows.
     fn end(&self) -> Result<(), LinkError>;
 }
 
-/// The newest messages of a topic, in memory.
 pub(crate) struct MemoryBuffer {
     held: Mutex<Held>,
     changed: Condvar,
@@ -231,7 +226,6 @@ impl ReplayBuffer for LogBuffer {
         self.set_published(message.item().map_or(0, |item| item.seq.saturating_add(1)));
     }
 
-    /// Ends the stream with the last message of the log.
     fn end(&self) -> Result<(), LinkError> {
         let mut messages = lock(&self.published).messages;
         while self.read(messages)?.is_some() {

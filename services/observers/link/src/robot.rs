@@ -68,7 +68,6 @@ struct Robot<'a> {
     waker: Waker,
 }
 
-/// A topic that the base requests.
 struct SentTopic {
     buffer: Arc<MemoryBuffer>,
     offer: Arc<Offer>,
@@ -137,7 +136,6 @@ impl Robot<'_> {
         }
     }
 
-    /// Checks that this side can continue after so many items.
     fn check_start(&self, received: u64) -> Result<(), LinkError> {
         let (poses, base) = (self.next_pose(), received);
         let window = self.launch.manifest.window.scans as u64;

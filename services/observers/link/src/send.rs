@@ -47,7 +47,6 @@ const MAX_SCANS: usize = 2;
 
 #[derive(Clone, Debug)]
 pub struct SendOptions {
-    /// The folder of the run's results.
     pub out: PathBuf,
     /// The endpoints and certificates for receivers.
     pub network: Network,
@@ -79,7 +78,6 @@ impl fmt::Display for Sent {
     }
 }
 
-/// The description of a run that a receiver needs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct RunOffer {
     pub window: Window,
@@ -98,9 +96,7 @@ pub(crate) struct RunOffer {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct OfferedTopic {
     pub name: String,
-    /// The type of its header, with the version.
     pub version: String,
-    /// True if no message of it may be missed.
     pub is_lossless: bool,
 }
 
@@ -206,7 +202,6 @@ impl<'run> Sending<'run> {
         }
     }
 
-    /// Returns whether all receivers have everything, or want no more.
     fn is_complete(&self) -> bool {
         self.topics.iter().all(|topic| topic.offer.is_done())
     }
@@ -222,7 +217,6 @@ impl<'run> Sending<'run> {
 }
 
 impl SentTopic<'_> {
-    /// Buffers the messages that the run has published.
     fn take(&mut self) -> Result<(), StageError> {
         loop {
             match self.observer.take() {
@@ -252,7 +246,6 @@ impl Logs {
         })
     }
 
-    /// Returns the messages of a topic.
     fn buffer(&self, name: &str, manifest: &Manifest) -> Arc<dyn ReplayBuffer> {
         let composed = match manifest.refines {
             true => Refined::TOPIC,

@@ -27,7 +27,6 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 /// there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
-/// Time between two checks whether a request is still wanted.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The most requests of a topic that are answered at once. A receiver has one of each topic.
 const MAX_REQUESTS: usize = 64;
@@ -44,7 +43,6 @@ pub(crate) const RECEIVER: &str = "receiver";
 /// The parameter of a receiver that has everything, or wants no more.
 pub(crate) const DONE: &str = "done";
 
-/// The topics that are offered to the other side.
 pub(crate) struct Server {
     session: Session,
     prefix: String,
@@ -63,7 +61,6 @@ pub(crate) struct Offer {
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
     running: AtomicU64,
-    /// The messages and bytes that were sent.
     messages: AtomicU64,
     bytes: AtomicU64,
     waker: Option<Waker>,
@@ -71,7 +68,6 @@ pub(crate) struct Offer {
 }
 
 struct ReceiverState {
-    /// The number of its newest request.
     request: u64,
     /// True once the receiver has declined more messages.
     is_done: bool,
@@ -134,13 +130,11 @@ impl Offer {
         self.answered.load(Ordering::Relaxed)
     }
 
-    /// Returns the messages and the bytes that were sent.
     pub fn sent(&self) -> (u64, u64) {
         let read = |number: &AtomicU64| number.load(Ordering::Relaxed);
         (read(&self.messages), read(&self.bytes))
     }
 
-    /// Returns whether there was a request.
     pub fn has_receivers(&self) -> bool {
         !self.receivers().is_empty()
     }

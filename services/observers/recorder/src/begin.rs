@@ -13,7 +13,6 @@ use crate::{
 
 /// A recording that is begun, or continued in its next part.
 pub(crate) struct Begun {
-    /// The head of the part to write.
     pub head: Head,
     /// The ledger of the run that has started the recorder.
     pub ledger: Option<Ledger>,
@@ -63,7 +62,6 @@ pub(crate) fn begin(
     })
 }
 
-/// Checks that a resumed run can continue its recording.
 pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
     match Ledger::of(out).read(file)? {
         Some(_) => Ok(()),

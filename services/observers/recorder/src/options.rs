@@ -11,7 +11,6 @@ pub(crate) const HEALTH: &str = "health";
 
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The folder of the run's results.
     pub out: PathBuf,
     pub to: PathBuf,
     /// The topics, `log` and `health` among them; empty: the default ones that the run has.

@@ -36,20 +36,17 @@ impl Entry {
     }
 }
 
-/// The end that entries are put into.
 pub(crate) struct Sender {
     entries: mpsc::Sender<Entry>,
     waiting: Arc<AtomicUsize>,
     limit: usize,
 }
 
-/// The end that entries are taken from.
 pub(crate) struct Receiver {
     entries: mpsc::Receiver<Entry>,
     waiting: Arc<AtomicUsize>,
 }
 
-/// The result of waiting for an entry.
 pub(crate) enum Taken {
     Entry(Entry),
     Idle,

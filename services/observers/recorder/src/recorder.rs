@@ -40,18 +40,15 @@ const DEFAULT: [&str; 8] = [
     "fix",
     "objects",
 ];
-/// Time between two sentences about missed messages in the log.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     pub path: PathBuf,
-    /// The messages of each topic.
     pub counts: Vec<Counts>,
 }
 
 impl Recorded {
-    /// Returns whether nothing was missed.
     pub fn is_complete(&self) -> bool {
         self.counts.iter().all(|it| it.missed == 0)
     }
@@ -172,9 +169,7 @@ struct Recorder<'run> {
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,
-    /// True if the supervisor has started it.
     is_of_run: bool,
-    /// Missed messages that the log has reported.
     reported: u64,
     /// The time of the next message about missed messages.
     due: Instant,

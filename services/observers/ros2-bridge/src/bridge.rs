@@ -38,7 +38,6 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Joins the domain and opens all topics.
     pub fn open(settings: Settings) -> Result<Self, NodeError> {
         let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
         Ok(Self {

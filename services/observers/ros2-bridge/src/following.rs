@@ -21,7 +21,6 @@ use crate::{
     run_state::{RunPhase, RunState, Shared, SharedRunState},
 };
 
-/// Time between two polls for a run, and for a request to stop.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct PoseTopics {
@@ -32,7 +31,6 @@ pub struct PoseTopics {
 
 pub struct ObjectTopics {
     pub detections: Outlet<Detection3DArray>,
-    /// The same to look at.
     pub markers: Outlet<MarkerArray>,
 }
 
@@ -68,7 +66,6 @@ fn await_end(shared: &Shared, run: &ObservedRun) {
     }
 }
 
-/// Publishes the poses of each run.
 pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
     each_run(shared, |run, state| {
         shared.show(state);
@@ -169,7 +166,6 @@ fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
     stamp_ns
 }
 
-/// Takes the corrections of each run with SLAM.
 pub fn follow_corrections(shared: &Shared) {
     each_run(shared, |run, state| {
         if !run.manifest().window.slam {
@@ -181,7 +177,6 @@ pub fn follow_corrections(shared: &Shared) {
     });
 }
 
-/// Publishes the objects of each run that tracks them.
 pub fn follow_objects(shared: &Shared, mut topics: ObjectTopics, say: fn(&str)) {
     each_run(shared, |run, state| {
         if !run.manifest().window.objects {

@@ -19,12 +19,10 @@ use crate::{
     run_state::{Shared, SharedRunState},
 };
 
-/// The shortest time between two maps.
 const INTERVAL: Duration = Duration::from_secs(5);
 /// The pause before the next map, as a multiple of the time for drawing the last map.
 const PAUSE_FACTOR: u32 = 9;
 
-/// Why a map cannot be drawn.
 type LiveMapError = Box<dyn Error>;
 
 /// The keyframes of a run, drawn at their corrected poses.
@@ -112,7 +110,6 @@ impl LiveMap {
         })
     }
 
-    /// Returns whether all was read, and nothing more comes.
     fn has_ended(&self) -> bool {
         self.queries.has_ended() && self.keyframes.has_ended()
     }

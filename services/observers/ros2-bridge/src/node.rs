@@ -14,7 +14,6 @@ use crate::outlet::Outlet;
 /// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 
-/// Why there is no node, or no topic, a sentence.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct NodeError(pub(crate) String);

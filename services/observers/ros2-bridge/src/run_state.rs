@@ -15,10 +15,8 @@ use gyre_ros2_messages::frames::Frames;
 use crate::{Mounting, clock::Clock};
 
 pub struct Shared {
-    /// The folder of the results of the run.
     pub out: PathBuf,
     pub frames: Frames,
-    /// The radar on the vehicle.
     pub mounting: Mounting,
     stopping: AtomicBool,
     /// The last runs by their names, which are others at each start.
@@ -35,7 +33,6 @@ const MAX_RUNS: usize = 4;
 pub struct SharedRunState(Arc<Mutex<RunState>>);
 
 impl SharedRunState {
-    /// Locks it for reading and writing.
     pub fn lock(&self) -> MutexGuard<'_, RunState> {
         locked(&self.0)
     }
@@ -57,7 +54,6 @@ pub struct RunState {
     /// Messages for which readers left no room.
     pub unsent: u64,
     pub maps: u64,
-    /// The reason why something is not published.
     pub notice: Option<String>,
 }
 
@@ -68,7 +64,6 @@ pub struct Counts {
     pub first: Option<u64>,
     pub newest: Option<u64>,
     pub published: u64,
-    /// Those that came too fast for the bridge.
     pub missed: u64,
 }
 
@@ -154,12 +149,10 @@ impl Shared {
         locked(&self.shown).clone()
     }
 
-    /// Asks all threads to end.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
     }
 
-    /// Returns whether the threads are to end.
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
     }

@@ -39,7 +39,6 @@ pub struct Settings {
     pub gyro_topic: Option<String>,
     /// The topic of the odometry of the wheels, if it is used.
     pub wheels_topic: Option<String>,
-    /// A GNSS receiver, if it is used.
     pub fixes: Option<FixSettings>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
@@ -47,7 +46,6 @@ pub struct Settings {
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
-    /// Constants of its ranges and angles.
     pub constants: Constants,
 }
 

@@ -19,11 +19,9 @@ const MIN_TOKEN: usize = 16;
 /// can name as its origin.
 const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 
-/// The secret of readers.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// The conditions for an answer to a request.
 pub struct Access {
     /// The token; `None`: only this machine has access.
     token: Option<Token>,
@@ -34,7 +32,6 @@ pub struct Access {
     pub of_viewers: bool,
 }
 
-/// The answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// It may read.
@@ -84,7 +81,6 @@ impl Token {
         }
     }
 
-    /// Returns the token's text.
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -27,7 +27,6 @@ pub struct Limits {
     pub connections: u32,
     /// Time for the head of a request, from the connection or from the answer before.
     pub request: Duration,
-    /// Time for the client to take an answer.
     pub answer: Duration,
 }
 

@@ -13,7 +13,6 @@ const MAX_SAMPLES: usize = 8192;
 /// Delays of a pose: sensor to pose, then hand-over and work of each stage.
 const KINDS: usize = 1 + 2 * StageId::ALL.len();
 
-/// The delays of the poses of the last minute.
 #[derive(Debug, Default)]
 pub struct Delays {
     samples: VecDeque<DelaySample>,
@@ -49,12 +48,9 @@ pub struct StageDelays {
     work: Percentiles,
 }
 
-/// The delays as the page shows them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DelayReport {
-    /// The number of poses.
     samples: usize,
-    /// From the complete sweep to its pose.
     sensor_to_pose: Percentiles,
     stages: Vec<StageDelays>,
     /// Sensor to pose in each second of the last minute, oldest first; `None` without a pose.
@@ -62,7 +58,6 @@ pub struct DelayReport {
 }
 
 impl Delays {
-    /// Adds a pose.
     pub fn add(&mut self, item: &Item) {
         let mut delays_us = [None; KINDS];
         delays_us[0] = Some(in_us(item.sensor_to_pose_ns()));

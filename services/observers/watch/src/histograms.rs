@@ -14,7 +14,6 @@ const POSE_BUCKETS_S: [f64; 14] = [
     0.001, 0.0025, 0.005, 0.0075, 0.01, 0.025, 0.05, 0.075, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0,
 ];
 
-/// The delays of all observed poses.
 #[derive(Clone, Debug)]
 pub struct Histograms {
     pub sensor_to_pose: Histogram,
@@ -40,7 +39,6 @@ impl Default for Histograms {
 }
 
 impl Histograms {
-    /// Adds a pose.
     pub fn add(&self, item: &Item) {
         let seconds = |duration_ns: i64| duration_ns as f64 * 1e-9;
         self.sensor_to_pose

@@ -12,7 +12,6 @@ const SLICE: usize = 2000;
 pub(crate) struct JournalTrack {
     journal: PathBuf,
     next: u64,
-    /// The newest pose that was seen.
     newest: u64,
     /// The journal from the next pose on, as long as the track is behind the newest one.
     records: Option<Records>,

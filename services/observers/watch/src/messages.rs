@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
 
-/// A layer that a browser may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Powers as measured.
@@ -21,9 +20,7 @@ pub enum Layer {
 pub struct Missed {
     pub pose: u64,
     pub scan: u64,
-    /// Masked scans that were missed.
     pub masked: u64,
-    /// Scans whose objects were missed.
     pub objects: u64,
 }
 
@@ -43,33 +40,25 @@ pub enum RunState {
 }
 
 impl RunState {
-    /// Returns whether there is a run.
     pub fn is_up(self) -> bool {
         matches!(self, Self::Working | Self::Finishing)
     }
 }
 
-/// The run as the page describes it.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(tag = "kind", rename = "run")]
 pub struct RunInfo {
-    /// Each start of a run has a new id.
     pub id: String,
-    /// The folder of its results.
     pub out: String,
     pub state: RunState,
-    /// True if it drops scans rather than wait.
     pub live: bool,
     /// Pace relative to the sensor's clock; none: as fast as it goes.
     pub rate: Option<f64>,
-    /// The most scans in flight.
     pub window: usize,
-    /// True if it tracks objects.
     pub objects: bool,
     pub version: &'static str,
 }
 
-/// Counts and delays, once a second.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename = "health")]
 pub struct HealthReport {
@@ -82,14 +71,12 @@ pub struct HealthReport {
     /// The part of gyro, wheels and Doppler in the last motions, and the rates of their samples, in
     /// words; none without them.
     pub others: Option<String>,
-    /// The reason why something is not shown.
     pub notice: Option<String>,
     pub processes: Vec<Process>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RunCounts {
-    /// Scans that the source has published.
     pub published: u64,
     pub poses: u64,
     /// Scans that live mode has dropped.
@@ -107,7 +94,6 @@ pub struct RunCounts {
 #[derive(Serialize)]
 #[serde(tag = "kind", rename = "poses")]
 pub struct NewPoses<'a> {
-    /// The vertices replace all earlier ones.
     pub replace: bool,
     pub vertices: &'a [Vertex],
     pub pose: Option<CurrentPose>,
@@ -121,7 +107,6 @@ pub struct ObjectsReport {
     pub seq: u64,
     /// x, y (m), yaw (rad) of the scan.
     pub pose: [f64; 3],
-    /// Objects, also those that are not listed.
     pub count: u64,
     pub objects: Vec<ObjectReport>,
 }

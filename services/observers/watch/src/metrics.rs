@@ -19,7 +19,6 @@ use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 /// The type of the answer.
 pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// Counts and states at the time of a scrape.
 #[derive(Debug)]
 struct Snapshot {
     is_up: bool,
@@ -27,7 +26,6 @@ struct Snapshot {
     processes: Vec<Process>,
 }
 
-/// Returns the text of the answer.
 pub fn scrape(view: &RunView) -> String {
     let mut registry = Registry::with_prefix("gyre");
     let run = view.run();

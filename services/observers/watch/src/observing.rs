@@ -28,11 +28,9 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures: all scans of a radar that turns four times a second, and
 /// some of one that is played faster.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(180);
-/// Time between two reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
 pub struct Followed {
-    /// The folder of its results.
     pub out: PathBuf,
     /// Returns whether a run that has ended in this folder has reached the end of its recording.
     pub is_complete: fn(&Path) -> bool,

@@ -47,7 +47,6 @@ const HEADERS: [(header::HeaderName, &str); 5] = [
     ),
 ];
 
-/// Adds the headers that all answers have.
 pub fn protect(headers: &mut HeaderMap) {
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));

@@ -32,7 +32,6 @@ struct ScanPicture {
     bins: usize,
     /// Range of the outer edge of the last bin, m.
     max_range_m: f64,
-    /// The azimuth that was measured first.
     first: usize,
     clockwise: bool,
     /// Weaker powers are noise, and sent as 0.
@@ -134,7 +133,6 @@ pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Re
     frame::encode(&picture, &cells)
 }
 
-/// The points of a scan with its pose.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename = "points")]
 struct PointsPicture {

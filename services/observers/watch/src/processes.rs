@@ -19,10 +19,8 @@ pub struct ProcessMeter {
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Process {
-    /// The stage or follower.
     pub name: String,
     pub pid: u32,
-    /// The activity.
     pub state: &'static str,
     /// The rating of the activity: `good`, `warn`, or `bad`.
     pub level: &'static str,

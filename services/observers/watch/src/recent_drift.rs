@@ -11,7 +11,6 @@ const STRETCH_M: f64 = 100.0;
 /// Motions that are kept at most: a vehicle that stands or creeps fills the stretch with them.
 const MAX_MOTIONS: usize = 2048;
 
-/// The motions of the last stretch.
 #[derive(Debug, Default)]
 pub struct RecentDrift {
     motions: VecDeque<OdometryMotion>,
@@ -28,7 +27,6 @@ pub struct Drift {
 }
 
 impl RecentDrift {
-    /// Adds the motion to the next pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         if pose.item.is(flag::BREAK) {
             *self = Self::default();

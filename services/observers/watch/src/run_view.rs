@@ -40,22 +40,17 @@ pub struct RunView {
     state: Mutex<ViewState>,
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
     pub updates: Updates,
-    /// Browsers that want each layer.
     wanted: [AtomicUsize; 4],
-    /// Delays of all poses.
     pub histograms: Histograms,
 }
 
 pub type Newest = watch::Sender<Option<Message>>;
 
-/// The newest of each kind of message to a browser.
 #[derive(Default)]
 pub struct Updates {
     pub run: Newest,
-    /// Counts and delays.
     pub health: Newest,
     pub layers: [Newest; 4],
-    /// True when the program ends.
     pub stop: watch::Sender<bool>,
 }
 
@@ -75,7 +70,6 @@ struct ViewState {
     counts: RunCounts,
     last_motions: VecDeque<RefinementRecord>,
     rates: SampleRates,
-    /// The numbers and poses of the last scans.
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
@@ -124,7 +118,6 @@ impl RunView {
         });
     }
 
-    /// Ends the run, and its processes with it.
     pub fn end(&self, state: RunState) {
         {
             let mut state = self.state();
@@ -146,7 +139,6 @@ impl RunView {
         send_json(&self.updates.run, &state.run);
     }
 
-    /// Adds the next pose of the trajectory.
     pub fn add_to_track(&self, pose: &PoseHeader) {
         let mut state = self.state();
         state.track.add(pose);
@@ -252,7 +244,6 @@ impl RunView {
         self.state().counts
     }
 
-    /// Sends the report of this second.
     pub fn report(&self) {
         let now_ns = clock::now_ns();
         let mut state = self.state();
@@ -324,12 +315,10 @@ impl RunView {
         self.wanted[layer as usize].load(Ordering::Relaxed) > 0
     }
 
-    /// Ends all threads and connections.
     pub fn stop(&self) {
         self.updates.stop.send_replace(true);
     }
 
-    /// Returns whether the program ends.
     pub fn is_stopping(&self) -> bool {
         *self.updates.stop.borrow()
     }

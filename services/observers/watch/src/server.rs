@@ -42,7 +42,6 @@ const MAX_READERS: usize = 16;
 const MAX_RECEIVED: usize = 1024;
 /// The longest request of a viewer, bytes.
 const MAX_REQUESTED: usize = 64 << 10;
-/// Time between two checks whether the server has failed.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -78,7 +77,6 @@ struct Shared {
     view: Arc<RunView>,
     hub: Arc<Hub>,
     access: Arc<Access>,
-    /// The places that are free for readers.
     places: Arc<Semaphore>,
 }
 
@@ -110,7 +108,6 @@ impl Endpoint {
         format!("{scheme}://{host}/{query}")
     }
 
-    /// Serves until the program stops.
     async fn serve(self, router: Router, stop: watch::Receiver<bool>) -> io::Result<()> {
         self.listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(self.listener)?;

@@ -14,7 +14,6 @@ use crate::{
     track::Cursor,
 };
 
-/// Time between two messages of poses.
 const POSES_INTERVAL: Duration = Duration::from_millis(200);
 /// The longest time that a browser may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
@@ -32,7 +31,6 @@ struct Wanted {
 }
 
 impl Wanted {
-    /// Takes the names of the layers, separated by spaces.
     fn set(&mut self, names: &str) {
         for (name, layer) in LAYERS {
             let is_wanted = names.split(' ').any(|named| named == name);

@@ -13,7 +13,6 @@ const TURN_RAD: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Vertex(pub [f64; 6]);
 
-/// The vertices so far.
 #[derive(Debug)]
 pub struct Track {
     vertices: Vec<Vertex>,
@@ -94,7 +93,6 @@ impl Track {
         (&self.vertices[first..], replaces)
     }
 
-    /// Removes all vertices, for another run.
     pub fn clear(&mut self) {
         *self = Self {
             version: self.version + 1,

@@ -34,7 +34,6 @@ pub struct ObjectBand {
     /// The upper bound, m or m/s; `None`: the band has no end.
     pub to: Option<f64>,
     pub required: usize,
-    /// Share of them that were matched.
     pub recall: f64,
     /// Share of the tracked ones that were matched.
     pub precision: f64,
@@ -70,7 +69,6 @@ pub(super) struct Sums {
     pub matched: usize,
     pub false_positives: usize,
     position_m2: f64,
-    /// Pairs whose true velocity is known.
     moving_pairs: usize,
     velocity_m2_s2: f64,
     heading_rad2: f64,
@@ -78,7 +76,6 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Adds a required object, and what matches it.
     pub fn add(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
         self.required += 1;
         let Some(found) = found else {
@@ -101,7 +98,6 @@ impl Sums {
         share(self.nees, self.moving_pairs)
     }
 
-    /// Returns the figures of a band whose sums they are.
     pub fn in_band(&self, band: &Band) -> ObjectBand {
         ObjectBand {
             from: band.0,

@@ -13,7 +13,6 @@ use super::PlotError;
 
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// A diagram with two axes.
 pub type Chart<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
@@ -90,7 +89,6 @@ pub fn axes(
     mesh.draw().map_err(drawing)
 }
 
-/// Draws a line through points.
 pub fn curve(
     chart: &mut Chart<'_, '_>,
     points: impl IntoIterator<Item = (f64, f64)>,
@@ -121,13 +119,10 @@ pub fn document(
 }
 
 pub struct Entry<'a> {
-    /// The text.
     pub label: &'a str,
-    /// The symbol in front of the text.
     pub symbol: Symbol,
 }
 
-/// The symbol of a legend entry.
 pub enum Symbol {
     Line(ShapeStyle),
     Area(RGBColor),
@@ -171,7 +166,6 @@ pub fn header(
     Ok(())
 }
 
-/// Returns a mark.
 pub fn dot<C>(at: C) -> Circle<C, u32> {
     Circle::new(at, px(6.0), MARK.filled())
 }

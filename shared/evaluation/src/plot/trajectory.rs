@@ -86,9 +86,7 @@ fn scene_svg(scene: &Scene<'_>) -> Result<String, PlotError> {
     })
 }
 
-/// The content of the plot, positions in m.
 struct Scene<'a> {
-    /// The estimates by their names.
     paths: Vec<(&'a str, Vec<(f64, f64)>)>,
     truth: Option<Vec<(f64, f64)>>,
     title: &'static str,

@@ -49,7 +49,6 @@ const LONGEST_LINE: usize = 1 << 16;
 /// Refuses a line without end, which would be kept in memory.
 struct ShortLines<R> {
     text: R,
-    /// Bytes of the current line.
     line: usize,
 }
 

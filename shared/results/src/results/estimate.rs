@@ -14,7 +14,6 @@ const MOST: usize = 1_000_000;
 /// The poses of a run, up to [`MOST`].
 #[derive(Debug, Default)]
 pub struct Estimate {
-    /// The poses with the scans' times.
     pub trajectory: Trajectory,
     pub motions: Vec<TimedMotion>,
     pub poses: usize,
@@ -34,7 +33,6 @@ impl Estimate {
         self.motions.extend(odometry::motion(pose));
     }
 
-    /// Checks that no pose was let go.
     pub fn require_all(&self) -> Result<(), Failure> {
         match self.poses <= MOST {
             true => Ok(()),

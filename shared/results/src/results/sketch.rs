@@ -11,7 +11,6 @@ const ENOUGH: usize = 1 << 15;
 #[derive(Debug, Default)]
 pub struct Sketch {
     kept: Vec<Pose>,
-    /// How often the path was thinned.
     halvings: u32,
     poses: usize,
     pub length_m: f64,
@@ -19,7 +18,6 @@ pub struct Sketch {
 }
 
 impl Sketch {
-    /// Adds the next pose.
     pub fn add(&mut self, pose: Pose) {
         if let Some(last) = &self.last {
             let step = pose.translation.vector - last.translation.vector;
@@ -38,7 +36,6 @@ impl Sketch {
         }
     }
 
-    /// Returns the poses that were kept, and the last one.
     pub fn path(&self) -> Vec<Pose> {
         let last = self.poses.saturating_sub(1);
         let last_is_kept = last.is_multiple_of(1 << self.halvings);

@@ -27,12 +27,10 @@ const DRAWN: usize = 1000;
 
 const HEADER: &str = "scan,found_scan,x_m,y_m,yaw_rad,similarity,correlation,searched,runner_up,chi_square,weight,verdict\n";
 
-/// Keyframes, loops and corrected poses.
 pub struct Slam {
     estimator: TrajectoryEstimator,
     correction: Correction,
     queries: Vec<Query>,
-    /// The scan and the time of each keyframe.
     keyframes: Vec<(u64, i64)>,
     gnss: Option<GnssLog>,
 }
@@ -96,7 +94,6 @@ impl Slam {
         self.correction.correct(seq, pose)
     }
 
-    /// Returns the corrected poses of the keyframes.
     pub fn poses(&self) -> &[Pose] {
         self.estimator.poses()
     }

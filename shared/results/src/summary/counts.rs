@@ -19,13 +19,10 @@ const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
-    /// Scans that the source published.
     pub published: u64,
-    /// Scans with a pose.
     pub processed: u64,
     /// Scans published and not processed: what live mode dropped.
     pub dropped: u64,
-    /// Scans that could not be read.
     pub unreadable: u64,
     /// Scans that the recording lacks, by the gaps in its times.
     pub missing: u64,
@@ -48,7 +45,6 @@ pub struct Counts {
     pub doppler: Option<DopplerCounts>,
 }
 
-/// The path that was driven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Course {
     pub path_m: f64,
@@ -61,7 +57,6 @@ pub struct Course {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LostCounts {
-    /// Scans with lost azimuths.
     pub scans: u64,
     pub azimuths: u64,
     /// Azimuths in bursts at unknown places.
@@ -114,7 +109,6 @@ impl GyroCounts {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WheelCounts {
-    /// Motions whose distance they measured.
     pub motions: u64,
     /// Motions with slip: the distance differed from the radar's distance, or had differed
     /// recently.
@@ -123,7 +117,6 @@ pub struct WheelCounts {
     pub predicted: u64,
     /// True distance over distance of the wheels, after the last of them.
     pub scale: f64,
-    /// Standard deviation of that scale.
     pub scale_sigma: f64,
     /// Delay of the stamps and its standard deviation, s; `None`: it is unknown.
     pub delay_s: Option<[f64; 2]>,
@@ -144,7 +137,6 @@ impl WheelCounts {
     }
 }
 
-/// The contribution of the velocity by Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DopplerCounts {
     /// Motions between two scans that both measured it.
@@ -155,7 +147,6 @@ pub struct DopplerCounts {
     pub predicted: u64,
     /// True velocity over the measured one, after the last of them.
     pub scale: f64,
-    /// Standard deviation of that scale.
     pub scale_sigma: f64,
 }
 
@@ -183,13 +174,11 @@ pub struct MotionCounts {
     pub weak: u64,
     /// Predicted from the motions before, because nothing matched.
     pub predicted: u64,
-    /// Weak or predicted.
     pub doubtful: u64,
     /// Weak ones, and predicted ones whose distance neither wheels nor Doppler measured.
     pub unsure: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
-    /// Motions of a standing vehicle.
     pub stationary: u64,
     /// Motions along walls without structure, where the radar does not observe the distance:
     /// wheels, Doppler or earlier motions determine it.
@@ -232,7 +221,6 @@ impl Counts {
     }
 }
 
-/// Counts the poses of a journal.
 #[derive(Debug, Default)]
 pub struct Counter {
     processed: u64,

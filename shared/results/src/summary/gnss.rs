@@ -29,7 +29,6 @@ pub struct GnssSummary {
     used: usize,
     /// Fixes that contradict the others, the odometry or the loops.
     refused: usize,
-    /// Why none are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
     /// Delay of the fixes, estimated from their speeds, beyond `gnss.delay_s`, s; `None` if the

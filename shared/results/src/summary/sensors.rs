@@ -23,7 +23,6 @@ const MOTIONS_OF_DELAY: usize = 1 << 14;
 pub struct Clock(VecDeque<Compared>);
 
 impl Clock {
-    /// Adds the motion to a pose.
     pub fn add(&mut self, pose: &PoseHeader, by_radar: f64, by_sensor: Option<f64>) {
         if self.0.is_empty() && by_sensor.is_none() {
             return;

@@ -3,7 +3,6 @@
 use gyre_evaluation::LoopErrors;
 use serde::Serialize;
 
-/// The counts of loops in the summary.
 #[derive(Debug, Default, Serialize)]
 pub struct SlamSummary {
     pub keyframes: usize,

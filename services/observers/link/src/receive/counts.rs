@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, fmt};
 
-/// The messages that were received and missed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Received {
     pub topics: BTreeMap<String, ReceivedCount>,
@@ -10,18 +9,14 @@ pub struct Received {
     pub is_interrupted: bool,
 }
 
-/// The messages of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReceivedCount {
     pub received: u64,
-    /// Messages between them that did not arrive.
     pub missed: u64,
-    /// True if none may be missed.
     pub is_lossless: bool,
 }
 
 impl Received {
-    /// Returns whether nothing was missed that must not be.
     pub fn is_complete(&self) -> bool {
         let mut topics = self.topics.values();
         topics.all(|count| !count.is_lossless || count.missed == 0)

@@ -16,7 +16,6 @@ use crate::{
     waker::Waker,
 };
 
-/// The copy of a run of another machine.
 pub(super) struct Mirror<'a> {
     pub session: Session,
     pub link: String,

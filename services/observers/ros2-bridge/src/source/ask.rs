@@ -17,7 +17,6 @@ use crate::NodeError;
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Why a driver's radar cannot be used, a sentence.
 #[derive(Debug, Error)]
 #[error("{reason}")]
 pub struct AskError {

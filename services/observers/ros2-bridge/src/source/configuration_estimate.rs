@@ -11,7 +11,6 @@ const TURNS: usize = 2;
 
 #[derive(Clone, Debug, Default)]
 pub struct ConfigurationEstimate {
-    /// The last encoder count.
     last: Option<u16>,
     /// Encoder counts from one azimuth to the next in a turn.
     steps: Vec<u16>,

@@ -36,7 +36,6 @@ fn names() -> [String; 3] {
     .map(|definition| definition.dds_name())
 }
 
-/// A message of a driver, and its publisher.
 pub struct Packet {
     pub message: PacketMessage,
     pub publisher: Gid,
@@ -76,7 +75,6 @@ impl PacketMessage {
     }
 }
 
-/// The topic of the azimuths, as it is published.
 enum Azimuths {
     Azimuth(Subscription<RadarFftDataMsg>),
     Bytes(Subscription<RadarFftDataMessage>),
@@ -95,10 +93,8 @@ pub struct Driver {
     azimuths: Option<Azimuths>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
-    /// Samples of an inertial sensor.
     gyro: Option<Subscription<Imu>>,
     wheels: Option<Subscription<Odometry>>,
-    /// A GNSS receiver, whose fixes others need.
     fixes: Option<Fixes>,
 }
 
@@ -199,7 +195,6 @@ impl Driver {
         Ok(None)
     }
 
-    /// Returns whether configurations are published in this form.
     fn is_described_as(&self, form: &Definition) -> bool {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
@@ -227,7 +222,6 @@ impl Driver {
         }
     }
 
-    /// Takes the next message with azimuths.
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         Ok(match &self.azimuths {
             Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,
@@ -249,7 +243,6 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     Ok(subscription)
 }
 
-/// Subscribes to the samples of a sensor, if it is used.
 fn sensor<M: Ros2Message + Send + 'static>(
     node: &mut Node,
     wakeups: &mut Wakeups,

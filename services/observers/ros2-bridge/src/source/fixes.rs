@@ -13,7 +13,6 @@ use crate::{NodeError, node::Node};
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
 
-/// Where fixes come from, and where they go to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FixSettings {
     pub topic: String,

@@ -25,14 +25,12 @@ use crate::NodeError;
 
 /// The most messages between two checks for signals and new readers.
 const MAX_MESSAGES: usize = 512;
-/// Time between two polls for a driver.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time after which a configuration is estimated: the driver sends it every four turns.
 const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
 /// Time without an azimuth of a publisher after which a different publisher takes its place.
 const PUBLISHER_WAIT: Duration = Duration::from_secs(1);
 
-/// A radar behind its driver.
 pub struct Radar {
     settings: Settings,
     driver: Driver,

@@ -29,10 +29,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures of a topic, for recordings that are played fast.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The shortest time between two complete trajectories.
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Publishes topics to viewers.
 struct Publisher {
     hub: Arc<Hub>,
     followed: Arc<Followed>,
@@ -104,7 +102,6 @@ impl Publisher {
         }
     }
 
-    /// Returns whether another picture is due.
     fn is_due(&mut self, interval: Duration) -> bool {
         let is_due = self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
         if is_due {

@@ -14,7 +14,6 @@ use super::{
 
 /// The channels, and the viewers that have subscribed to them.
 pub struct Hub {
-    /// All channels that a run can have.
     pub channels: Vec<Channel>,
     pub of_run: watch::Sender<Vec<usize>>,
     /// The newest sentence about a topic that is not shown.
@@ -27,7 +26,6 @@ pub struct Hub {
 /// A viewer in the hub. Dropped, it is removed with its subscriptions.
 pub struct HubMember {
     hub: Arc<Hub>,
-    /// The messages that wait for it.
     pub queue: Arc<ViewerQueue>,
 }
 
@@ -53,7 +51,6 @@ impl Hub {
         self.channels.iter().position(|it| it.name == name)
     }
 
-    /// Returns whether a viewer has subscribed to a channel.
     pub fn is_wanted(&self, name: &str) -> bool {
         let has = |channel: usize| self.wanted[channel].load(Ordering::Relaxed) > 0;
         self.position(name).is_some_and(has)
@@ -79,7 +76,6 @@ impl Hub {
         self.viewers().iter().for_each(|it| it.put(&message));
     }
 
-    /// Adds a viewer.
     pub fn join(self: &Arc<Self>) -> HubMember {
         let queue = Arc::new(ViewerQueue::default());
         self.viewers().push(Arc::clone(&queue));

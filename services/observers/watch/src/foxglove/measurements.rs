@@ -30,7 +30,6 @@ struct Hop {
     work_ms: f64,
 }
 
-/// Returns the delays of a pose in JSON.
 pub fn latency(item: &Item) -> Vec<u8> {
     let ms = |duration_ns: i64| duration_ns as f64 * 1e-6;
     let hops = item.hop_times().map(|times| {

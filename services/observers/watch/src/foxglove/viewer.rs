@@ -15,7 +15,6 @@ use crate::run_view::RunView;
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 /// The longest time that a viewer may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
-/// The shortest time between two sentences about skipped messages.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(2);
 /// The first byte of a message of a channel, and of one that sets the viewer's clock.
 const MESSAGE_DATA: u8 = 1;
@@ -46,7 +45,6 @@ struct Subscription {
     channel_id: usize,
 }
 
-/// A connection.
 struct Viewer {
     socket: WebSocket,
     hub: Arc<Hub>,

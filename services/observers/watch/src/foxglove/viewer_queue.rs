@@ -22,13 +22,11 @@ pub struct ViewerQueue {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodedMessage {
-    /// The channel's number.
     pub channel: usize,
     /// True if only the newest of the channel waits.
     pub is_bulky: bool,
     /// Time of the scan on the sensor's clock, ns.
     pub stamp_ns: i64,
-    /// The message.
     pub data: Bytes,
 }
 
@@ -57,7 +55,6 @@ impl ViewerQueue {
         queue.subscriptions.insert(channel, subscription).is_none()
     }
 
-    /// Ends a subscription, and returns its channel.
     pub fn unsubscribe(&self, subscription: u32) -> Option<usize> {
         let mut queue = self.queue();
         let mut all = queue.subscriptions.iter();
