@@ -9,11 +9,12 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_masking::{Backend, MaskKind, MaskingConfig};
+use gyre_masking::{MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
 use gyre_run::latency::{Latency, Percentiles};
 use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
+use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::{figures, judgement::Judgement, machine::Machine};
@@ -40,24 +41,17 @@ pub struct Session<'a> {
     pub report: Option<&'a Report>,
 }
 
-#[derive(Debug, Serialize)]
-struct Mask {
-    model: String,
-    /// The SHA-256 of the network's file.
-    sha256: String,
-    backend: Backend,
-}
-
-impl Mask {
-    fn of(masking: &MaskingConfig) -> Option<Self> {
-        let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
-        let mask = Self {
-            model: model.display().to_string(),
-            sha256: sha256.clone(),
-            backend: masking.backend,
-        };
-        (masking.kind == MaskKind::Learned).then_some(mask)
-    }
+/// Returns the network of the masks: its model, the SHA-256 of its file, and the library that
+/// computes it.
+fn network(masking: &MaskingConfig) -> Option<Value> {
+    let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
+    (masking.kind == MaskKind::Learned).then(|| {
+        json!({
+            "model": model.display().to_string(),
+            "sha256": sha256,
+            "backend": masking.backend,
+        })
+    })
 }
 
 /// Why the results of a run that has played all scans are unreliable.
@@ -130,7 +124,7 @@ pub struct Summary {
     window: usize,
     /// `None`: no network makes the masks.
     #[serde(skip_serializing_if = "Option::is_none")]
-    mask: Option<Mask>,
+    mask: Option<Value>,
     /// `None`: a radar's, without end.
     #[serde(skip_serializing_if = "Option::is_none")]
     scans_in_recording: Option<usize>,
@@ -179,7 +173,7 @@ impl Summary {
         }
     }
 
-    fn figures(&self) -> serde_json::Value {
+    fn figures(&self) -> Value {
         // A figure that JSON cannot hold is null there.
         serde_json::to_value(self).unwrap_or_default()
     }
@@ -220,7 +214,7 @@ impl Summary {
             mode: configuration.run.mode,
             rate: configuration.run.rate,
             window: configuration.run.window,
-            mask: Mask::of(&configuration.odometry.masking),
+            mask: network(&configuration.odometry.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
             course,

@@ -4,8 +4,9 @@ use gyre_messages::{
     ListedObject, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome,
 };
 use serde::Serialize;
+use serde_json::{Value, json};
 
-use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
+use crate::{delays::DelayReport, processes::Process, track::Vertex};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
@@ -90,55 +91,25 @@ pub struct RunCounts {
     pub samples: SampleHealth,
 }
 
-/// The trajectory's new vertices and the newest pose.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "poses")]
-pub struct NewPoses<'a> {
-    pub replace: bool,
-    pub vertices: &'a [Vertex],
-    pub pose: Option<CurrentPose>,
-    pub drift: Option<Drift>,
-}
-
-/// The objects at the time of a scan, in the frame of the first one.
-#[derive(Debug, Serialize)]
-#[serde(tag = "kind", rename = "objects")]
-pub struct ObjectsReport {
-    pub seq: u64,
-    /// x, y (m), yaw (rad) of the scan.
-    pub pose: [f64; 3],
-    pub count: u64,
-    pub objects: Vec<ObjectReport>,
-}
-
-#[derive(Debug, Serialize)]
-pub struct ObjectReport {
-    pub id: u64,
-    /// x, y (m), yaw (rad) of its centre.
-    pub pose: [f64; 3],
-    /// Along x and y, m/s.
-    pub velocity: [f64; 2],
-    /// Length and width, m.
-    pub size: [f64; 2],
-    pub moving: bool,
-}
-
-impl ObjectsReport {
-    pub fn of(header: &ObjectsHeader) -> Self {
-        let report = |object: &ListedObject| ObjectReport {
-            id: object.id,
-            pose: [object.x_m, object.y_m, object.yaw_rad],
-            velocity: [object.vx_mps, object.vy_mps],
-            size: [object.length_m, object.width_m],
-            moving: object.is_moving(),
-        };
-        Self {
-            seq: header.item.seq,
-            pose: [header.x_m, header.y_m, header.yaw_rad],
-            count: header.objects,
-            objects: header.list().iter().map(report).collect(),
-        }
-    }
+/// Returns the objects at the time of a scan, in the frame of the first one: x, y (m), yaw (rad) of
+/// each centre, the velocity along x and y (m/s), length and width (m).
+pub fn objects(header: &ObjectsHeader) -> Value {
+    let object = |object: &ListedObject| {
+        json!({
+            "id": object.id,
+            "pose": [object.x_m, object.y_m, object.yaw_rad],
+            "velocity": [object.vx_mps, object.vy_mps],
+            "size": [object.length_m, object.width_m],
+            "moving": object.is_moving(),
+        })
+    };
+    json!({
+        "kind": "objects",
+        "seq": header.item.seq,
+        "pose": [header.x_m, header.y_m, header.yaw_rad],
+        "count": header.objects,
+        "objects": header.list().iter().map(object).collect::<Vec<_>>(),
+    })
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]

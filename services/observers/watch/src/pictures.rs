@@ -5,7 +5,7 @@ use gyre_geometry::SparsePoint;
 use gyre_messages::MaskedHeader;
 use gyre_radar::{PolarScan, Sense};
 use ndarray::ArrayView2;
-use serde::Serialize;
+use serde_json::json;
 
 use crate::frame;
 
@@ -21,24 +21,8 @@ const NOISE_SHARE: f64 = 0.6;
 /// Unit of the coordinates of points, m: 16 bits reach 655 m.
 const POINT_UNIT_M: f64 = 0.02;
 
-/// A scan as a picture: `azimuths x bins` powers. Azimuth `a` looks at `2 pi a / azimuths`,
-/// counter-clockwise from straight ahead.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "scan")]
-struct ScanPicture {
-    seq: u64,
-    scan: u64,
-    azimuths: usize,
-    bins: usize,
-    /// Range of the outer edge of the last bin, m.
-    max_range_m: f64,
-    first: usize,
-    clockwise: bool,
-    /// Weaker powers are noise, and sent as 0.
-    floor: u8,
-}
-
-/// Makes a picture of a scan: the strongest return in each cell.
+/// Makes a picture of a scan: the strongest return in each cell. Azimuth `a` looks at
+/// `2 pi a / azimuths`, counter-clockwise from straight ahead.
 pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Bytes> {
     let geometry = &scan.geometry;
     let azimuths = geometry.azimuths.min(MAX_AZIMUTHS);
@@ -61,16 +45,19 @@ pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Byte
             false => *power >> DROPPED_BITS << DROPPED_BITS,
         };
     }
-    let picture = ScanPicture {
-        seq,
-        scan: number,
-        azimuths,
-        bins,
-        max_range_m: f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
-        first: column(0),
-        clockwise: geometry.sense == Sense::Clockwise,
-        floor,
-    };
+    let picture = json!({
+        "kind": "scan",
+        "seq": seq,
+        "scan": number,
+        "azimuths": azimuths,
+        "bins": bins,
+        // Of the outer edge of the last bin.
+        "max_range_m": f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
+        "first": column(0),
+        "clockwise": geometry.sense == Sense::Clockwise,
+        // Weaker powers are noise, and sent as 0.
+        "floor": floor,
+    });
     frame::encode(&picture, &powers)
 }
 
@@ -99,47 +86,25 @@ fn column_of(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
     (counter_clockwise.rem_euclid(1.0) * azimuths as f64).round() as usize % azimuths
 }
 
-/// A raster as a picture: `side x side` cells, row 0 far ahead, column 0 far left, the sensor in
-/// the middle.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "raster")]
-struct RasterPicture {
-    seq: u64,
-    side: usize,
-    width_m: f64,
-}
-
 /// Makes a picture of a masked raster: the strongest value of each cell, relative to the maximum.
+/// Row 0 is far ahead, column 0 far left.
 pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Result<Bytes> {
     let n = raster.nrows();
     let cells_of_one = n.div_ceil(MAX_SIDE).max(1);
     let side = n.div_ceil(cells_of_one);
     let strongest = raster.iter().copied().fold(0.0, f32::max);
-    let scale = if strongest > 0.0 {
-        255.0 / strongest
-    } else {
-        0.0
+    let scale = match strongest > 0.0 {
+        true => 255.0 / strongest,
+        false => 0.0,
     };
     let mut cells = vec![0_u8; side * side];
     for ((row, column), value) in raster.indexed_iter() {
         let cell = &mut cells[row / cells_of_one * side + column / cells_of_one];
         *cell = ((value * scale) as u8 >> DROPPED_BITS << DROPPED_BITS).max(*cell);
     }
-    let picture = RasterPicture {
-        seq,
-        side,
-        width_m: (side * cells_of_one) as f64 * f64::from(cell_m),
-    };
+    let width_m = (side * cells_of_one) as f64 * f64::from(cell_m);
+    let picture = json!({"kind": "raster", "seq": seq, "side": side, "width_m": width_m});
     frame::encode(&picture, &cells)
-}
-
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "points")]
-struct PointsPicture {
-    seq: u64,
-    /// x, y (m), yaw (rad) of the scan in the frame of the first.
-    pose: [f64; 3],
-    unit_m: f64,
 }
 
 /// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
@@ -160,11 +125,7 @@ pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> PackedPoints {
 impl PackedPoints {
     /// Makes a message of the points and the pose of their scan.
     pub fn at(&self, pose: [f64; 3], seq: u64) -> std::io::Result<Bytes> {
-        let picture = PointsPicture {
-            seq,
-            pose,
-            unit_m: POINT_UNIT_M,
-        };
+        let picture = json!({"kind": "points", "seq": seq, "pose": pose, "unit_m": POINT_UNIT_M});
         frame::encode(&picture, &self.0)
     }
 }

@@ -15,14 +15,13 @@ use gyre_messages::{
 };
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
+use serde_json::json;
 use tokio::sync::watch;
 
 use crate::{
     delays::Delays,
     histograms::Histograms,
-    messages::{
-        CurrentPose, HealthReport, Layer, NewPoses, ObjectsReport, RunCounts, RunInfo, RunState,
-    },
+    messages::{self, CurrentPose, HealthReport, Layer, RunCounts, RunInfo, RunState},
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
@@ -206,7 +205,7 @@ impl RunView {
 
     /// Shows the objects of a scan.
     pub fn set_objects(&self, header: &ObjectsHeader) {
-        send_json(self.updates.of(Layer::Objects), &ObjectsReport::of(header));
+        send_json(self.updates.of(Layer::Objects), &messages::objects(header));
     }
 
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
@@ -275,13 +274,13 @@ impl RunView {
             return None;
         }
         *last = seq;
-        let poses = NewPoses {
-            replace,
-            vertices,
-            pose: state.latest,
-            drift: state.drift.drift(),
-        };
-        json(&poses)
+        json(&json!({
+            "kind": "poses",
+            "replace": replace,
+            "vertices": vertices,
+            "pose": state.latest,
+            "drift": state.drift.drift(),
+        }))
     }
 
     /// Returns the trajectory: x, y (m), yaw (rad).

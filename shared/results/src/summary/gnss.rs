@@ -6,6 +6,7 @@ use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_mapping::Origin;
 use gyre_slam::{FixRefusal, TrajectoryEstimator};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Fixes with a smaller weight count as refused: they pull less than a quarter as hard.
 const LEAST_WEIGHT: f64 = 0.25;
@@ -40,7 +41,7 @@ pub struct GnssSummary {
     residual_rms_m: Option<f64>,
     /// The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    east_north: Option<EastNorth>,
+    east_north: Option<Value>,
     /// Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     plane: Option<[f64; 2]>,
@@ -49,32 +50,20 @@ pub struct GnssSummary {
     origin: Option<Origin>,
 }
 
-/// A pose in the plane of the fixes, with its standard deviations.
-#[derive(Debug, Serialize)]
-struct EastNorth {
-    east_m: f64,
-    north_m: f64,
-    /// Direction of the x axis, counter-clockwise from east, degrees.
-    yaw_deg: f64,
-    east_sigma_m: f64,
-    north_sigma_m: f64,
-    yaw_sigma_deg: f64,
-}
-
-impl EastNorth {
-    fn of(pose: &UncertainMotion) -> Self {
-        let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
-        let variances = pose.covariance.diagonal();
-        let sigma = variances.map(|variance| variance.max(0.0).sqrt());
-        Self {
-            east_m,
-            north_m,
-            yaw_deg: yaw_rad.to_degrees(),
-            east_sigma_m: sigma.x,
-            north_sigma_m: sigma.y,
-            yaw_sigma_deg: sigma.z.to_degrees(),
-        }
-    }
+/// Returns a pose in the plane of the fixes with its standard deviations; the direction of the x
+/// axis is counter-clockwise from east.
+fn east_north(pose: &UncertainMotion) -> Value {
+    let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
+    let variances = pose.covariance.diagonal();
+    let sigma = variances.map(|variance| variance.max(0.0).sqrt());
+    json!({
+        "east_m": east_m,
+        "north_m": north_m,
+        "yaw_deg": yaw_rad.to_degrees(),
+        "east_sigma_m": sigma.x,
+        "north_sigma_m": sigma.y,
+        "yaw_sigma_deg": sigma.z.to_degrees(),
+    })
 }
 
 impl GnssSummary {
@@ -110,7 +99,7 @@ impl GnssSummary {
             refusal: log.unusable.clone().or_else(refusal),
             delay_s: fixes.clock().map(|clock| clock.delay_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
-            east_north: frame.as_ref().map(EastNorth::of),
+            east_north: frame.as_ref().map(east_north),
             plane: log.plane.map(|plane| {
                 let origin = plane.origin();
                 [origin.latitude_deg, origin.longitude_deg]

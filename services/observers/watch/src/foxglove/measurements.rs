@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use gyre_messages::{Item, StageId};
-use serde::Serialize;
 use serde_json::{Value, json};
 
 /// The channel of the delays of each pose.
@@ -11,44 +10,26 @@ pub const LATENCY: &str = "/latency";
 /// The channel of the report that the page shows once a second.
 pub const HEALTH: &str = "/health";
 
-/// The delays of a pose, ms.
-#[derive(Debug, Serialize)]
-struct Latency {
-    seq: u64,
-    scan: u64,
-    /// Scans that live mode has dropped so far.
-    dropped: u64,
-    sensor_to_pose_ms: f64,
-    /// By the stage's name, with `_` for `-`: paths of plots have no hyphens.
-    stages: BTreeMap<String, Hop>,
-}
-
-#[derive(Debug, Serialize)]
-struct Hop {
-    transport_ms: f64,
-    wait_ms: f64,
-    work_ms: f64,
-}
-
+/// Returns the delays of a pose. The names of stages have `_` for `-`: paths of plots have no
+/// hyphens.
 pub fn latency(item: &Item) -> Vec<u8> {
     let ms = |duration_ns: i64| duration_ns as f64 * 1e-6;
     let hops = item.hop_times().map(|times| {
-        let hop = Hop {
-            transport_ms: ms(times.transport_ns.unwrap_or(0)),
-            wait_ms: ms(times.wait_ns),
-            work_ms: ms(times.work_ns),
-        };
+        let hop = json!({
+            "transport_ms": ms(times.transport_ns.unwrap_or(0)),
+            "wait_ms": ms(times.wait_ns),
+            "work_ms": ms(times.work_ns),
+        });
         (key(times.stage), hop)
     });
-    let latency = Latency {
-        seq: item.seq,
-        scan: item.scan,
-        dropped: item.dropped(),
-        sensor_to_pose_ms: ms(item.sensor_to_pose_ns()),
-        stages: hops.collect(),
-    };
-    // Numbers and names always are JSON.
-    serde_json::to_vec(&latency).unwrap_or_default()
+    let latency = json!({
+        "seq": item.seq,
+        "scan": item.scan,
+        "dropped": item.dropped(),
+        "sensor_to_pose_ms": ms(item.sensor_to_pose_ns()),
+        "stages": hops.collect::<BTreeMap<_, _>>(),
+    });
+    latency.to_string().into()
 }
 
 fn key(stage: StageId) -> String {
