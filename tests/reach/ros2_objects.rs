@@ -45,20 +45,10 @@ fn assert_is(detection: &Value, row: &Row) {
     };
     let class = if row.moving { "moving" } else { "standing" };
     assert_eq!(result["hypothesis"]["class_id"], class);
-    let (at, size) = (
-        &detection["bbox"]["center"]["position"],
-        &detection["bbox"]["size"],
-    );
-    assert_eq!(detection["bbox"]["center"], result["pose"]["pose"]);
-    let covariance = &result["pose"]["covariance"];
-    let found = [
-        &at["x"],
-        &at["y"],
-        &size["x"],
-        &size["y"],
-        &covariance[7],
-        &covariance[0],
-    ];
+    let (center, size) = (&detection["bbox"]["center"], &detection["bbox"]["size"]);
+    assert_eq!(*center, result["pose"]["pose"]);
+    let (at, of) = (&center["position"], &result["pose"]["covariance"]);
+    let found = [&at["x"], &at["y"], &size["x"], &size["y"], &of[7], &of[0]];
     let [x_m, y_m, length_m, width_m, cov_xx, cov_yy] = row.values;
     let expected = [1.0 - y_m, x_m, length_m, width_m, cov_xx, cov_yy];
     for (found, expected) in found.map(number).into_iter().zip(expected) {
