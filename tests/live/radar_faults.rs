@@ -75,21 +75,11 @@ fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_d
     odometry::assert_unbroken(&odometry::rows(&run.odometry()));
 }
 
-/// The fate of a connection in a relay.
-#[derive(Clone, Copy)]
-enum Connection {
-    /// Passes on what radar and client send.
-    Relayed,
-    /// Sends bytes that are no messages.
-    Junk,
-    /// Describes the radar, and repeatedly reports that it is alive.
-    KeptAlive,
-    /// Describes the radar, and sends that without a pause.
-    Flooded,
-}
+/// Treats a client of a relay in front of a radar.
+type Treatment = fn(TcpStream, &str) -> io::Result<()>;
 
 /// Listens for connections, and treats each by this list; all further connections are relayed.
-fn relay(radar: &str, all: &'static [Connection]) -> String {
+fn relay(radar: &str, all: &'static [Treatment]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let radar = radar.to_owned();
@@ -97,14 +87,8 @@ fn relay(radar: &str, all: &'static [Connection]) -> String {
     thread::spawn(move || {
         for (k, client) in listener.incoming().enumerate() {
             let (client, radar) = (client.unwrap(), radar.clone());
-            thread::spawn(move || match all.get(k) {
-                Some(Connection::Junk) => send_junk(client),
-                Some(Connection::KeptAlive) => {
-                    keep_alive(client, &radar, Duration::from_millis(200))
-                }
-                Some(Connection::Flooded) => keep_alive(client, &radar, Duration::ZERO),
-                _ => pass_on(client, &radar),
-            });
+            let treat = all.get(k).copied().unwrap_or(pass_on);
+            thread::spawn(move || treat(client, &radar));
         }
     });
     address
@@ -117,7 +101,8 @@ fn pass_on(mut client: TcpStream, radar: &str) -> io::Result<()> {
     io::copy(&mut radar, &mut client).map(|_| ())
 }
 
-fn send_junk(mut client: TcpStream) -> io::Result<()> {
+/// Sends bytes that are no messages.
+fn send_junk(mut client: TcpStream, _: &str) -> io::Result<()> {
     for _ in 0..100 {
         client.write_all(&[0x55; 1 << 16])?;
     }
@@ -125,17 +110,25 @@ fn send_junk(mut client: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-fn keep_alive(mut client: TcpStream, radar: &str, pause: Duration) -> io::Result<()> {
+/// Describes the radar, and repeatedly reports that it is alive.
+fn keep_alive(client: TcpStream, radar: &str) -> io::Result<()> {
+    report_life(client, radar, Duration::from_millis(200), 1)
+}
+
+/// As above without a pause.
+fn flood(client: TcpStream, radar: &str) -> io::Result<()> {
+    report_life(client, radar, Duration::ZERO, 4096)
+}
+
+fn report_life(mut to: TcpStream, radar: &str, pause: Duration, at_once: usize) -> io::Result<()> {
     let mut described = [0; 256];
     let count = TcpStream::connect(radar)?.read(&mut described)?;
-    client.write_all(&described[..count])?;
+    to.write_all(&described[..count])?;
     let mut alive = Vec::new();
     write_keep_alive(&mut alive);
-    if pause.is_zero() {
-        alive = alive.repeat(4096);
-    }
+    let alive = alive.repeat(at_once);
     loop {
-        client.write_all(&alive)?;
+        to.write_all(&alive)?;
         thread::sleep(pause);
     }
 }
@@ -144,13 +137,7 @@ fn keep_alive(mut client: TcpStream, radar: &str, pause: Duration) -> io::Result
 fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
     let radar = Radar::playing(recording::small(), &["--repeat"]);
     // Before the run it is asked for its configuration.
-    let connections = &[
-        Connection::Relayed,
-        Connection::Junk,
-        Connection::Junk,
-        Connection::KeptAlive,
-        Connection::Flooded,
-    ];
+    let connections: &[Treatment] = &[pass_on, send_junk, send_junk, keep_alive, flood];
     let run = run_at(&relay(&radar.address, connections)).set("source.scans=12");
     let mut running = run.start();
     running.await_stages();
@@ -181,11 +168,8 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     let run = radar.received(12);
     let mut running = run.start();
     running.await_poses(2);
-    let _other = Radar::to(
-        &["--udp", &to],
-        recording::small(),
-        &["--repeat", "--rate", "1"],
-    );
+    let options = ["--repeat", "--rate", "1"];
+    let _other = Radar::to(&["--udp", &to], recording::small(), &options);
     let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
     let large = Configuration {
         azimuth_samples: 400,
@@ -224,10 +208,8 @@ fn a_radar_that_is_silent_is_waited_for_by_name_until_it_sends_again() {
     let run = run_at(&radar.address);
     let mut running = run.start();
     radar.played();
-    running.await_words(&format!(
-        "waiting for the radar at {}: no scan for 3 s",
-        radar.address
-    ));
+    let waits = format!("waiting for the radar at {}: no scan", radar.address);
+    running.await_words(&format!("{waits} for 3 s"));
     running.await_words("no scan for 6 s");
     let again = Radar::to(&["--listen", &radar.address], recording::small(), &[]);
     running.await_words(&format!("the radar at {} sends, after ", again.address));
