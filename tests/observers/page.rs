@@ -140,11 +140,8 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     fits_a_phone(&mut browser);
     interrupt(running);
     browser.until("document.getElementById('state').textContent === 'Ended early'");
-    assert!(
-        browser
-            .text("banner")
-            .contains("The same command continues it")
-    );
+    let banner = browser.text("banner");
+    assert!(banner.contains("The same command continues it"));
 
     // The next run in the same folder is shown, and the browser changes no result.
     let short = small(40).option("--fresh");

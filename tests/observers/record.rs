@@ -91,10 +91,8 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
     let mut inspect = gyre();
     inspect.args(["inspect", "--json"]).arg(file(&run));
     let report: Value = serde_json::from_str(&Ended::of(inspect).succeeded().stdout).unwrap();
-    assert_eq!(
-        (&report["format"], &report["scans"]),
-        (&"mcap".into(), &SCANS.into())
-    );
+    assert_eq!(report["format"], "mcap");
+    assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
 }
 
@@ -189,11 +187,8 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let missed = SCANS - there.len();
     assert!(missed >= 4, "{there:?}");
     assert_eq!(recording.missed()["scan"], missed as u64);
-    assert!(
-        ended.stderr.contains(&format!("missed {missed} scan")),
-        "{}",
-        ended.stderr
-    );
+    let (said, missing) = (&ended.stderr, format!("missed {missed} scan"));
+    assert!(said.contains(&missing), "{said}");
     missed
 }
 
@@ -227,11 +222,8 @@ fn a_recorder_that_dies_right_before_the_end_is_reported() {
     let ended = running.finish();
     ended.succeeded();
     let has_said = ["end of the recording is missing", " scan: the recording"];
-    assert!(
-        has_said.iter().any(|it| ended.stderr.contains(it)),
-        "{}",
-        ended.stderr
-    );
+    let said = &ended.stderr;
+    assert!(has_said.iter().any(|it| said.contains(it)), "{said}");
 }
 
 /// The messages on `/health`.
@@ -440,10 +432,8 @@ fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
             .unwrap_or_else(|| panic!("no box for {row:?}"));
         for (seen, text) in (2..5).map(|k| (&found[k], &row[k])) {
             let expected: f64 = text.parse().unwrap();
-            assert!(
-                (seen.as_f64().unwrap() - expected).abs() < 1e-3,
-                "{found} {row:?}"
-            );
+            let apart = seen.as_f64().unwrap() - expected;
+            assert!(apart.abs() < 1e-3, "{found} {row:?}");
         }
     }
     assert_eq!(boxes.len(), rows.len());

@@ -151,11 +151,8 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
     for topic in ["masked", "motion"] {
         let entries: Vec<_> = recording.entries(topic).collect();
         for entry in &entries {
-            assert_eq!(
-                scans.get(&entry.seq),
-                Some(&entry.scan),
-                "{topic} {entry:?}"
-            );
+            let scan = scans.get(&entry.seq);
+            assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
         }
         let lacks = (scans.len() - entries.len()) as u64;
         assert!(lacks > 0);

@@ -35,17 +35,14 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
         .into_iter()
         .map(|it| it.1)
         .collect();
-    assert!(
-        frames.iter().any(|it| it == "world -> odo") && frames.iter().any(|it| it == "odo -> car")
-    );
+    let has = |of: &str| frames.iter().any(|it| it == of);
+    assert!(has("world -> odo") && has("odo -> car"));
     // The radar looks to the left of the car, which so drives to the right of the radar's first
     // scan.
     let (_, mounted, values) = &transforms(&topics["/tf_static"])[0];
     assert_eq!(mounted, "car -> top");
-    assert!(
-        (values[0] - 1.0).abs() < 1e-12 && (values[2] - values[3]).abs() < 1e-12,
-        "{values:?}"
-    );
+    let apart = [values[0] - 1.0, values[2] - values[3]];
+    assert!(apart.iter().all(|it| it.abs() < 1e-12), "{values:?}");
     let message = topics["/car/map"].last().unwrap();
     assert_eq!(message["header"]["frame_id"], "world");
     let map = Grid::of(message);
@@ -99,10 +96,8 @@ struct Grid {
 impl Grid {
     fn of(message: &Value) -> Self {
         let (info, origin) = (&message["info"], &message["info"]["origin"]);
-        assert_eq!(
-            ["x", "y", "z", "w"].map(|part| number(&origin["orientation"][part])),
-            [0.0, 0.0, 0.0, 1.0]
-        );
+        let turn = ["x", "y", "z", "w"].map(|part| number(&origin["orientation"][part]));
+        assert_eq!(turn, [0.0, 0.0, 0.0, 1.0]);
         let runs = message["data"].as_array().unwrap();
         let runs = runs
             .iter()

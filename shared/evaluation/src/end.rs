@@ -57,10 +57,8 @@ mod tests {
             start * pose(23.0, 4.0, 0.2),
         ];
         let end = end_error(&MatchedPoses::new(estimate, truth).unwrap());
-        assert!(
-            (end.position_m - 5.0).abs() < 1e-9
-                && (end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9
-        );
+        assert!((end.position_m - 5.0).abs() < 1e-9);
+        assert!((end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9);
         assert!((end.percent.unwrap() - 25.0).abs() < 1e-9, "of 20 m");
     }
 

@@ -238,10 +238,8 @@ mod tests {
         let motions = [0, 10, 20, 30].map(|t| motion(t, t + 10, 1.0));
         let found = matched(&motions, &[0, 10, 40]).unwrap();
         assert_eq!((found.chains.len(), found.without_truth), (1, 3));
-        assert_eq!(
-            found.chains[0].true_motion(0, 4),
-            Some(pose(40.0, 0.0, 0.0))
-        );
+        let whole = found.chains[0].true_motion(0, 4);
+        assert_eq!(whole, Some(pose(40.0, 0.0, 0.0)));
         assert_eq!(found.chains[0].true_motion(1, 2), None);
     }
 

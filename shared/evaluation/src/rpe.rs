@@ -102,9 +102,7 @@ mod tests {
     #[test]
     fn standing_still_has_no_forward_ratio() {
         let still = vec![Pose::identity(); 4];
-        assert_eq!(
-            rpe(&MatchedPoses::new(still.clone(), still).unwrap()).forward_ratio,
-            None
-        );
+        let matched = MatchedPoses::new(still.clone(), still).unwrap();
+        assert_eq!(rpe(&matched).forward_ratio, None);
     }
 }

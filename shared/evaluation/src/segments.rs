@@ -98,14 +98,17 @@ mod tests {
     fn a_segment_ends_strictly_beyond_its_length() {
         let distance = [0.0, 100.0, 100.0, 101.0];
         let found: Vec<_> = segments(&distance, EVERY).collect();
-        assert_eq!(
-            found,
-            [Segment {
-                first: 0,
-                last: 3,
-                length: 0
-            }]
-        );
+        let [
+            Segment {
+                first,
+                last,
+                length,
+            },
+        ] = found[..]
+        else {
+            panic!("{found:?}");
+        };
+        assert_eq!((first, last, length), (0, 3, 0));
         assert_eq!(segments(&[0.0, 100.0], EVERY).count(), 0);
     }
 
@@ -116,10 +119,8 @@ mod tests {
         let found: Vec<_> = segments(&distance, step)
             .map(|s| (s.first, s.last, s.length))
             .collect();
-        assert_eq!(
-            found,
-            [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)]
-        );
+        let expected = [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)];
+        assert_eq!(found, expected);
     }
 
     #[test]
@@ -130,9 +131,7 @@ mod tests {
         per_length.add(0, [3.0]);
         per_length.add(2, [8.0]);
         assert_eq!(per_length.mean(), Some(([4.0], 3)));
-        assert_eq!(
-            per_length.means().collect::<Vec<_>>(),
-            [(100.0, [2.0], 2), (300.0, [8.0], 1)]
-        );
+        let means: Vec<_> = per_length.means().collect();
+        assert_eq!(means, [(100.0, [2.0], 2), (300.0, [8.0], 1)]);
     }
 }

@@ -104,10 +104,8 @@ fn true_covariances_pass_the_acceptance_interval_95_times_in_100() {
         }
     }
     let is_right = |count: &usize| (368..392).contains(count);
-    assert!(
-        accepted.iter().flatten().all(is_right),
-        "{accepted:?} of 400"
-    );
+    let are_right = accepted.iter().flatten().all(is_right);
+    assert!(are_right, "{accepted:?} of 400");
 }
 
 #[test]
@@ -193,19 +191,18 @@ fn three_sigma_bands_contain_the_errors_of_true_covariances() {
         let share = bands.inside_percent(3.0);
         inside = [0, 1, 2].map(|part| inside[part] + share[part] / drives as f64);
     }
-    assert!(
-        inside.iter().all(|share| (99.2..99.95).contains(share)),
-        "{inside:?}"
-    );
+    let is_right = |share: &f64| (99.2..99.95).contains(share);
+    assert!(inside.iter().all(is_right), "{inside:?}");
 }
 
 #[test]
 fn sigma_starts_at_zero_and_that_of_yaw_grows_with_the_root_of_time() {
     let bands = bands(&Drive::new(100, 1).matched(), TruthSigma::default());
     let samples = &bands.chains[0];
+    let zero = Vector3::zeros();
     assert_eq!(
         (samples.len(), samples[0].sigma, samples[0].error),
-        (101, Vector3::zeros(), Vector3::zeros())
+        (101, zero, zero)
     );
     assert_eq!(samples[100].time_s, 25.0);
     assert!((samples[100].sigma.z / covariance()[(2, 2)].sqrt() - 10.0).abs() < 1e-9);

@@ -39,10 +39,8 @@ fn axes_are_equal_and_y_points_up() {
         let corners = [(0.0, 0.0), (side.0, 0.0), (side.0, side.1)].map(|(x, y)| pose(x, y, 0.0));
         let points = polyline(&trajectory_svg(&corners, None).unwrap(), ESTIMATE);
         let (right, up) = (points[1].0 - points[0].0, points[1].1 - points[2].1);
-        assert!(
-            (right / side.0 - up / side.1).abs() * side.0.min(side.1) < 2.5,
-            "{side:?}: {right} {up}"
-        );
+        let apart = (right / side.0 - up / side.1) * side.0.min(side.1);
+        assert!(apart.abs() < 2.5, "{side:?}: {right} {up}");
     }
 }
 
@@ -55,9 +53,9 @@ fn an_estimate_in_another_frame_is_drawn_over_its_ground_truth() {
     for (a, b) in estimate.iter().zip(&truth) {
         assert!((a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0);
     }
-    assert!(
-        svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("ground truth")
-    );
+    for words in ["SE(2) alignment", "start", "ground truth"] {
+        assert!(svg.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -100,10 +100,8 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     let Next::Message(motion) = next(&motions, 7) else {
         panic!("there is no motion");
     };
-    assert_eq!(
-        (motion.seq, motion.bytes.len()),
-        (7, size_of::<MotionHeader>())
-    );
+    let found = (motion.seq, motion.bytes.len());
+    assert_eq!(found, (7, size_of::<MotionHeader>()));
     let end = PoseHeader {
         item: Item {
             flags: flag::END,
@@ -114,8 +112,6 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     journal.append(&end).unwrap();
     poses.end().unwrap();
     assert_eq!(next(&*poses, 39), sent(39));
-    assert_eq!(
-        (next(&*poses, 40), next(&motions, 40)),
-        (Next::Ended, Next::Ended)
-    );
+    let both = [next(&*poses, 40), next(&motions, 40)];
+    assert_eq!(both, [Next::Ended, Next::Ended]);
 }

@@ -107,11 +107,7 @@ mod tests {
                     continue;
                 }
                 let encoder = (azimuth % 400 * counts / 400) as u16;
-                assert_eq!(
-                    estimate.configuration(counts as u16, 0.04),
-                    None,
-                    "{azimuth}"
-                );
+                assert_eq!(estimate.configuration(counts as u16, 0.04), None);
                 estimate.add(encoder, 3768, azimuth * 625_000);
                 if azimuth == 1_200 {
                     break;
