@@ -78,11 +78,8 @@ pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'
         .import("numpy")?
         .call_method1("ascontiguousarray", (points,))?;
     let fields = together.call_method1("view", (numpy::dtype::<f32>(py),))?;
-    readable(
-        &sliceable::<f32>(&fields)?,
-        "points",
-        "a structured array of points",
-    )
+    let fields = sliceable::<f32>(&fields)?;
+    readable(&fields, "points", "a structured array of points")
 }
 
 impl State {

@@ -198,16 +198,16 @@ fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<
     Ok(stamps.collect())
 }
 
-/// Times, ns, and values, as a keyword of this name has them.
-type Pairs = (&'static str, Vec<(i64, f64)>);
+/// Times, ns, and values.
+type Pairs = Vec<(i64, f64)>;
 
-fn samples((gyro, rates): Pairs, (wheels, speeds): Pairs) -> PyResult<Vec<Sample>> {
+fn samples(rates: Pairs, speeds: Pairs) -> PyResult<Vec<Sample>> {
     let rates = rates.into_iter().map(|(ns, of)| Sample::yaw_rate(ns, of));
     let speeds = speeds.into_iter().map(|(ns, of)| Sample::speed(ns, of));
     let expected = format!("rates are at most {MAX_RATE_RADPS} rad/s");
-    let mut samples = checked(gyro, rates.collect(), &expected)?;
+    let mut samples = checked("gyro", rates.collect(), &expected)?;
     let expected = format!("speeds are at most {MAX_SPEED_MPS} m/s");
-    samples.extend(checked(wheels, speeds.collect(), &expected)?);
+    samples.extend(checked("wheels", speeds.collect(), &expected)?);
     samples.sort_by_key(Sample::order);
     Ok(samples)
 }
@@ -310,10 +310,7 @@ impl Scan {
             azimuth_stamp_ns: stamps.into_any().unbind(),
             azimuth_flags: flags.into_any().unbind(),
             index: None,
-            samples: samples(
-                ("gyro", gyro.unwrap_or_default()),
-                ("wheels", wheels.unwrap_or_default()),
-            )?,
+            samples: samples(gyro.unwrap_or_default(), wheels.unwrap_or_default())?,
         };
         scan.check(py)?;
         Ok(scan)

@@ -179,11 +179,8 @@ impl Slam {
             ));
         }
         let capacity = config.odometry.points.capacity;
-        let closer = LoopCloser::new(
-            LoopOptions::default(),
-            &config.odometry.refinement,
-            capacity,
-        );
+        let refinement = &config.odometry.refinement;
+        let closer = LoopCloser::new(LoopOptions::default(), refinement, capacity);
         let state = State {
             builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,

@@ -276,11 +276,9 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
 /// The logs of the sensors are not there any more, and their delays are in the samples already.
 #[test]
 fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
-    let of_gyro = (
-        configurations::gyro_and_wheels(),
-        configurations::with_gyro(),
-    );
-    let of_radar = (configurations::doppler(), configurations::without_doppler());
+    use configurations::{doppler, gyro_and_wheels, with_gyro, without_doppler};
+    let of_gyro = (gyro_and_wheels(), with_gyro());
+    let of_radar = (doppler(), without_doppler());
     for ((configuration, without), setting) in [
         (of_gyro, "wheels.kind=none"),
         (of_radar, "doppler.kind=none"),
@@ -322,11 +320,9 @@ fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it
     let run = recorded(&played());
     run.complete();
     let without = Run::small().data(&file(&run)).argument("--from", "masked");
-    without.finish().refused_with(&[
-        "was recorded without the topic `masked`",
-        "record.topics",
-        "without --from",
-    ]);
+    let lacks = "was recorded without the topic `masked`";
+    let words = [lacks, "record.topics", "without --from"];
+    without.finish().refused_with(&words);
     // As in docs/watch.md.
     let run = recorded(&played()).set("record.topics=['scan','masked','pose']");
     let odometry = run.complete();

@@ -301,25 +301,15 @@ fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     Ended::of(up).succeeded();
-    let shadow = Shadow::start(
-        &run,
-        "joint",
-        "joint-search",
-        &["--scans", "3", "--nice", "15"],
-    );
+    let options = ["--scans", "3", "--nice", "15"];
+    let shadow = Shadow::start(&run, "joint", "joint-search", &options);
     let (code, report) = shadow.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
     assert_eq!(report["counts"]["compared"], 3);
-    refused(
-        &run,
-        &["joint-search", "--command", "/nowhere/search"],
-        &["cannot start joint-search", "/nowhere/search"],
-    );
-    refused(
-        &run,
-        &["rotation-search"],
-        &["the run has no rotation-search", "joint-search"],
-    );
+    let nowhere = ["joint-search", "--command", "/nowhere/search"];
+    refused(&run, &nowhere, &["cannot start joint-search", nowhere[2]]);
+    let words = ["the run has no rotation-search", "joint-search"];
+    refused(&run, &["rotation-search"], &words);
     let mut down = gyre();
     down.arg("down").arg(run.out());
     Ended::of(down).succeeded();

@@ -126,10 +126,8 @@ fn by_index(
         estimate_surplus: estimate.len() - matched,
         truth_surplus: truth.len() - matched,
     };
-    Ok((
-        MatchedPoses::new(estimate[..matched].to_vec(), truth[..matched].to_vec())?,
-        coverage,
-    ))
+    let [estimate, truth] = [estimate, truth].map(|poses| poses[..matched].to_vec());
+    Ok((MatchedPoses::new(estimate, truth)?, coverage))
 }
 
 fn by_time(
@@ -157,12 +155,9 @@ fn by_time(
         && in_gaps == 0
         && let (Some(estimate_ns), Some(truth_ns)) = (estimate_ns, truth_ns)
     {
-        let span_s = |(first, last): (i64, i64)| {
-            format!(
-                "{:.3} s to {:.3} s",
-                first as f64 * 1e-9,
-                last as f64 * 1e-9
-            )
+        let span_s = |(first_ns, last_ns): (i64, i64)| {
+            let [first_s, last_s] = [first_ns, last_ns].map(|ns| ns as f64 * 1e-9);
+            format!("{first_s:.3} s to {last_s:.3} s")
         };
         return Err(EvaluationError(format!(
             "the trajectories do not overlap in time: estimate {}, ground truth {} (same clock, same unit?)",
@@ -220,15 +215,9 @@ const ROUNDING_NS: u64 = 1_000;
 /// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a
 /// gap.
 pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
-    let ends = truth
-        .stamps_ns
-        .first()
-        .into_iter()
-        .chain(truth.stamps_ns.last());
-    let end = ends
-        .copied()
-        .find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
-    let stamp_ns = end.unwrap_or(stamp_ns);
+    let ends = [truth.stamps_ns.first(), truth.stamps_ns.last()];
+    let is_end = |end: &&i64| stamp_ns.abs_diff(**end) <= ROUNDING_NS;
+    let stamp_ns = *ends.into_iter().flatten().find(is_end).unwrap_or(&stamp_ns);
     let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
     let Some(before) = after.checked_sub(1) else {
         return At::Outside;
@@ -245,11 +234,8 @@ pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) ->
         return At::Gap;
     }
     let share = since(stamp_ns) as f64 / since(after_ns) as f64;
-    At::Pose(interpolate(
-        &truth.poses[before],
-        &truth.poses[after],
-        share,
-    ))
+    let [before, after] = [before, after].map(|at| &truth.poses[at]);
+    At::Pose(interpolate(before, after, share))
 }
 
 #[cfg(test)]
@@ -274,11 +260,9 @@ mod tests {
         truth_ns: &[i64],
     ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
         let (estimate, truth) = (line(estimate_ns.len()), line(truth_ns.len()));
-        associate(
-            TimedPoses::new(estimate_ns, &estimate),
-            TimedPoses::new(truth_ns, &truth),
-            Association::default(),
-        )
+        let estimate = TimedPoses::new(estimate_ns, &estimate);
+        let truth = TimedPoses::new(truth_ns, &truth);
+        associate(estimate, truth, Association::default())
     }
 
     #[test]
@@ -343,16 +327,12 @@ mod tests {
     fn trajectories_that_cannot_be_associated_are_refused_with_the_reason() {
         let (two, three) = (seconds(&[1.0, 2.0]), seconds(&[0.0, 1.0, 2.0]));
         let refused = |estimate: &[i64], truth: &[i64]| by_time(estimate, truth).unwrap_err().0;
+        let (later, apart) = (seconds(&[2.0, 3.0]), seconds(&[10.0, 12.5]));
+        let spans = "1.000 s to 2.000 s, ground truth 10.000 s to 12.500 s";
         for (refused, words) in [
-            (
-                refused(&two, &seconds(&[10.0, 12.5])),
-                "1.000 s to 2.000 s, ground truth 10.000 s to 12.500 s",
-            ),
-            (refused(&two, &seconds(&[2.0, 3.0])), "1 of 2 estimated"),
-            (
-                refused(&three, &[0, 7, 5]),
-                "ground truth decrease at pose 2",
-            ),
+            (refused(&two, &apart), spans),
+            (refused(&two, &later), "1 of 2 estimated"),
+            (refused(&three, &[0, 7, 5]), "truth decrease at pose 2"),
             (refused(&[], &[]), "0 of 0 estimated"),
         ] {
             assert!(refused.contains(words), "{refused}");

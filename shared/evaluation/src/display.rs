@@ -122,25 +122,17 @@ impl fmt::Display for Coverage {
 
 impl fmt::Display for Kitti {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} segments, step {}",
-            self.translation_percent,
-            self.rotation_deg_per_100m,
-            self.rotation_deg_per_km,
-            self.segments,
-            self.step
-        )
+        write!(f, "{:.5} % translation, ", self.translation_percent)?;
+        let (per_100m, per_km) = (self.rotation_deg_per_100m, self.rotation_deg_per_km);
+        write!(f, "{per_100m:.5} deg/100 m ({per_km:.4} deg/km) rotation; ")?;
+        write!(f, "{} segments, step {}", self.segments, self.step)
     }
 }
 
 impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = self.percent;
-        write!(
-            f,
-            "{percent:.4} % of the length; rmse after SE(2) alignment of each segment"
-        )
+        write!(f, "{:.4} % of the length; rmse after SE(2) ", self.percent)?;
+        write!(f, "alignment of each segment")
     }
 }
 
@@ -150,11 +142,8 @@ impl fmt::Display for EndError {
         if let Some(percent) = self.percent {
             write!(f, ", {percent:.2} % of the path")?;
         }
-        write!(
-            f,
-            ", heading {:.2} deg; first poses aligned",
-            self.heading_deg
-        )
+        let heading_deg = self.heading_deg;
+        write!(f, ", heading {heading_deg:.2} deg; first poses aligned")
     }
 }
 
@@ -169,16 +158,13 @@ impl fmt::Display for Rpe {
         if let Some(ratio) = self.forward_ratio {
             write!(f, "; forward distance {ratio:.4} of the true one")?;
         }
-        let (rmse, mean, pairs) = (
-            self.rotation_rmse_deg,
-            self.rotation_mean_deg,
-            self.pairs.len(),
-        );
+        let (rmse, mean) = (self.rotation_rmse_deg, self.rotation_mean_deg);
         write!(
             f,
-            "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs",
+            "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean",
             ""
-        )
+        )?;
+        write!(f, "; {} pairs", self.pairs.len())
     }
 }
 
@@ -227,12 +213,10 @@ impl fmt::Display for TruthSigma {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self == Self::default() {
             true => write!(f, "exact"),
-            false => write!(
-                f,
-                "sigma {} m, {:.3} deg",
-                self.position_m,
-                self.yaw_rad.to_degrees()
-            ),
+            false => {
+                let (position_m, yaw_deg) = (self.position_m, self.yaw_rad.to_degrees());
+                write!(f, "sigma {position_m} m, {yaw_deg:.3} deg")
+            }
         }
     }
 }

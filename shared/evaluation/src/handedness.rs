@@ -90,11 +90,8 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     let mirror_image: Vec<_> = estimate.iter().map(|p| negate(p, true, true)).collect();
     let mirrored_m = aligned_rmse_m(&mirror_image, truth);
     let y = sense(given_m, mirrored_m, MIN_MISFIT_M);
-    let heading = sense(
-        heading_misfit(&estimate_yaw, &truth_yaw, 1.0),
-        heading_misfit(&estimate_yaw, &truth_yaw, -1.0),
-        MIN_MISFIT_RAD,
-    );
+    let [given, negated] = [1.0, -1.0].map(|sign| heading_misfit(&estimate_yaw, &truth_yaw, sign));
+    let heading = sense(given, negated, MIN_MISFIT_RAD);
     let (y_negated, heading_negated) = decide(y, heading, mirrored_m < given_m + MIN_MISFIT_M);
     let lacks =
         |yaw: &[f64], other: &[f64]| range(yaw) < CONSTANT_RAD && range(other) > MIN_TURN_RAD;
@@ -105,10 +102,8 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
         truth_lacks_heading: lacks(&truth_yaw, &estimate_yaw),
         estimate_lacks_heading: lacks(&estimate_yaw, &truth_yaw),
     };
-    (
-        matched.map_estimate(|p| negate(p, y_negated, heading_negated)),
-        axes,
-    )
+    let change = |pose: &Pose| negate(pose, y_negated, heading_negated);
+    (matched.map_estimate(change), axes)
 }
 
 fn decide(y: Sign, heading: Sign, mirror_no_worse: bool) -> (bool, bool) {
@@ -172,13 +167,9 @@ fn heading_misfit(estimate: &[f64], truth: &[f64], sign: f64) -> f64 {
 }
 
 fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
-    let against_path = |poses: &[Pose]| turns_with_path(poses) < 0.0;
-    match (
-        against_path(matched.estimate()),
-        against_path(matched.truth()),
-    ) {
-        (true, false) => HeadingFault::Estimate,
-        (false, true) => HeadingFault::Truth,
+    match [matched.estimate(), matched.truth()].map(|poses| turns_with_path(poses) < 0.0) {
+        [true, false] => HeadingFault::Estimate,
+        [false, true] => HeadingFault::Truth,
         _ => HeadingFault::Unclear,
     }
 }

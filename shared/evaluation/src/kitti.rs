@@ -73,10 +73,7 @@ fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
     let estimated = Motion::within(matched.estimate(), segment);
     let error = estimated.to(&Motion::within(matched.truth(), segment));
     let per_100m = 100.0 / segment.length_m();
-    [
-        error.translation.norm() * per_100m,
-        error.angle_rad().to_degrees() * per_100m,
-    ]
+    [error.translation.norm(), error.angle_rad().to_degrees()].map(|it| it * per_100m)
 }
 
 /// A planar rigid motion in complex numbers: x -> rotation x + translation.

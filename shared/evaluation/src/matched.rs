@@ -126,11 +126,7 @@ mod tests {
             (vec![still; 3], two.clone(), "one by one with 2 poses"),
             (vec![still], vec![still], "1 of 1 estimated"),
             (two.clone(), far(f64::NAN), "pose 1 of the ground truth"),
-            (
-                two.clone(),
-                far(f64::INFINITY),
-                "pose 1 of the ground truth",
-            ),
+            (two.clone(), far(f64::INFINITY), "1 of the ground truth"),
             (far(-2e9), two.clone(), "pose 1 of the estimate"),
             (scaled(0.5), two, "rotation of pose 0 of the estimate"),
         ] {

@@ -130,10 +130,8 @@ fn segments(
     starts.filter_map(move |first| {
         let truth = chain.true_motion(first, first + length)?;
         let segment = chain.composed(first).nth(length - 1)?;
-        let squared = normalised(
-            &segment.error(&truth),
-            &(segment.covariance + sigma.of_motion(&truth)),
-        )?;
+        let covariance = segment.covariance + sigma.of_motion(&truth);
+        let squared = normalised(&segment.error(&truth), &covariance)?;
         Some(Sample {
             from_ns: chain.stamps_ns[first],
             squared,

@@ -29,11 +29,8 @@ fn gaussian(random: &mut impl Rng) -> Vector3<f64> {
 
 /// A pose with an error of (x, y, yaw) along the axes of its reference frame.
 fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
-    pose(
-        truth.translation.x + error.x,
-        truth.translation.y + error.y,
-        truth.rotation.angle() + error.z,
-    )
+    let (at, yaw_rad) = (&truth.translation, truth.rotation.angle());
+    pose(at.x + error.x, at.y + error.y, yaw_rad + error.z)
 }
 
 /// A winding drive and its motions with errors drawn from `covariance()`.
@@ -50,10 +47,8 @@ impl Drive {
         let stamps_ns: Vec<_> = (0..truth.len() as i64).map(|k| k * INTERVAL_NS).collect();
         let spread = covariance().cholesky().unwrap().l();
         let motion = |k: usize| {
-            let motion = disturbed(
-                &truth[k].inv_mul(&truth[k + 1]),
-                spread * gaussian(&mut random),
-            );
+            let error = spread * gaussian(&mut random);
+            let motion = disturbed(&truth[k].inv_mul(&truth[k + 1]), error);
             let estimate = UncertainMotion {
                 motion,
                 covariance: covariance(),
@@ -73,12 +68,8 @@ impl Drive {
     }
 
     fn matched(&self) -> MatchedMotions {
-        MatchedMotions::new(
-            &self.motions,
-            TimedPoses::new(&self.stamps_ns, &self.truth),
-            INTERVAL_NS,
-        )
-        .unwrap()
+        let truth = TimedPoses::new(&self.stamps_ns, &self.truth);
+        MatchedMotions::new(&self.motions, truth, INTERVAL_NS).unwrap()
     }
 
     fn nees(&self) -> Nees {

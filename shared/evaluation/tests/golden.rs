@@ -24,10 +24,8 @@ fn kitti_poses(path: PathBuf) -> Vec<Pose> {
             .split_whitespace()
             .map(|v| v.parse().unwrap())
             .collect();
-        Pose::from_parts(
-            [m[3], m[7]].into(),
-            Unit::new_unchecked(Complex::new(m[0], m[4])),
-        )
+        let rotation = Unit::new_unchecked(Complex::new(m[0], m[4]));
+        Pose::from_parts([m[3], m[7]].into(), rotation)
     };
     fs::read_to_string(path)
         .unwrap()

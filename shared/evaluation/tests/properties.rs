@@ -51,11 +51,8 @@ fn kitti_by_definition(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, 
             n += 1;
         }
     }
-    (
-        100.0 * translation / n as f64,
-        100.0 * rotation.to_degrees() / n as f64,
-        n,
-    )
+    let mean = |sum: f64| 100.0 * sum / n as f64;
+    (mean(translation), mean(rotation.to_degrees()), n)
 }
 
 proptest! {

@@ -149,10 +149,8 @@ fn add_corrected(
     };
     if let Ok(evaluation) = judge(corrected, &truth, Options::default()) {
         summary.ate_m = Some(evaluation.ate.rmse_m);
-        summary.ground_truth = match evaluation.axes.are_as_given() {
-            true => slam.errors_of(&truth),
-            false => None,
-        };
+        let are_as_given = evaluation.axes.are_as_given();
+        summary.ground_truth = are_as_given.then(|| slam.errors_of(&truth)).flatten();
     }
     let bands = slam.bands(&truth).and_then(|bands| Ok(bands_svg(&bands)?));
     match bands {
@@ -173,12 +171,8 @@ fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
         let motions = judge_motions(&estimate.motions, &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
         let options = NeesOptions::default();
-        Ok(Judgement::new(
-            evaluation,
-            motions.ok().as_ref(),
-            &options,
-            None,
-        ))
+        let motions = motions.ok();
+        Ok(Judgement::new(evaluation, motions.as_ref(), &options, None))
     };
     let all = estimate.require_all();
     let truth = all.and_then(|()| Ok(read_trajectory(path)?));

@@ -102,12 +102,9 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let mut taps = Vec::new();
     for topic in &topics {
         // Recording begins with the first scan, which waits for the recorder.
-        let expected = earlier.as_ref().map(|it| it.get(topic).copied());
-        taps.extend(Tap::on(
-            &run,
-            topic,
-            expected.map(Option::unwrap_or_default),
-        )?);
+        let expected = earlier.as_ref();
+        let expected = expected.map(|it| it.get(topic).copied().unwrap_or_default());
+        taps.extend(Tap::on(&run, topic, expected)?);
     }
     let (to, split) = (options.to.clone(), options.split);
     let writer = SplitWriter::create(to, head, split, ledger, earlier.unwrap_or_default())?;

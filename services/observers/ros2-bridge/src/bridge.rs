@@ -67,13 +67,9 @@ impl Bridge {
         let (frames, radar) = (&shared.frames, shared.mounting.radar());
         let now_ns = clock::since_1970_ns();
         // The place of the radar on the vehicle.
+        let place = frames::transform(now_ns, &frames.base, &frames.radar, radar);
         self.mounting.send(TFMessage {
-            transforms: vec![frames::transform(
-                now_ns,
-                &frames.base,
-                &frames.radar,
-                radar,
-            )],
+            transforms: vec![place],
         });
         thread::scope(|threads| {
             threads.spawn(|| follow_poses(shared, self.poses, say));

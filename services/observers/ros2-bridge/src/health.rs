@@ -35,12 +35,8 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
             let state = shared.shown().lock().clone();
-            diagnostics.send(array(
-                &shared.out.display().to_string(),
-                &state,
-                answer.ok(),
-                &mut before,
-            ));
+            let out = shared.out.display().to_string();
+            diagnostics.send(array(&out, &state, answer.ok(), &mut before));
         }
         std::thread::sleep(POLL_INTERVAL.min(due.saturating_duration_since(Instant::now())));
     }

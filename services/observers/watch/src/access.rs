@@ -74,10 +74,9 @@ impl Token {
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
         match text.len() >= MIN_TOKEN && text.bytes().all(plain) {
             true => Ok(Self(text.to_owned())),
-            false => Err(io::Error::new(
-                ErrorKind::InvalidData,
-                format!("a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"),
-            )),
+            false => Err(io::Error::other(format!(
+                "a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"
+            ))),
         }
     }
 

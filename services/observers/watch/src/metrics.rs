@@ -29,10 +29,8 @@ struct Snapshot {
 pub fn scrape(view: &RunView) -> String {
     let mut registry = Registry::with_prefix("gyre");
     let run = view.run();
-    let labels = vec![
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("out", run.out),
-    ];
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let labels = vec![("version", version), ("out", run.out)];
     registry.register("run", "The run that is watched", Info::new(labels));
     registry.register_with_unit(
         "sensor_to_pose",
@@ -65,12 +63,8 @@ impl Collector for Snapshot {
             encode_value(kind, value, metric)?;
         }
         for (name, help, label, values) in self.labelled() {
-            family(
-                encoder,
-                (name, help, None, MetricType::Counter),
-                label,
-                values,
-            )?;
+            let description = (name, help, None, MetricType::Counter);
+            family(encoder, description, label, values)?;
         }
         self.encode_rates(encoder)?;
         self.encode_processes(encoder)
@@ -104,12 +98,8 @@ fn encode_value<N: EncodeCounterValue + EncodeGaugeValue>(
 }
 
 /// A name, a help, a label, and a count for each value of the label.
-type Labelled = (
-    &'static str,
-    &'static str,
-    &'static str,
-    Vec<(&'static str, u64)>,
-);
+type Labelled = (Name, Name, Name, Vec<(Name, u64)>);
+type Name = &'static str;
 
 impl Snapshot {
     /// Returns the metrics without labels: a name, a help, a type and a value of each. Those of
@@ -188,12 +178,8 @@ impl Snapshot {
         family(encoder, description, "process", restarts)?;
         let help = "Processor time of a process since its start.";
         let cpu = self.of_processes(|it| it.cpu_s);
-        let description = (
-            "process_cpu",
-            help,
-            Some(Unit::Seconds),
-            MetricType::Counter,
-        );
+        let unit = Some(Unit::Seconds);
+        let description = ("process_cpu", help, unit, MetricType::Counter);
         family(encoder, description, "process", cpu)?;
         let help = "Memory of a process's own.";
         let memory = self.of_processes(|it| it.own_bytes.map(|bytes| bytes as f64));

@@ -166,15 +166,14 @@ impl Server {
     }
 
     fn serve(self, view: &Arc<RunView>, hub: Arc<Hub>) -> io::Result<()> {
-        let shared = |endpoint: &Endpoint, of_viewers| Shared {
-            view: Arc::clone(view),
-            hub: Arc::clone(&hub),
-            access: Arc::new(Access::new(
-                endpoint.address,
-                endpoint.token.clone(),
-                of_viewers,
-            )),
-            places: Arc::new(Semaphore::new(MAX_READERS)),
+        let shared = |endpoint: &Endpoint, of_viewers| {
+            let (address, token) = (endpoint.address, endpoint.token.clone());
+            Shared {
+                view: Arc::clone(view),
+                hub: Arc::clone(&hub),
+                access: Arc::new(Access::new(address, token, of_viewers)),
+                places: Arc::new(Semaphore::new(MAX_READERS)),
+            }
         };
         let stop = || view.updates.stop.subscribe();
         let of_page = router(shared(&self.page, false));

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
-use crate::{Bands, TruthSigma};
+use crate::{BandSample, Bands, TruthSigma};
 
 /// Size of the document, px: the header and three panels of equal height, the last with the time
 /// axis.
@@ -69,18 +69,12 @@ type Point = [f64; 3];
 /// Returns one component (x, y, yaw) of the errors in each chain.
 fn chains(bands: &Bands, part: usize) -> Vec<Vec<Point>> {
     let scale = if part == 2 { 1f64.to_degrees() } else { 1.0 };
-    let chains = bands.chains.iter().map(|chain| {
-        let points = chain.iter();
-        points
-            .map(|s| {
-                [
-                    s.time_s,
-                    scale * s.error[part],
-                    SIGMAS * scale * s.sigma[part],
-                ]
-            })
-            .collect()
-    });
+    let point = |s: &BandSample| {
+        let (error, sigma) = (scale * s.error[part], scale * s.sigma[part]);
+        [s.time_s, error, SIGMAS * sigma]
+    };
+    let chains = bands.chains.iter();
+    let chains = chains.map(|chain| chain.iter().map(point).collect());
     chains.collect()
 }
 
@@ -91,11 +85,8 @@ fn draw_panel(
     x_desc: Option<&str>,
     y_desc: &str,
 ) -> Result<(), PlotError> {
-    let sizes = chains
-        .iter()
-        .flatten()
-        .map(|[_, error, band]| error.abs().max(*band));
-    let largest = sizes.fold(0.0, f64::max);
+    let size = |[_, error, band]: &Point| error.abs().max(*band);
+    let largest = chains.iter().flatten().map(size).fold(0.0, f64::max);
     let top = match largest > 1e-9 {
         true => (1.0 + HEADROOM) * largest,
         false => 1.0,

@@ -153,10 +153,10 @@ pub fn header(
             Symbol::Line(style) => {
                 area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style))
             }
-            Symbol::Area(colour) => area.draw(&Rectangle::new(
-                [at(x, 21.0), at(x + 26.0, 35.0)],
-                colour.filled(),
-            )),
+            Symbol::Area(colour) => {
+                let corners = [at(x, 21.0), at(x + 26.0, 35.0)];
+                area.draw(&Rectangle::new(corners, colour.filled()))
+            }
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;

@@ -36,12 +36,9 @@ fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
     let translations = lengths().map(|l| (l.length_m, l.translation_percent));
     let rotations = lengths().map(|l| (l.length_m, l.rotation_deg_per_100m));
     let longest = lengths().last().map_or(100.0, |l| l.length_m);
+    let title = "KITTI errors over segment length";
     draw(
-        [
-            "KITTI errors over segment length",
-            &caption,
-            "segment length (m)",
-        ],
+        [title, &caption, "segment length (m)"],
         50.0..longest + 50.0,
         [
             ("translation (%)", translations.collect(), translation),
@@ -60,12 +57,9 @@ fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
     let translations = pairs().map(|p| (p.distance_m, p.translation_m));
     let rotations = pairs().map(|p| (p.distance_m, p.rotation_deg.abs()));
     let end = pairs().last().map_or(0.0, |p| p.distance_m).max(1.0);
+    let title = "Relative pose error over distance";
     draw(
-        [
-            "Relative pose error over distance",
-            &caption,
-            "distance travelled (m)",
-        ],
+        [title, &caption, "distance travelled (m)"],
         0.0..1.03 * end,
         [
             ("translation (m)", translations.collect(), translation),

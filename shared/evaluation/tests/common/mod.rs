@@ -31,10 +31,8 @@ pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> 
 /// repeat every `bend` motions, more to the left.
 pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
-    chain(
-        pose(7.0, -3.0, 0.4),
-        (0..n).map(|k| pose(2.37, 0.0, turn(k))),
-    )
+    let motions = (0..n).map(|k| pose(2.37, 0.0, turn(k)));
+    chain(pose(7.0, -3.0, 0.4), motions)
 }
 
 /// The parameters of a random [`drive`] of 150 m to 1.2 km.

@@ -46,11 +46,8 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     };
     let assembler = SweepAssembler::new(&configuration, settings.constants);
     let assembler = assembler.map_err(|error| {
-        let topic = &settings.topic;
-        AskError::of(
-            format!("the radar on {topic} cannot be used: {error}"),
-            false,
-        )
+        let reason = format!("the radar on {} cannot be used: {error}", settings.topic);
+        AskError::of(reason, false)
     })?;
     Ok(Sizes {
         period_ns: configuration.period_ns(),

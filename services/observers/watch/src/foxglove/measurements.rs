@@ -52,10 +52,8 @@ pub fn health_schema() -> Value {
     let process = words.into_iter().chain(numbers(usage));
     let processes = json!({"type": "array", "items": object(process)});
     let own = numbers(counts).chain(numbers(["scans_per_s", "distance_m"]));
-    object(own.chain([
-        ("missed".to_owned(), missed),
-        ("processes".to_owned(), processes),
-    ]))
+    let lists = [("missed", missed), ("processes", processes)];
+    object(own.chain(lists.map(|(name, schema)| (name.to_owned(), schema))))
 }
 
 fn numbers<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, Value)> + use<N> {
