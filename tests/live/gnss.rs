@@ -49,10 +49,8 @@ pub fn with_graph(run: Run, address: &str) -> Run {
 /// The messages that the receiver sends during the drive.
 pub fn log_of_drive() -> String {
     let text = log(0.0);
-    text.lines()
-        .take(1 + FIXES)
-        .map(|line| format!("{line}\n"))
-        .collect()
+    let lines = text.lines().take(1 + FIXES);
+    lines.map(|line| format!("{line}\n")).collect()
 }
 
 /// The log of a run's fixes.

@@ -97,10 +97,8 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
 fn a_live_gyro_that_is_silent_leaves_the_radar_alone() {
     let whole = with_log();
     let radar = Radar::playing(whole.path(), &[]);
-    let run = radar
-        .run(SCANS)
-        .set("gyro.kind=udp")
-        .set(&format!("gyro.listen='{}'", address(1)));
+    let run = radar.run(SCANS).set("gyro.kind=udp");
+    let run = run.set(&format!("gyro.listen='{}'", address(1)));
     run.finish().failed_with(&["gyro.kind is set, but none of"]);
     let live = run.odometry();
     assert!(live == Run::small().data(whole.path()).complete(), "{live}");

@@ -17,10 +17,8 @@ const RATE: &str = "4";
 const SLOW_MASKING_MS: u64 = 94;
 
 fn live() -> Run {
-    Run::of_recording()
-        .rate(RATE)
-        .set("run.mode=live")
-        .set(&format!("stages.masking.delay_ms={SLOW_MASKING_MS}"))
+    let run = Run::of_recording().rate(RATE).set("run.mode=live");
+    run.set(&format!("stages.masking.delay_ms={SLOW_MASKING_MS}"))
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
@@ -104,10 +102,8 @@ fn any_process_can_die_and_every_scan_is_accounted_for() {
 
 #[test]
 fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
-    let run = Run::of_recording()
-        .rate("1.5")
-        .set("run.mode=live")
-        .set("source.scans=12");
+    let run = Run::of_recording().rate("1.5").set("run.mode=live");
+    let run = run.set("source.scans=12");
     let lossless = Run::of_recording().set("source.scans=12").complete();
     let live = run.complete();
     assert_eq!(run.summary()["dropped"], 0);

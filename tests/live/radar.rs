@@ -46,11 +46,8 @@ impl Radar {
             command.args(["--rate", RATE]);
         }
         command.arg("--data").arg(recording).args(arguments);
-        let mut server = command
-            .stderr(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        command.stderr(Stdio::piped()).stdout(Stdio::piped());
+        let mut server = command.spawn().unwrap();
         let mut said = String::new();
         let mut words = BufReader::new(server.stderr.take().unwrap());
         words.read_line(&mut said).unwrap();
@@ -176,10 +173,9 @@ fn datagrams_give_the_motions_of_the_recording() {
     let begun = &stamps(&live)[0][0];
     let all = stamps(&all);
     let first = &all.iter().find(|row| row[0] == *begun).unwrap()[1];
-    let recorded = Run::small()
-        .data(whole.path())
-        .set(&format!("source.first={first}"))
-        .set(&format!("source.scans={scans}"));
+    let recorded = Run::small().data(whole.path());
+    let recorded = recorded.set(&format!("source.first={first}"));
+    let recorded = recorded.set(&format!("source.scans={scans}"));
     assert_eq!(motions(&live), motions(&recorded.complete()));
 }
 

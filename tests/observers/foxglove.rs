@@ -164,10 +164,8 @@ fn connect(url: &str, query: &str, headers: &[&str]) -> (TcpStream, String) {
     let (address, _) = url.strip_prefix("ws://").unwrap().split_once('/').unwrap();
     let (_, port) = address.rsplit_once(':').unwrap();
     let mut stream = TcpStream::connect(("127.0.0.1", port.parse().unwrap())).unwrap();
-    let headers: String = headers
-        .iter()
-        .map(|header| format!("{header}\r\n"))
-        .collect();
+    let headers = headers.iter().map(|header| format!("{header}\r\n"));
+    let headers: String = headers.collect();
     let request = format!(
         "GET /{query} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{headers}\r\n"

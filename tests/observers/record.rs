@@ -122,10 +122,8 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
 fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
     for (mode, rate) in [("lossless", "max"), ("live", "4")] {
         let run = recorded(&played().rate(rate)).set(ALL);
-        let run = run
-            .set("source.scans=6")
-            .set(&format!("run.mode={mode}"))
-            .set("stages.refinement.delay_ms=800");
+        let run = run.set("source.scans=6").set(&format!("run.mode={mode}"));
+        let run = run.set("stages.refinement.delay_ms=800");
         let mut running = run.start();
         running.await_stages();
         await_file(&file(&run));
@@ -232,10 +230,9 @@ fn health(recording: &Path) -> Vec<Value> {
     let messages = mcap::MessageStream::new(&bytes)
         .unwrap()
         .map(Result::unwrap);
-    messages
-        .filter(|message| message.channel.topic == "/health")
-        .map(|message| serde_json::from_slice(&message.data).unwrap())
-        .collect()
+    let of_health = messages.filter(|message| message.channel.topic == "/health");
+    let parsed = of_health.map(|message| serde_json::from_slice(&message.data));
+    parsed.map(Result::unwrap).collect()
 }
 
 #[test]
@@ -363,10 +360,8 @@ fn real_scans_replay_to_the_same_bytes() {
         return;
     };
     let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration)
-        .data(&data)
-        .set("source.scans=20")
-        .set(WINDOW);
+    let run = Run::of_file(&configuration).data(&data);
+    let run = run.set("source.scans=20").set(WINDOW);
     let run = recorded(&run).set(ALL);
     let odometry = run.complete();
     assert_eq!(replay(&file(&run), &[]), odometry);
@@ -422,10 +417,8 @@ fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
         let is_it = |found: &&Value| {
             (0..2).all(|column| found[column].as_i64() == row[column].parse().ok())
         };
-        let found = boxes
-            .iter()
-            .find(is_it)
-            .unwrap_or_else(|| panic!("no box for {row:?}"));
+        let found = boxes.iter().find(is_it);
+        let found = found.unwrap_or_else(|| panic!("no box for {row:?}"));
         for (seen, text) in (2..5).map(|k| (&found[k], &row[k])) {
             let expected: f64 = text.parse().unwrap();
             let apart = seen.as_f64().unwrap() - expected;

@@ -22,11 +22,8 @@ const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refine
 /// A live run that is recorded, with a refinement that is slower than the scans: whenever masking
 /// is started again, scans that it had taken are in flight.
 fn slow(run: Run) -> Run {
-    let run = run
-        .set("run.mode=live")
-        .set(WINDOW)
-        .set("stages.refinement.delay_ms=180")
-        .set(TOPICS);
+    let run = run.set("run.mode=live").set(WINDOW).set(TOPICS);
+    let run = run.set("stages.refinement.delay_ms=180");
     recorded(&run)
 }
 

@@ -278,10 +278,8 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
 
 #[test]
 fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
-    let run = long()
-        .rate(HALF_RATE)
-        .set("run.mode=live")
-        .set("stages.masking.delay_ms=50");
+    let run = long().rate(HALF_RATE).set("run.mode=live");
+    let run = run.set("stages.masking.delay_ms=50");
     let mut running = run.start();
     running.await_poses(1);
     let shadow = Shadow::start(&run, "masking", "masking", &[]);
@@ -294,10 +292,8 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
 
 #[test]
 fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
-    let run = Run::of_recording()
-        .rate("0.3")
-        .set("search.kind=exhaustive")
-        .set("raster.n=63");
+    let run = Run::of_recording().rate("0.3").set("raster.n=63");
+    let run = run.set("search.kind=exhaustive");
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     Ended::of(up).succeeded();

@@ -126,10 +126,8 @@ fn a_robot_that_plays_another_drive_is_refused() {
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let [first, second] = [recording::small(), other.path()].map(|data| {
         let robot = Run::small().data(data).rate("2");
-        robot
-            .set("link.side='robot'")
-            .set("link.cut='motion'")
-            .set(&format!("link.connect=['{address}']"))
+        let robot = robot.set("link.side='robot'").set("link.cut='motion'");
+        robot.set(&format!("link.connect=['{address}']"))
     });
     let mut here = first.start();
     here.await_poses(6);

@@ -198,9 +198,8 @@ fn what_cannot_be_loaded_or_returned_is_said() {
             "stages.refinement",
             "masking, rotation-search, translation-search",
         ]);
-    with(Run::of_recording(), "rotation-search", &file)
-        .set("search.kind=exhaustive")
-        .finish()
+    let run = with(Run::of_recording(), "rotation-search", &file).set("search.kind=exhaustive");
+    run.finish()
         .refused_with(&["stages.rotation-search", "no such stage"]);
     let run = with(Run::of_recording(), "masking", &file).set("stages.masking.command=['x']");
     run.finish()
@@ -321,10 +320,8 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
         Ended::of(new).succeeded();
         let project = folder.path().join(format!("my-{stage}"));
         let mut build = Command::new("cargo");
-        build
-            .current_dir(&project)
-            .env("CARGO_TARGET_DIR", folder.path().join("target"))
-            .args(["build", "--quiet"]);
+        build.current_dir(&project).args(["build", "--quiet"]);
+        build.env("CARGO_TARGET_DIR", folder.path().join("target"));
         Ended::of(build).succeeded();
         let program = folder.path().join(format!("target/debug/my-{stage}"));
         let mut conformance = gyre();

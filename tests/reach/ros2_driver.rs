@@ -55,10 +55,11 @@ impl Driver {
 
 /// A run that receives so many scans from a topic in a domain.
 fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
-    run.argument("--ros2", topic)
-        .set(&format!("source.domain={domain}"))
-        .set("source.interface='127.0.0.1'")
-        .set(&format!("source.scans={scans}"))
+    let run = run
+        .argument("--ros2", topic)
+        .set("source.interface='127.0.0.1'");
+    let run = run.set(&format!("source.domain={domain}"));
+    run.set(&format!("source.scans={scans}"))
 }
 
 #[test]

@@ -31,10 +31,8 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
 
     let odometry = &topics["/car/odom"];
     assert_eq!(odometry[0]["header"]["frame_id"], "odo");
-    let frames: Vec<String> = transforms(&topics["/tf"])
-        .into_iter()
-        .map(|it| it.1)
-        .collect();
+    let transformed = transforms(&topics["/tf"]).into_iter();
+    let frames: Vec<String> = transformed.map(|it| it.1).collect();
     let has = |of: &str| frames.iter().any(|it| it == of);
     assert!(has("world -> odo") && has("odo -> car"));
     // The radar looks to the left of the car, which so drives to the right of the radar's first

@@ -31,10 +31,8 @@ pub struct BandSample {
 /// one.
 pub fn bands(matched: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
     let start_ns = matched.span_ns().0;
-    let chains = matched
-        .chains
-        .iter()
-        .map(|chain| samples(chain, start_ns, truth_sigma));
+    let of_chain = |chain| samples(chain, start_ns, truth_sigma);
+    let chains = matched.chains.iter().map(of_chain);
     Bands {
         chains: chains.filter(|samples| samples.len() > 1).collect(),
         truth_sigma,

@@ -21,15 +21,12 @@ pub fn end_error(matched: &MatchedPoses) -> EndError {
     let (estimate, truth) = (matched.estimate(), matched.truth());
     let [estimated, actual] = [estimate, truth].map(|poses| poses[0].inv_mul(&poses[last]));
     let position_m = (estimated.translation.vector - actual.translation.vector).norm();
+    let turn = actual.rotation.rotation_to(&estimated.rotation);
     let path_m = crate::matched::path_m(truth);
     EndError {
         position_m,
         percent: (path_m > 0.0).then(|| 100.0 * position_m / path_m),
-        heading_deg: actual
-            .rotation
-            .rotation_to(&estimated.rotation)
-            .angle()
-            .to_degrees(),
+        heading_deg: turn.angle().to_degrees(),
     }
 }
 

@@ -279,10 +279,8 @@ mod tests {
 
     #[test]
     fn a_ground_truth_without_heading_is_recognised() {
-        let positions: Vec<Pose> = drive()
-            .iter()
-            .map(|p| pose(p.translation.x, p.translation.y, 0.0))
-            .collect();
+        let position = |p: &Pose| pose(p.translation.x, p.translation.y, 0.0);
+        let positions: Vec<Pose> = drive().iter().map(position).collect();
         let axes = resolve(with(drive(), true, true), positions.clone());
         assert!(axes.truth_lacks_heading && axes.y_negated && axes.heading_negated);
         assert_eq!(axes.heading_fault, None);

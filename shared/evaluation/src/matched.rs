@@ -57,10 +57,8 @@ impl MatchedPoses {
             travelled += step;
             travelled
         };
-        std::iter::once(0.0)
-            .chain(steps_m(&self.truth))
-            .map(add)
-            .collect()
+        let steps_m = std::iter::once(0.0).chain(steps_m(&self.truth));
+        steps_m.map(add).collect()
     }
 
     pub(crate) fn map_estimate(self, change: impl FnMut(&Pose) -> Pose) -> Self {

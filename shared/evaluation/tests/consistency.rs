@@ -102,10 +102,8 @@ fn true_covariances_pass_the_acceptance_interval_95_times_in_100() {
 #[test]
 fn true_covariances_have_a_ratio_of_one_in_each_half_of_a_long_drive() {
     let nees = Drive::new(12_800, 7).nees();
-    let segments = nees
-        .by_length
-        .iter()
-        .map(|it| (it.motions, it.all.segments));
+    let lengths = nees.by_length.iter();
+    let segments = lengths.map(|it| (it.motions, it.all.segments));
     let expected = [(1, 12_800), (4, 3_200), (16, 800), (64, 200)];
     assert_eq!(segments.collect::<Vec<_>>(), expected);
     let single = &nees.by_length[0];

@@ -20,18 +20,13 @@ fn data() -> Option<PathBuf> {
 /// normalised, because the fifth decimal of the published figures depends on their rounding.
 fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     let parse = |line: &str| {
-        let m: Vec<f64> = line
-            .split_whitespace()
-            .map(|v| v.parse().unwrap())
-            .collect();
+        let numbers = line.split_whitespace().map(|v| v.parse().unwrap());
+        let m: Vec<f64> = numbers.collect();
         let rotation = Unit::new_unchecked(Complex::new(m[0], m[4]));
         Pose::from_parts([m[3], m[7]].into(), rotation)
     };
-    fs::read_to_string(path)
-        .unwrap()
-        .lines()
-        .map(parse)
-        .collect()
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().map(parse).collect()
 }
 
 /// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw
@@ -74,10 +69,8 @@ fn kitti_errors_of_chained_motions_equal_the_published_figures_in_both_handednes
     let estimate = kitti_poses(data.join("golden/csv-chain/estimate.txt"));
     let y_right =
         chained_csv(data.join("trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv"));
-    let y_left: Vec<_> = y_right
-        .iter()
-        .map(|p| pose(p.translation.x, -p.translation.y, -p.rotation.angle()))
-        .collect();
+    let mirrored = |p: &Pose| pose(p.translation.x, -p.translation.y, -p.rotation.angle());
+    let y_left: Vec<_> = y_right.iter().map(mirrored).collect();
     let evaluations = [&y_right, &y_left].map(|truth| by_index(&estimate, truth, 10));
     for evaluation in &evaluations {
         assert_eq!(five_decimals(evaluation), ["1.22286", "0.39305"]);

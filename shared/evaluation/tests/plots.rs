@@ -16,11 +16,9 @@ fn evaluation(n: usize) -> Evaluation {
 
 /// Returns the points of the longest polyline of a colour, in canvas units.
 fn polyline(svg: &str, colour: &str) -> Vec<(f64, f64)> {
-    let line = svg
-        .lines()
-        .filter(|l| l.starts_with("<polyline") && l.contains(colour))
-        .max_by_key(|l| l.len())
-        .unwrap();
+    let is_one = |l: &&str| l.starts_with("<polyline") && l.contains(colour);
+    let lines = svg.lines().filter(is_one);
+    let line = lines.max_by_key(|l| l.len()).unwrap();
     let (_, points) = line.split_once("points=\"").unwrap();
     let (points, _) = points.split_once('"').unwrap();
     let point = |p: &str| {

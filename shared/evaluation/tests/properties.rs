@@ -20,10 +20,8 @@ fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
 
 /// Chains the motions from pose to pose after `change`.
 fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> {
-    let motions = poses
-        .windows(2)
-        .enumerate()
-        .map(|(k, w)| change(k, w[0].inv_mul(&w[1])));
+    let pairs = poses.windows(2).enumerate();
+    let motions = pairs.map(|(k, w)| change(k, w[0].inv_mul(&w[1])));
     chain(poses[0], motions.collect::<Vec<_>>())
 }
 

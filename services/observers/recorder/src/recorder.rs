@@ -214,11 +214,8 @@ impl Recorder<'_> {
     fn report_missed(&mut self) -> Result<(), StageError> {
         let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
         if missed > self.reported && Instant::now() >= self.due {
-            let counts = self
-                .taps
-                .iter()
-                .map(|tap| tap.counts())
-                .filter(|it| it.missed > 0);
+            let counts = self.taps.iter().map(Tap::counts);
+            let counts = counts.filter(|it| it.missed > 0);
             let counts: Vec<String> = counts
                 .map(|it| format!("{} of {}", it.missed, it.topic))
                 .collect();

@@ -326,10 +326,8 @@ impl RunView {
 /// Returns the part of gyro, wheels and Doppler in the last motions, and their rates, in words.
 fn others(state: &ViewState) -> Option<String> {
     let used = WitnessCounts::of(&state.last_motions).in_words();
-    let words: Vec<String> = used
-        .into_iter()
-        .chain(state.counts.samples.in_words())
-        .collect();
+    let samples = state.counts.samples.in_words();
+    let words: Vec<String> = used.into_iter().chain(samples).collect();
     (!words.is_empty()).then(|| words.join("; "))
 }
 

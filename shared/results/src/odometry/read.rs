@@ -78,10 +78,8 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
     if let Some(name) = COLUMNS.split(' ').find(missing) {
         return Err(format!("not an odometry.csv: its header has no column {name}").into());
     }
-    reader
-        .deserialize()
-        .map(|row| MotionRow::motion(&row?))
-        .collect()
+    let rows = reader.deserialize();
+    rows.map(|row| MotionRow::motion(&row?)).collect()
 }
 
 impl MotionRow {
@@ -155,10 +153,8 @@ mod tests {
     fn what_was_written_is_read_whatever_columns_are_beside_it() {
         let (poses, text) = (poses(), csv(&poses()));
         assert_eq!(parse(text.as_bytes()).unwrap(), motions(&poses));
-        let wider: String = text
-            .lines()
-            .map(|line| format!("new,{line},newer\n"))
-            .collect();
+        let wider = text.lines().map(|line| format!("new,{line},newer\n"));
+        let wider: String = wider.collect();
         assert_eq!(parse(wider.as_bytes()).unwrap(), motions(&poses));
     }
 

@@ -42,10 +42,8 @@ impl<'a> Files<'a> {
         let made = |path: &Path| self.drafts.iter().any(|draft| draft.path() == path);
         // The truth of a simulation is written when the run begins.
         let results = FILES.iter().filter(|name| **name != SIMULATED_TRUTH);
-        let others: Vec<_> = results
-            .map(|name| self.out.join(name))
-            .filter(|path| !made(path))
-            .collect();
+        let paths = results.map(|name| self.out.join(name));
+        let others: Vec<_> = paths.filter(|path| !made(path)).collect();
         self.drafts.into_iter().try_for_each(Draft::commit)?;
         others.iter().try_for_each(|path| storage::remove(path))?;
         Ok(storage::sync_folder(self.out.path())?)
