@@ -54,10 +54,8 @@ fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
 
 /// Returns an address that stays free: senders take their ports on 127.0.0.1.
 pub fn address(test: u32) -> String {
-    format!(
-        "127.0.0.2:{}",
-        40_000 + test * 3_500 + process::id() % 3_500
-    )
+    let port = 40_000 + test * 3_500 + process::id() % 3_500;
+    format!("127.0.0.2:{port}")
 }
 
 fn recorded_with_logs(recording: &Path) -> String {

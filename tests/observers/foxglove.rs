@@ -218,14 +218,10 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
     let (mut running, server) = started(&run);
     let (mut stalled, answer) = connect(&server.foxglove(), "", &[SDK]);
     assert!(answer.contains(" 101 "), "{answer}");
-    let channels: Vec<_> = (0..13)
-        .map(|id| format!("{{\"id\":{id},\"channelId\":{id}}}"))
-        .collect();
-    let request = format!(
-        "{{\"op\":\"subscribe\",\"subscriptions\":[{}]}}",
-        channels.join(",")
-    );
-    stalled.write_all(&frame(&request)).unwrap();
+    let channels = (0..13).map(|id| serde_json::json!({"id": id, "channelId": id}));
+    let channels: Vec<Value> = channels.collect();
+    let request = serde_json::json!({"op": "subscribe", "subscriptions": channels});
+    stalled.write_all(&frame(&request.to_string())).unwrap();
     running.await_poses(20);
     let early = own_bytes(server.pid());
     running.await_poses(recording::SCANS_AROUND);

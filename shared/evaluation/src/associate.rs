@@ -159,10 +159,9 @@ fn by_time(
             let [first_s, last_s] = [first_ns, last_ns].map(|ns| ns as f64 * 1e-9);
             format!("{first_s:.3} s to {last_s:.3} s")
         };
+        let (estimate, truth) = (span_s(estimate_ns), span_s(truth_ns));
         return Err(EvaluationError(format!(
-            "the trajectories do not overlap in time: estimate {}, ground truth {} (same clock, same unit?)",
-            span_s(estimate_ns),
-            span_s(truth_ns)
+            "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
         )));
     }
     if matched < 2 {
@@ -192,11 +191,9 @@ pub(crate) fn require_stamps(
         )));
     }
     if let Some(k) = stamps.windows(2).position(|w| w[1] < w[0]) {
+        let (before, later, k) = (stamps[k], stamps[k + 1], k + 1);
         return Err(EvaluationError(format!(
-            "the stamps of the {side} decrease at pose {}: {} ns after {} ns",
-            k + 1,
-            stamps[k + 1],
-            stamps[k]
+            "the stamps of the {side} decrease at pose {k}: {later} ns after {before} ns"
         )));
     }
     Ok(stamps.first().copied().zip(stamps.last().copied()))

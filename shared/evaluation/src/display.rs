@@ -18,16 +18,12 @@ impl fmt::Display for Evaluation {
                 ""
             )?;
         }
-        writeln!(
+        let (path_m, estimated_m) = (self.path_m, self.estimated_path_m);
+        write!(
             f,
-            "path length   {:.2} m, estimate {:.2} m{}",
-            self.path_m,
-            self.estimated_path_m,
-            match self.truth_stands {
-                true => "; the ground truth stands still: is it of this drive?",
-                false => "",
-            }
+            "path length   {path_m:.2} m, estimate {estimated_m:.2} m"
         )?;
+        writeln!(f, "{}", if self.truth_stands { STANDS } else { "" })?;
         match &self.kitti {
             Some(kitti) => writeln!(f, "KITTI         {kitti}")?,
             None => writeln!(f, "KITTI         none: {}", self.why_no_kitti())?,
@@ -36,12 +32,12 @@ impl fmt::Display for Evaluation {
             Some(seg) => writeln!(f, "seg           {seg}")?,
             None => writeln!(f, "seg           none: {TOO_SHORT}")?,
         }
-        let ate = &self.ate;
-        writeln!(
+        let (rmse, mean, max) = (self.ate.rmse_m, self.ate.mean_m, self.ate.max_m);
+        write!(
             f,
-            "ATE           {:.3} m rmse, {:.3} m mean, {:.3} m max, after SE(2) alignment",
-            ate.rmse_m, ate.mean_m, ate.max_m
+            "ATE           {rmse:.3} m rmse, {mean:.3} m mean, {max:.3} m max, "
         )?;
+        writeln!(f, "after SE(2) alignment")?;
         if let Some(end) = &self.end {
             writeln!(f, "end point     {end}")?;
         }
@@ -59,6 +55,7 @@ impl fmt::Display for Evaluation {
     }
 }
 
+const STANDS: &str = "; the ground truth stands still: is it of this drive?";
 const TOO_SHORT: &str = "the path is not longer than 100 m";
 
 impl Evaluation {
@@ -76,11 +73,10 @@ impl Evaluation {
         for (k, length) in seg.by_length.iter().enumerate() {
             write!(f, "\n{:8.0} {:10}", length.length_m, length.segments)?;
             match self.kitti.as_ref().and_then(|kitti| kitti.by_length.get(k)) {
-                Some(kitti) => write!(
-                    f,
-                    " {:12.4} {:11.4}",
-                    kitti.translation_percent, kitti.rotation_deg_per_100m
-                )?,
+                Some(kitti) => {
+                    write!(f, " {:12.4}", kitti.translation_percent)?;
+                    write!(f, " {:11.4}", kitti.rotation_deg_per_100m)?;
+                }
                 None => write!(f, " {:>12} {:>11}", "-", "-")?,
             }
             write!(f, " {:7.4}", length.percent)?;
@@ -150,11 +146,8 @@ impl fmt::Display for EndError {
 impl fmt::Display for Rpe {
     /// Writes two lines, the second indented as the rows of an evaluation are.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "translation {:.4} m rmse, {:.4} m mean",
-            self.translation_rmse_m, self.translation_mean_m
-        )?;
+        let (rmse, mean) = (self.translation_rmse_m, self.translation_mean_m);
+        write!(f, "translation {rmse:.4} m rmse, {mean:.4} m mean")?;
         if let Some(ratio) = self.forward_ratio {
             write!(f, "; forward distance {ratio:.4} of the true one")?;
         }
@@ -186,12 +179,9 @@ impl fmt::Display for Nees {
         self.by_length.iter().try_for_each(|length| length.fmt(f))?;
         let lengths = self.by_length.iter();
         let factors = lengths.map(|length| format!("{:.2}", length.all.pose.ratio.sqrt()));
-        write!(
-            f,
-            "\n\n{:14}poses err {} times as much as their covariances say",
-            "",
-            factors.collect::<Vec<_>>().join(", ")
-        )
+        let factors = factors.collect::<Vec<_>>().join(", ");
+        write!(f, "\n\n{:14}poses err {factors} times as much ", "")?;
+        write!(f, "as their covariances say")
     }
 }
 
@@ -225,11 +215,11 @@ impl fmt::Display for NeesFigures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:11}", self.segments)?;
         for figure in [self.pose, self.translation, self.yaw] {
-            let [low, high] = figure.acceptance_interval;
+            let ([low, high], outside) = (figure.acceptance_interval, figure.outside_percent);
             write!(
                 f,
-                "{:8.2} [{low:.2}, {high:.2}]{:6.1} %",
-                figure.ratio, figure.outside_percent
+                "{:8.2} [{low:.2}, {high:.2}]{outside:6.1} %",
+                figure.ratio
             )?;
         }
         Ok(())

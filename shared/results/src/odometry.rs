@@ -21,11 +21,8 @@ pub fn write_row(pose: &PoseHeader, text: &mut String) {
         return;
     }
     let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
-    let _ = write!(
-        text,
-        "{},{},{},{},{}",
-        item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
-    );
+    let _ = write!(text, "{},{},{}", item.seq, item.scan, item.previous_scan);
+    let _ = write!(text, ",{},{}", item.stamp_ns, motion.interval_ns);
     add(text, &[motion.x_m, motion.y_m, motion.yaw_rad], 9);
     add(text, &motion.covariance, 12);
     add(text, &[motion.score, motion.runner_up_score], 9);

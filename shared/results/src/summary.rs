@@ -245,10 +245,10 @@ impl fmt::Display for Summary {
         };
         let of = self.scans_in_recording;
         let of = of.map_or(String::new(), |scans| format!(" of {scans}"));
+        let (poses, wall_s, per_s) = (c.processed, self.wall_s, self.scans_per_s);
         writeln!(
             f,
-            "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
-            c.processed, self.wall_s, self.scans_per_s
+            "\n{ending}: {poses}{of} scans in {wall_s:.1} s, {per_s:.1} scans/s"
         )?;
         let figures = self.figures();
         let groups = figures::GROUPS.iter();
@@ -278,11 +278,9 @@ impl fmt::Display for Summary {
 
 impl Summary {
     fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "\n{:20}{:>9}{:>9}{:>9}{:>9}   busy   allocations",
-            "latency, us", "p50", "p90", "p99", "max"
-        )?;
+        let name = "latency, us";
+        write!(f, "\n{name:20}      p50      p90      p99      max   ")?;
+        writeln!(f, "busy   allocations")?;
         row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
         writeln!(f)?;
         for stage in StageId::ALL {
@@ -312,9 +310,7 @@ impl Summary {
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
-    write!(
-        f,
-        "{name:20}{:9.0}{:9.0}{:9.0}{:9.0}",
-        p.p50_us, p.p90_us, p.p99_us, p.max_us
-    )
+    write!(f, "{name:20}")?;
+    let mut times_us = [p.p50_us, p.p90_us, p.p99_us, p.max_us].into_iter();
+    times_us.try_for_each(|time_us| write!(f, "{time_us:9.0}"))
 }

@@ -66,19 +66,11 @@ impl fmt::Display for Recorded {
                 false => counts.join(", "),
             }
         };
-        write!(
-            f,
-            "recorded {} in {}",
-            list(|it| it.recorded),
-            self.path.display()
-        )?;
+        let (recorded, missed) = (list(|it| it.recorded), list(|it| it.missed));
+        write!(f, "recorded {recorded} in {}", self.path.display())?;
         match self.is_complete() {
             true => write!(f, "; missed nothing"),
-            false => write!(
-                f,
-                "; missed {}: the recording is not complete",
-                list(|it| it.missed)
-            ),
+            false => write!(f, "; missed {missed}: the recording is not complete"),
         }
     }
 }

@@ -51,14 +51,11 @@ impl ObjectBand {
             Some(to) => format!("{} to {to} {unit}", self.from),
             None => format!("from {} {unit}", self.from),
         };
+        let [recall, precision] = [self.recall, self.precision].map(|it| 100.0 * it);
+        let (position, velocity) = (self.position_rmse_m, self.velocity_rmse_mps);
+        let (heading, required) = (self.heading_rmse_deg, self.required);
         format!(
-            "{band:<13} recall {:.1} %, precision {:.1} %, {:.2} m, {:.2} m/s, {:.1} deg, of {}",
-            100.0 * self.recall,
-            100.0 * self.precision,
-            self.position_rmse_m,
-            self.velocity_rmse_mps,
-            self.heading_rmse_deg,
-            self.required
+            "{band:<13} recall {recall:.1} %, precision {precision:.1} %, {position:.2} m, {velocity:.2} m/s, {heading:.1} deg, of {required}"
         )
     }
 }

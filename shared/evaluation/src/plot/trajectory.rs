@@ -96,16 +96,14 @@ struct Scene<'a> {
 impl Scene<'_> {
     fn matched(matched: &MatchedPoses) -> Self {
         let ate = ate(matched);
+        let rmse_m = ate.rmse_m;
         let align = |pose: &Pose| ate.truth_from_estimate * pose;
         let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
         Self {
             paths: vec![("estimate", positions(&aligned))],
             truth: Some(positions(matched.truth())),
             title: "Trajectory and ground truth",
-            caption: format!(
-                "estimate after SE(2) alignment; ATE {:.2} m rmse",
-                ate.rmse_m
-            ),
+            caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
         }
     }
 

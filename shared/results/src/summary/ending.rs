@@ -89,12 +89,9 @@ impl Summary {
             return format!("{p99_ms:.0} ms (99 %)");
         };
         if self.rate == Rate::Max {
-            let times = self.scans_per_s * period_s;
-            return format!(
-                "{:.1} scans/s, {times:.1} times the radar's {:.1}",
-                self.scans_per_s,
-                1.0 / period_s
-            );
+            let (per_s, own_per_s) = (self.scans_per_s, 1.0 / period_s);
+            let times = per_s * period_s;
+            return format!("{per_s:.1} scans/s, {times:.1} times the radar's {own_per_s:.1}");
         }
         let p50_ms = self.latency.sensor_to_pose.p50_us / 1e3;
         let period_ms = period_s * 1e3 / self.rate.factor().unwrap_or(1.0);
