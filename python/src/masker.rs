@@ -74,9 +74,8 @@ pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'
             "points are expected as Odometry.points or Masked.points has them",
         ));
     }
-    let together = py
-        .import("numpy")?
-        .call_method1("ascontiguousarray", (points,))?;
+    let numpy = py.import("numpy")?;
+    let together = numpy.call_method1("ascontiguousarray", (points,))?;
     let fields = together.call_method1("view", (numpy::dtype::<f32>(py),))?;
     let fields = sliceable::<f32>(&fields)?;
     readable(&fields, "points", "a structured array of points")

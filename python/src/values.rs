@@ -78,9 +78,8 @@ fn value_within(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<V
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
         let items = value.try_iter()?;
-        let items: PyResult<Vec<Value>> = items
-            .map(|item| value_within(key, &item?, within))
-            .collect();
+        let items = items.map(|item| value_within(key, &item?, within));
+        let items: PyResult<Vec<Value>> = items.collect();
         return Ok(Value::Array(items?));
     }
     // Numbers of numpy do not belong to Python's classes.

@@ -114,9 +114,8 @@ pub(crate) fn whole(scans: usize) -> TempDir {
 
 /// Makes all rows of a recording measured ones.
 pub(crate) fn complete(drive: TempDir) -> TempDir {
-    recording::images(drive.path())
-        .iter()
-        .for_each(|image| recording::complete(image));
+    let images = recording::images(drive.path());
+    images.iter().for_each(|image| recording::complete(image));
     drive
 }
 
@@ -182,9 +181,8 @@ fn datagrams_give_the_motions_of_the_recording() {
 #[test]
 fn datagrams_without_scans_are_named_in_a_sentence() {
     let to = group(3);
-    let run = Run::small()
-        .argument("--radar", &format!("udp://{to}"))
-        .set("source.interface='127.0.0.1'");
+    let run = Run::small().argument("--radar", &format!("udp://{to}"));
+    let run = run.set("source.interface='127.0.0.1'");
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
     let (stop, stopped) = mpsc::channel::<()>();
     let sending = thread::spawn(move || {

@@ -13,9 +13,8 @@ fn long() -> Run {
 
 /// A drive of so many scans: the small recording, again and again.
 fn small(scans: usize) -> Run {
-    Run::of_recording()
-        .set("source.repeat=true")
-        .set(&format!("source.scans={scans}"))
+    let run = Run::of_recording().set("source.repeat=true");
+    run.set(&format!("source.scans={scans}"))
 }
 
 fn started(run: &Run) -> Running {

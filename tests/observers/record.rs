@@ -162,18 +162,15 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     let recording = open_recording(&file(&run)).unwrap();
     // The scans that are there are played, and those that are not are named; what needs every
     // message is refused.
-    let again = Run::configured("")
-        .data(&file(&run))
-        .set("source.max_unreadable=100");
+    let again = Run::configured("").data(&file(&run));
+    let again = again.set("source.max_unreadable=100");
     let sentence = format!("{missed} of the {SCANS} scans");
     again.finish().failed_with(&[&sentence, "cannot be read"]);
-    let lost = (0..SCANS as u64)
-        .find(|seq| !seqs(&recording, "masked").contains(seq))
-        .unwrap();
+    let masked = seqs(&recording, "masked");
+    let lost = (0..).find(|seq| !masked.contains(seq)).unwrap();
     let lacks = format!("lacks message {lost} of topic `masked`");
-    let from = Run::configured("")
-        .data(&file(&run))
-        .argument("--from", "masked");
+    let from = Run::configured("").data(&file(&run));
+    let from = from.argument("--from", "masked");
     from.finish().refused_with(&[&lacks]);
 }
 
@@ -227,9 +224,8 @@ fn a_recorder_that_dies_right_before_the_end_is_reported() {
 /// The messages on `/health`.
 fn health(recording: &Path) -> Vec<Value> {
     let bytes = fs::read(recording).unwrap();
-    let messages = mcap::MessageStream::new(&bytes)
-        .unwrap()
-        .map(Result::unwrap);
+    let messages = mcap::MessageStream::new(&bytes).unwrap();
+    let messages = messages.map(Result::unwrap);
     let of_health = messages.filter(|message| message.channel.topic == "/health");
     let parsed = of_health.map(|message| serde_json::from_slice(&message.data));
     parsed.map(Result::unwrap).collect()
@@ -296,9 +292,8 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     running.await_poses(SCANS / 3);
     let mut record = gyre();
     record.arg("record").arg(run.out());
-    record
-        .args(["--topics", "scan,masked", "--to"])
-        .arg(file(&run));
+    record.args(["--topics", "scan,masked", "--to"]);
+    record.arg(file(&run));
     let mut recorder = record.spawn().unwrap();
     running.finish().succeeded();
     recorder.wait().unwrap();
@@ -307,9 +302,8 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
     // A scan before the recorder came is not there, and the stages after `masked` need it.
     let replay = Run::small().data(&file(&run)).argument("--from", "masked");
-    replay
-        .finish()
-        .refused_with(&["lacks message 0 of topic `masked`"]);
+    let lacks = "lacks message 0 of topic `masked`";
+    replay.finish().refused_with(&[lacks]);
 }
 
 #[test]
@@ -340,9 +334,8 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     let run = played();
     let place = run.folder().join("small");
     fs::create_dir(&place).unwrap();
-    let recorded = run
-        .clone()
-        .argument("--record", place.join("drive.mcap").to_str().unwrap());
+    let file = place.join("drive.mcap");
+    let recorded = run.clone().argument("--record", file.to_str().unwrap());
     let Some(command) = recorded.with_tmpfs(&place, "size=512k") else {
         return;
     };
@@ -369,9 +362,8 @@ fn real_scans_replay_to_the_same_bytes() {
     let configured = Run::of_file(&configuration).data(&file(&run));
     assert_eq!(configured.complete(), odometry);
     let other = configured.set("dataset.range_offset_m=0.5");
-    other
-        .finish()
-        .refused_with(&["range_offset_m", "that they were recorded with"]);
+    let words = ["range_offset_m", "that they were recorded with"];
+    other.finish().refused_with(&words);
 }
 
 /// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of

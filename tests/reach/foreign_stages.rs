@@ -68,9 +68,8 @@ fn a_fault_that_does_not_come_again_costs_a_restart() {
 
 #[test]
 fn a_source_that_reads_slower_than_the_stages_work_is_no_stall() {
-    let run = run_with("radar-replay", "scan read_ms 300", false)
-        .rate("max")
-        .set("run.stall_timeout_s=1.5");
+    let run = run_with("radar-replay", "scan read_ms 300", false);
+    let run = run.rate("max").set("run.stall_timeout_s=1.5");
     run.finish().succeeded();
     assert_eq!(run.summary()["restarts"], serde_json::json!({}));
 }

@@ -28,9 +28,8 @@ fn side(side: &str, cut: &str, endpoint: &str) -> Run {
         "robot" => Run::of_recording(),
         _ => Run::small(),
     };
-    run.set(&format!("link.side='{side}'"))
-        .set(&format!("link.cut='{cut}'"))
-        .set(endpoint)
+    let run = run.set(&format!("link.side='{side}'"));
+    run.set(&format!("link.cut='{cut}'")).set(endpoint)
 }
 
 /// Both sides over a free port of this machine: the base, and the robot.

@@ -258,9 +258,8 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
     let stage = child_with(running.pid(), file.to_str().unwrap());
     send(stage.unwrap(), Signal::KILL);
     let changed = "mine.py has changed since";
-    running
-        .finish()
-        .failed_with(&["masking has ended", changed]);
+    let ended = running.finish();
+    ended.failed_with(&["masking has ended", changed]);
     let is_another = "the program of masking is another one";
     run.finish()
         .refused_with(&["unfinished run of another program", is_another]);
@@ -300,9 +299,8 @@ fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
         let project = folder.path().join(format!("my-{stage}"));
         let file = project.join(format!("{function}.py"));
         let mut conformance = gyre();
-        conformance
-            .args(["conformance", stage, "--scans", "12", "--python"])
-            .arg(&file);
+        conformance.args(["conformance", stage, "--scans", "12", "--python"]);
+        conformance.arg(&file);
         Ended::of(conformance).succeeded();
         let odometry = with(Run::of_recording(), stage, &file).complete();
         assert_near(undisturbed(), &odometry, 0.5);

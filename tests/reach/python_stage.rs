@@ -150,9 +150,8 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
     if !can_start() {
         return;
     }
-    let run = Run::of_recording()
-        .rate("0.5")
-        .set("masking.undo_doppler=true");
+    let run = Run::of_recording().rate("0.5");
+    let run = run.set("masking.undo_doppler=true");
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
     let swap = swap_masking(&run, &["--command", &command().join(" ")]);

@@ -100,9 +100,8 @@ impl Grid {
         let runs = runs
             .iter()
             .map(|run| [0, 1].map(|part: usize| run[part].as_u64().unwrap()));
-        let cells: Vec<u8> = runs
-            .flat_map(|[value, count]| vec![value as u8; count as usize])
-            .collect();
+        let cells = runs.flat_map(|[value, count]| vec![value as u8; count as usize]);
+        let cells: Vec<u8> = cells.collect();
         let width = info["width"].as_u64().unwrap() as usize;
         assert_eq!(number(&info["height"]) * width as f64, cells.len() as f64);
         Self {

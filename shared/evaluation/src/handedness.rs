@@ -140,9 +140,8 @@ fn negate(pose: &Pose, y: bool, heading: bool) -> Pose {
 /// Returns the yaw of each pose without jumps of a full turn, rad.
 fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
     let mut yaw = poses.first().map_or(0.0, |p| p.rotation.angle());
-    let turns = poses
-        .windows(2)
-        .map(|w| w[0].rotation.angle_to(&w[1].rotation));
+    let turn = |w: &[Pose]| w[0].rotation.angle_to(&w[1].rotation);
+    let turns = poses.windows(2).map(turn);
     let add = |turn| {
         yaw += turn;
         yaw
@@ -152,9 +151,8 @@ fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
 }
 
 fn range(values: &[f64]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    let grow = |(low, high): (f64, f64), &it: &f64| (low.min(it), high.max(it));
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), grow);
     high - low
 }
 

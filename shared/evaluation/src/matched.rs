@@ -95,9 +95,8 @@ pub(crate) fn require_poses(side: &str, poses: &[Pose]) -> Result<(), Evaluation
 }
 
 fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
-    poses
-        .windows(2)
-        .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
+    let step = |w: &[Pose]| (w[1].translation.vector - w[0].translation.vector).norm();
+    poses.windows(2).map(step)
 }
 
 pub fn path_m(poses: &[Pose]) -> f64 {

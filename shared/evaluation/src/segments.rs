@@ -116,9 +116,8 @@ mod tests {
     fn segments_of_every_length_start_at_every_step() {
         let distance: Vec<f64> = (0..=250).map(f64::from).collect();
         let step = NonZeroUsize::new(50).unwrap_or(EVERY);
-        let found: Vec<_> = segments(&distance, step)
-            .map(|s| (s.first, s.last, s.length))
-            .collect();
+        let found = segments(&distance, step).map(|s| (s.first, s.last, s.length));
+        let found: Vec<_> = found.collect();
         let expected = [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)];
         assert_eq!(found, expected);
     }

@@ -101,9 +101,8 @@ mod tests {
             ..PoseHeader::default()
         };
         let mut text = HEADER.to_owned();
-        [pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]
-            .iter()
-            .for_each(|pose| write_row(pose, &mut text));
+        let poses = [pose(0, flag::BREAK), pose(1, 0), pose(2, 0)];
+        poses.iter().for_each(|pose| write_row(pose, &mut text));
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [31, 31, 31]);
         assert!(text.contains(",1.500000000,"));

@@ -95,9 +95,8 @@ pub fn write(
     files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
     let refines = configuration.has(StageId::Refinement);
     let course = read.counter.course(read.sketch.length_m);
-    let counts = read
-        .counter
-        .counts(read.end.as_ref(), configuration.source.first, refines);
+    let (end, first) = (read.end.as_ref(), configuration.source.first);
+    let counts = read.counter.counts(end, first, refines);
     let measured = Measured {
         counts,
         course,

@@ -350,9 +350,8 @@ impl Base<'_> {
 impl FromRobot {
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
         let first = self.messages.front()?.item();
-        first
-            .is_some_and(|it| it.seq == seq)
-            .then(|| self.messages.pop_front())?
+        let is_next = first.is_some_and(|it| it.seq == seq);
+        is_next.then(|| self.messages.pop_front())?
     }
 
     fn receive(&mut self) -> Result<(), LinkError> {

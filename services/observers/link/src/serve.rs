@@ -145,9 +145,8 @@ impl Offer {
     }
 
     fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, ReceiverState>> {
-        self.receivers
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        let receivers = self.receivers.lock();
+        receivers.unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Answers a request in a thread of its own, since sending waits while the network is slow.
@@ -233,9 +232,8 @@ impl Offer {
     /// Notes a request of a receiver, which replaces those before; returns its number.
     fn replace(&self, receiver: &str, is_done: bool) -> u64 {
         let mut receivers = self.receivers();
-        let before = receivers
-            .get(receiver)
-            .map_or(0, |receiver| receiver.request);
+        let before = receivers.get(receiver);
+        let before = before.map_or(0, |receiver| receiver.request);
         let state = ReceiverState {
             request: before + 1,
             is_done,

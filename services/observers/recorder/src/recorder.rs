@@ -58,9 +58,8 @@ impl fmt::Display for Recorded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |number: fn(&Counts) -> u64| {
             let counts = self.counts.iter().filter(|counts| number(counts) > 0);
-            let counts: Vec<String> = counts
-                .map(|it| format!("{} {}", number(it), it.topic))
-                .collect();
+            let counts = counts.map(|it| format!("{} {}", number(it), it.topic));
+            let counts: Vec<String> = counts.collect();
             match counts.is_empty() {
                 true => "nothing".to_owned(),
                 false => counts.join(", "),
@@ -208,9 +207,8 @@ impl Recorder<'_> {
         if missed > self.reported && Instant::now() >= self.due {
             let counts = self.taps.iter().map(Tap::counts);
             let counts = counts.filter(|it| it.missed > 0);
-            let counts: Vec<String> = counts
-                .map(|it| format!("{} of {}", it.missed, it.topic))
-                .collect();
+            let counts = counts.map(|it| format!("{} of {}", it.missed, it.topic));
+            let counts: Vec<String> = counts.collect();
             tracing::warn!(
                 "missed {} so far: the recorder was too slow, or was not there",
                 counts.join(", ")

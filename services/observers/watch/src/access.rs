@@ -140,9 +140,8 @@ impl Access {
 
     fn in_cookie<'a>(&self, headers: &'a HeaderMap) -> Option<&'a str> {
         let all = headers.get_all(header::COOKIE).into_iter();
-        let mut cookies = all
-            .filter_map(|cookies| cookies.to_str().ok())
-            .flat_map(|cookies| cookies.split("; "));
+        let all = all.filter_map(|cookies| cookies.to_str().ok());
+        let mut cookies = all.flat_map(|cookies| cookies.split("; "));
         cookies.find_map(|cookie| cookie.strip_prefix(self.cookie.as_str())?.strip_prefix('='))
     }
 }
@@ -184,9 +183,8 @@ mod tests {
     }
 
     fn judged(access: &Access, uri: &str, headers: &[(header::HeaderName, &str)]) -> Verdict {
-        let headers = headers
-            .iter()
-            .map(|(name, value)| (name.clone(), value.parse().unwrap()));
+        let headers = headers.iter();
+        let headers = headers.map(|(name, value)| (name.clone(), value.parse().unwrap()));
         access.judge(&uri.parse().unwrap(), &headers.collect())
     }
 

@@ -289,9 +289,8 @@ impl RunView {
         let latest = state.latest.map(|latest| latest.vertex);
         let (vertices, _) = state.track.since(&mut Cursor::default());
         let vertices = vertices.iter().chain(&latest);
-        vertices
-            .map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw])
-            .collect()
+        let poses = vertices.map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw]);
+        poses.collect()
     }
 
     /// Returns the time of the newest pose on the sensor's clock, ns.

@@ -37,9 +37,8 @@ pub fn px(length: f64) -> u32 {
 
 /// Returns a font of `size` px. The SVG back end divides sizes by 1.24, which is compensated here.
 pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
-    ("sans-serif", 1.24 * size * f64::from(UNITS_PER_PX))
-        .into_font()
-        .color(&colour)
+    let size = 1.24 * size * f64::from(UNITS_PER_PX);
+    ("sans-serif", size).into_font().color(&colour)
 }
 
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {

@@ -112,9 +112,8 @@ impl Summary {
         let out = Path::new(&self.out);
         // As short as a person here would write it.
         let here = env::current_dir().ok();
-        let out = here
-            .and_then(|here| out.strip_prefix(here).ok())
-            .unwrap_or(out);
+        let short = here.and_then(|here| out.strip_prefix(here).ok());
+        let out = short.unwrap_or(out);
         let out = out.display();
         format!("gyre report {out} --open; all figures: {out}/summary.json, or -v{again}")
     }

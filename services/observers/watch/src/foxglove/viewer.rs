@@ -141,9 +141,8 @@ impl Viewer {
         let gone = self.advertised.iter().filter(|it| !is_in(&of_run, it));
         let gone: Vec<usize> = gone.copied().collect();
         let new = of_run.iter().filter(|it| !is_in(&self.advertised, it));
-        let new: Vec<Value> = new
-            .map(|channel| self.hub.channels[*channel].advertised.clone())
-            .collect();
+        let new = new.map(|channel| self.hub.channels[*channel].advertised.clone());
+        let new: Vec<Value> = new.collect();
         self.advertised = of_run;
         if !gone.is_empty() {
             let message = json!({"op": "unadvertise", "channelIds": gone});
