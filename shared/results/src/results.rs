@@ -30,7 +30,6 @@ use crate::{
 use estimate::Estimate;
 use files::Files;
 use pass::{Pass, Read};
-use sketch::Sketch;
 use slam::Slam;
 
 pub use map::map_options;

@@ -7,7 +7,7 @@ use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
 use gyre_terminal::Failure;
 
-use super::{Estimate, Files, Sketch, Slam};
+use super::{Estimate, Files, Slam, sketch::Sketch};
 use crate::{odometry, poses, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
