@@ -14,14 +14,8 @@ use crate::{LinkError, Network, request::Question};
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
 
-const ASK_FOR_SCANS: Question = Question {
-    action: "ask the robot for its scans",
-    other: "the robot",
-};
-const ASK_FOR_START: Question = Question {
-    action: "ask the base where to go on",
-    other: "the base",
-};
+const ASK_FOR_SCANS: Question = Question("ask the robot for its scans", "the robot");
+const ASK_FOR_START: Question = Question("ask the base where to go on", "the base");
 
 pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     let side = match sender {
@@ -48,7 +42,7 @@ pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
         Ok(false)
     };
     let session = Network::from(config).open(pause)?;
-    let failed = || LinkError::zenoh(ASK_FOR_SCANS.action, &"it was interrupted");
+    let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
         if let Some(bytes) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
@@ -159,6 +153,6 @@ pub(crate) fn ask_base(
     agreement: &Agreement,
 ) -> Result<Option<StartAnswer>, LinkError> {
     let payload = serde_json::to_vec(agreement);
-    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.action, &e))?;
+    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.0, &e))?;
     ASK_FOR_START.ask(session, start_key(config), payload)
 }

@@ -31,10 +31,7 @@ use mirror::Mirror;
 const NAME: &str = "link";
 const PAUSE: Duration = Duration::from_millis(200);
 
-const ASK_FOR_RUN: Question = Question {
-    action: "ask for a run",
-    other: "the sender",
-};
+const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
@@ -73,7 +70,7 @@ fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
     let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
         true => Ok(()),
-        false => Err(LinkError::other_version(ASK_FOR_RUN.other)),
+        false => Err(LinkError::other_version(ASK_FOR_RUN.1)),
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) struct MirroredTopic {
 
 impl Mirror<'_> {
     pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
-        let other_version = || LinkError::other_version(ASK_FOR_RUN.other);
+        let other_version = || LinkError::other_version(ASK_FOR_RUN.1);
         let topic = topic(&offered.name).ok_or_else(other_version)?;
         let from = match topic.name {
             Pose::TOPIC => self.next_pose,
