@@ -24,16 +24,8 @@ const BAND: RGBColor = RGBColor(205, 226, 243);
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
     let times_s = bands.chains.iter().flatten().map(|sample| sample.time_s);
     let last = times_s.reduce(f64::max).ok_or(PlotError::Empty)?;
-    let legend = [
-        Entry {
-            label: "estimate - ground truth",
-            symbol: Symbol::Line(line(ESTIMATE, 2.0)),
-        },
-        Entry {
-            label: "+-3 sigma",
-            symbol: Symbol::Area(BAND),
-        },
-    ];
+    let error = ("estimate - ground truth", Symbol::Line(line(ESTIMATE, 2.0)));
+    let legend = [error, ("+-3 sigma", Symbol::Area(BAND))];
     let title = "Error over time with 3-sigma bands";
     document(SIZE, |area| {
         header(area, title, &caption(bands), &legend)?;

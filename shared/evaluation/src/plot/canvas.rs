@@ -117,10 +117,8 @@ pub fn document(
     Ok(svg.replacen(&as_drawn, &as_shown, 1))
 }
 
-pub struct Entry<'a> {
-    pub label: &'a str,
-    pub symbol: Symbol,
-}
+/// An entry of a legend: its label and its symbol.
+pub type Entry<'a> = (&'a str, Symbol);
 
 pub enum Symbol {
     Line(ShapeStyle),
@@ -148,7 +146,7 @@ pub fn header(
     let width = f64::from(area.dim_in_pixel().0) / f64::from(UNITS_PER_PX);
     let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
     for entry in legend {
-        match entry.symbol {
+        match entry.1 {
             Symbol::Line(style) => {
                 area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style))
             }
@@ -159,7 +157,7 @@ pub fn header(
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;
-        write(entry.label, at(x + 33.0, 28.0), label.clone())?;
+        write(entry.0, at(x + 33.0, 28.0), label.clone())?;
         x += entry_width(entry);
     }
     Ok(())
@@ -179,7 +177,7 @@ pub fn number(value: &f64) -> String {
 /// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as
 /// high.
 fn entry_width(entry: &Entry<'_>) -> f64 {
-    33.0 + 7.6 * entry.label.len() as f64 + 14.0
+    33.0 + 7.6 * entry.0.len() as f64 + 14.0
 }
 
 pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {

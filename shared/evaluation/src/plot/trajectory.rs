@@ -108,18 +108,12 @@ impl Scene<'_> {
     }
 
     fn legend(&self) -> Vec<Entry<'_>> {
-        let entry = |label, style| Entry {
-            label,
-            symbol: Symbol::Line(style),
-        };
+        let entry = |label, style| (label, Symbol::Line(style));
         let truth = self.truth.iter();
         let truth = truth.map(|_| entry("ground truth", line(TRUTH, 4.0)));
         let paths = self.paths.iter().zip(colours());
         let paths = paths.map(|((name, _), colour)| entry(shortened(name), line(colour, 2.0)));
-        let start = Entry {
-            label: "start",
-            symbol: Symbol::Dot,
-        };
+        let start = ("start", Symbol::Dot);
         truth.chain(paths).chain([start]).collect()
     }
 }
