@@ -189,18 +189,11 @@ impl Summary {
         session: &Session<'_>,
         measured: Measured,
     ) -> Self {
-        let Measured {
-            counts,
-            course,
-            latency,
-            evaluation,
-            slam,
-            gnss,
-        } = measured;
         let has_ended = session.ending == Some(Ending::Complete)
             || session.ending.is_some() && configuration.is_radar();
-        let of_sensors = || sensors::problem(configuration, &counts, gnss.as_ref());
-        let problem = Problem::of(&configuration.data(), out, session, &counts)
+        let (counts, gnss) = (&measured.counts, measured.gnss.as_ref());
+        let of_sensors = || sensors::problem(configuration, counts, gnss);
+        let problem = Problem::of(&configuration.data(), out, session, counts)
             .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         let recovery = report.into_iter().flat_map(|report| &report.recovery);
@@ -217,19 +210,19 @@ impl Summary {
             mask: network(&configuration.odometry.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
-            course,
-            counts,
+            course: measured.course,
+            counts: measured.counts,
             wall_s,
-            scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
+            scans_per_s: measured.latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
             shared_memory: session.footprint.cloned(),
             restarts: report.map_or_else(Default::default, |it| it.restarts.clone()),
             recovery_ms: recovery.map(|time| time.as_secs_f64() * 1e3).collect(),
             swaps: report.map_or_else(Default::default, |it| it.swaps.clone()),
             stages: report.map_or_else(Default::default, |it| it.counters.clone()),
-            latency,
-            evaluation,
-            slam,
-            gnss,
+            latency: measured.latency,
+            evaluation: measured.evaluation,
+            slam: measured.slam,
+            gnss: measured.gnss,
         }
     }
 }
