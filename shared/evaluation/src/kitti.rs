@@ -49,23 +49,22 @@ pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
         errors.add(segment.length, segment_error(matched, segment));
     }
     let ([translation_percent, rotation_deg_per_100m], segments) = errors.mean()?;
+    let by_length = errors.means();
+    let by_length = by_length.map(
+        |(length_m, [translation, rotation], segments)| KittiLength {
+            length_m,
+            translation_percent: translation,
+            rotation_deg_per_100m: rotation,
+            segments,
+        },
+    );
     Some(Kitti {
         translation_percent,
         rotation_deg_per_100m,
         rotation_deg_per_km: 10.0 * rotation_deg_per_100m,
         segments,
         step,
-        by_length: errors
-            .means()
-            .map(
-                |(length_m, [translation_percent, rotation_deg_per_100m], segments)| KittiLength {
-                    length_m,
-                    translation_percent,
-                    rotation_deg_per_100m,
-                    segments,
-                },
-            )
-            .collect(),
+        by_length: by_length.collect(),
     })
 }
 

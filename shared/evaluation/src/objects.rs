@@ -240,9 +240,8 @@ impl Count {
             }
         }
         let free = |count: usize, of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<usize> {
-            (0..count)
-                .filter(|index| pairs.iter().all(|pair| of(pair) != *index))
-                .collect()
+            let is_free = |index: &usize| pairs.iter().all(|pair| of(pair) != *index);
+            (0..count).filter(is_free).collect()
         };
         let (rows, columns) = (free(truth.len(), &|p| p.0), free(tracked.len(), &|p| p.1));
         let costs = |t: &usize| columns.iter().map(|f| within(*t, *f)).collect();

@@ -69,12 +69,8 @@ impl<const N: usize> PerLength<N> {
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();
-        (count > 0).then(|| {
-            (
-                std::array::from_fn(|value| total(value) / count as f64),
-                count,
-            )
-        })
+        let mean = |value| total(value) / count as f64;
+        (count > 0).then(|| (std::array::from_fn(mean), count))
     }
 
     /// Returns length (m), mean and count for each length that has segments.
