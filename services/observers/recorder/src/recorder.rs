@@ -19,7 +19,7 @@ use gyre_stage::{
 
 use crate::{
     RecorderError,
-    begin::{Begun, begin},
+    begin::begin,
     health::health,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
@@ -85,20 +85,17 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let _log = launch::start_log(manifest, NAME)?;
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
-    let Begun {
-        head,
-        ledger,
-        earlier,
-    } = begin(options, manifest, &topics)?;
+    let begun = begin(options, manifest, &topics)?;
     let mut taps = Vec::new();
     for topic in &topics {
         // Recording begins with the first scan, which waits for the recorder.
-        let expected = earlier.as_ref();
+        let expected = begun.earlier.as_ref();
         let expected = expected.map(|it| it.get(topic).copied().unwrap_or_default());
         taps.extend(Tap::on(&run, topic, expected)?);
     }
     let (to, split) = (options.to.clone(), options.split);
-    let writer = SplitWriter::create(to, head, split, ledger, earlier.unwrap_or_default())?;
+    let earlier = begun.earlier.unwrap_or_default();
+    let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier)?;
     let path = writer.path().to_owned();
     if options.continues {
         run.is_ready(NAME, &signals)?;
@@ -141,10 +138,8 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, Recorder
         let topics = DEFAULT.into_iter().filter(has).chain([LOG, HEALTH]);
         return Ok(topics.map(str::to_owned).collect());
     }
-    match named
-        .iter()
-        .find(|name| *name != LOG && *name != HEALTH && topic(name).is_none())
-    {
+    let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();
+    match named.iter().find(is_other) {
         Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
         None => Ok(named.to_vec()),
     }
@@ -189,12 +184,10 @@ impl Recorder<'_> {
             tap.drain(&self.queue)?;
         }
         self.report_missed()?;
-        for line in self
-            .log
-            .iter_mut()
-            .flat_map(|log| log.lines(clock::since_1970_ns()))
-        {
-            self.queue.put(Entry::Log(line));
+        if let Some(log) = &mut self.log {
+            for line in log.lines(clock::since_1970_ns()) {
+                self.queue.put(Entry::Log(line));
+            }
         }
         for json in self.health.iter().flat_map(Receiver::try_iter) {
             self.queue.put(Entry::Health(json, clock::since_1970_ns()));

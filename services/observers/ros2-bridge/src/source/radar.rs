@@ -196,14 +196,11 @@ impl Radar {
             bins,
             "the driver publishes no configuration: it was found from azimuths"
         );
-        let azimuth_offset = 0;
-        self.configure(
-            DescribedRadar {
-                radar,
-                azimuth_offset,
-            },
-            room,
-        )
+        let described = DescribedRadar {
+            radar,
+            azimuth_offset: 0,
+        };
+        self.configure(described, room)
     }
 
     /// Returns how to wait for more. Silence is reported once.
