@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{
     common::{Ended, Run, Running, Server, odometry, python, recording},
-    reach::python_has,
+    reach::{only_if, python_has},
 };
 
 /// Bytes before the powers in each row of an image: the azimuth, its time and its flag.
@@ -95,9 +95,7 @@ fn places(csv: &str, columns: [&str; 3]) -> BTreeMap<String, [f64; 2]> {
 
 #[test]
 fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results() {
-    if !python_has("mcap_protobuf, websockets") {
-        return;
-    }
+    only_if!(python_has("mcap_protobuf, websockets"));
     let run = driving("1");
     let (running, server) = started(&run);
     let mut viewer = Command::new(python());

@@ -20,7 +20,7 @@ use crate::{
         send, undisturbed,
     },
     operate::commands::{ask, await_status, process},
-    reach::python_has,
+    reach::{only_if, python_has},
     restart::faults::configurations,
 };
 
@@ -389,9 +389,7 @@ print(json.dumps({'boxes': boxes, 'arrows': arrows}))
 
 #[test]
 fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
-    if !python_has("mcap_protobuf") {
-        return;
-    }
+    only_if!(python_has("mcap_protobuf"));
     let run = Run::small().data(around_a_block()).set(WINDOW);
     let run = recorded(&run.set("objects.kind=tracks").rate("20"));
     run.complete();

@@ -23,6 +23,16 @@ use std::process::Command;
 
 use crate::common::{Ended, Run, gyre, odometry};
 
+/// Ends a test that cannot run here.
+macro_rules! only_if {
+    ($can:expr) => {
+        if !$can {
+            return;
+        }
+    };
+}
+pub(crate) use only_if;
+
 /// Asserts that two odometries have the same motions, but for this distance.
 pub fn assert_near(own: &str, other: &str, limit_m: f64) {
     let places = |csv| odometry::columns(csv, &["x_m", "y_m"]).concat();

@@ -18,7 +18,7 @@ use crate::{
         processes::{child_with, of_run},
         send, undisturbed,
     },
-    reach::{assert_near, python_has, swap_masking},
+    reach::{assert_near, only_if, python_has, swap_masking},
 };
 
 /// A file with a function.
@@ -41,9 +41,7 @@ fn failing(stage: &str, file: &Path) -> Run {
 
 #[test]
 fn factors_of_one_change_no_byte() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     for shape in ["power", "raster"] {
         let text = format!("def mask(scan):\n    return scan.{shape} >= 0\n");
         let (_folder, file) = file(&text);
@@ -54,9 +52,7 @@ fn factors_of_one_change_no_byte() {
 
 #[test]
 fn factors_of_powers_are_a_threshold_where_they_are_one() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
     assert_ne!(threshold, undisturbed());
     // Powers above 90 stay unchanged, and all others are below the threshold of 60.
@@ -71,9 +67,7 @@ fn factors_of_powers_are_a_threshold_where_they_are_one() {
 
 #[test]
 fn a_mask_sees_the_scan_and_its_place() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (folder, file) = file(
         "import json, pathlib, numpy as np\n\
          def mask(scan):\n\
@@ -98,9 +92,7 @@ fn a_mask_sees_the_scan_and_its_place() {
 
 #[test]
 fn searches_return_the_motion_of_the_run() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = file(
         "def rotation(scan, previous):\n\
          \x20   assert scan.stamp_ns > previous.stamp_ns and scan.raster.shape == previous.raster.shape\n\
@@ -146,9 +138,7 @@ fn failing_mask() -> (TempDir, PathBuf) {
 
 #[test]
 fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = failing_mask();
     let run = failing("masking", &file);
     let place = format!("{}, line 3: KeyError: 'wall'", file.display());
@@ -164,9 +154,7 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
 
 #[test]
 fn what_cannot_be_loaded_or_returned_is_said() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     for row in [
         "masking | def mask(scan) | line 1: SyntaxError",
         "masking | masks = 1 | there is no function `mask`",
@@ -224,9 +212,7 @@ fn an_interpreter_that_is_none_is_tried_once() {
 
 #[test]
 fn killed_it_leaves_no_interpreter_and_no_other_byte() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
     let run = with(Run::of_recording(), "masking", &file).rate("6");
     let mut running = run.start();
@@ -245,9 +231,7 @@ fn killed_it_leaves_no_interpreter_and_no_other_byte() {
 
 #[test]
 fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let above = |power: u8| format!("def mask(scan):\n    return scan.power > {power}\n");
     let (text, other) = (above(0), above(100));
     let (_folder, file) = file(&text);
@@ -287,9 +271,7 @@ fn begun_searches_keep_the_contract_and_drive() {
 }
 
 fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     for (stage, function) in stages {
         let folder = folder();
         let mut new = gyre();
@@ -331,9 +313,7 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
 
 #[test]
 fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let run = Run::of_recording().rate("0.5");
     let mut running = run.start();
     let own = running.await_poses(4).await_stage("masking");
@@ -357,9 +337,7 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
 
 #[test]
 fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
-    if !python_has("numpy") {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let model = "shared/method/masking/tests/models/pair-127.toml";
     let model = Path::new(crate::PROJECT).join(model);
     let run = Run::of_recording().rate("1").masked_by(&model);

@@ -21,7 +21,7 @@ use serde_json::Value;
 use crate::{
     PROJECT,
     common::{Ended, Run, gyre, python, recording, undisturbed},
-    reach::{assert_near, python_has, swap_masking},
+    reach::{assert_near, only_if, python_has, swap_masking},
 };
 
 /// The Python and the script.
@@ -105,9 +105,7 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
 #[test]
 #[ignore = ".ci/nightly: starts Python often"]
 fn it_keeps_the_contract_of_masking() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     let mut command = gyre();
     let words =
         "conformance masking --scans 12 --set raster.n=63 --stop-timeout-s 30 --patience-s 60";
@@ -118,18 +116,14 @@ fn it_keeps_the_contract_of_masking() {
 
 #[test]
 fn its_motions_are_those_of_the_own_masking_to_a_centimetre() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     let python = with_python(Run::of_recording()).complete();
     assert_near(undisturbed(), &python, 0.01);
 }
 
 #[test]
 fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     // Twelve seconds: Python starts slowly where the machine is busy.
     let run = Run::of_recording().rate("0.5");
     let mut running = run.start();
@@ -147,9 +141,7 @@ fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
 
 #[test]
 fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     let run = Run::of_recording().rate("0.5");
     let run = run.set("masking.undo_doppler=true");
     let mut running = run.start();

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::{
     common::{Run, gyre, odometry, python},
-    reach::python_has,
+    reach::{only_if, python_has},
 };
 
 /// The variance of an unmeasured quantity.
@@ -158,9 +158,7 @@ pub(crate) fn transforms(messages: &[Value]) -> Vec<(i64, String, [f64; 4])> {
 
 #[test]
 fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     // The queue holds four seconds, should the bridge be late.
     let run = Run::of_recording().rate("1");
     let domain = domain(0);
@@ -200,9 +198,7 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
 /// where nothing was measured.
 #[test]
 fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predicted() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let settings = ["refinement.min_overlap=1", "refinement.firm_overlap=1"];
     let run = settings.into_iter().fold(Run::of_recording(), Run::set);
     let run = run.rate("1");

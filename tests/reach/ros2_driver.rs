@@ -14,7 +14,10 @@ use crate::{
         radar::{Radar, whole},
     },
     observers::record::recorded,
-    reach::ros2::{Program, can_speak, domain},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain},
+    },
 };
 
 /// The topic of a driver's azimuths.
@@ -78,9 +81,7 @@ fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
 }
 
 fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let scans = recording::SCANS / 2;
     let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
@@ -102,9 +103,7 @@ fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String)
 
 #[test]
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let domain = domain(3);
     let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, 6);
@@ -117,9 +116,7 @@ fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
 
 #[test]
 fn a_gyro_and_wheels_beside_the_driver_are_used() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let whole = with_log();
     let logs = ["imu.csv", "wheels.csv"].map(|log| whole.path().join(log));
     let domain = domain(9);
@@ -139,9 +136,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
 
 #[test]
 fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let drive = gnss::drive();
     let log = drive.path().join("fixes.csv");
     fs::write(&log, gnss::log_of_drive()).unwrap();

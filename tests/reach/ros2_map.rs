@@ -4,14 +4,15 @@ use serde_json::Value;
 
 use crate::{
     common::{Ended, Run, gyre, recording},
-    reach::ros2::{Program, can_speak, domain, number, received, transforms},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain, number, received, transforms},
+    },
 };
 
 #[test]
 fn a_run_with_slam_has_a_map_frame_and_a_map() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let data = recording::around_a_block();
     let run = Run::small().data(data).set("slam.kind=graph").rate("20");
     let domain = domain(1);

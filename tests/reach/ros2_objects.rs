@@ -6,7 +6,10 @@ use serde_json::Value;
 
 use crate::{
     common::{Run, odometry, recording},
-    reach::ros2::{Program, can_speak, domain, number, received, stamp_ns},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain, number, received, stamp_ns},
+    },
 };
 
 /// An object of a scan, by `objects.csv`.
@@ -59,9 +62,7 @@ fn assert_is(detection: &Value, row: &Row) {
 
 #[test]
 fn a_node_of_ros_receives_the_objects_of_each_scan_as_detections_and_markers() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let run = Run::small().data(recording::around_a_block());
     let run = run.set("objects.kind=tracks").rate("10");
     let domain = domain(10);
