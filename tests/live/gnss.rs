@@ -17,11 +17,11 @@ use super::{
 };
 use crate::{
     common::{
-        Ended, Run, gyre,
+        Run,
         recording::{self, around_a_block},
         send,
     },
-    observers::record::{file, recorded},
+    observers::record::{self, recorded},
     slam::gnss::{left, log, with_antenna},
 };
 
@@ -119,12 +119,7 @@ pub fn assert_replays(run: &Run) {
 
 /// The replay of a run's recording.
 fn replayed(run: &Run) -> Run {
-    let again = Run::configured("");
-    let mut replay = gyre();
-    replay.arg("run").arg("--data").arg(file(run));
-    replay.arg("--out").arg(again.out());
-    Ended::of(replay);
-    again
+    record::replayed(&record::file(run), &[]).0
 }
 
 #[test]

@@ -215,21 +215,18 @@ fn a_capture_of_a_radar_is_played_as_that_radar() {
     let whole = whole(scans);
     let radar = Radar::playing(whole.path(), &["--rate", "8"]);
     let file = whole.path().join("radar.capture");
-    let mut command = gyre();
-    command.args(["radar-server", "--radar", &radar.address, "--capture"]);
-    Ended::of({
+    let capture = |address: &str| {
+        let mut command = gyre();
+        command.args(["radar-server", "--radar", address, "--capture"]);
         command.arg(&file);
-        command
-    })
-    .succeeded();
+        Ended::of(command)
+    };
+    capture(&radar.address).succeeded();
     let played = Radar::playing(&file, &["--rate", "0.2"]);
     let live = played.run(scans).complete();
     assert_eq!(live, Run::small().data(whole.path()).complete());
     // It is not overwritten, and is no datagrams.
-    let mut again = gyre();
-    again.args(["radar-server", "--radar", &played.address, "--capture"]);
-    again.arg(&file);
-    Ended::of(again).failed_with(&["File exists"]);
+    capture(&played.address).failed_with(&["File exists"]);
     let mut datagrams = gyre();
     datagrams.args(["radar-server", "--udp", "239.192.43.9:4378", "--data"]);
     datagrams.arg(&file);

@@ -13,9 +13,9 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::{
-    common::{Run, Running, gyre, odometry, recording},
+    common::{Run, Running, odometry, recording},
     live::radar::{Played, Radar, group, run_at},
-    operate::commands::await_status,
+    operate::commands::{ask, await_status},
 };
 
 /// Ends a run of a radar that has ended, with a pose of each scan that it has published.
@@ -142,13 +142,8 @@ fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
     let mut running = run.start();
     running.await_stages();
     // It is not well until azimuths come.
-    let ps = || {
-        let mut ps = gyre();
-        ps.args(["ps", "--check", "--out"]).arg(run.out());
-        ps.output().unwrap()
-    };
     let deaf = "no azimuths arrive from the radar";
-    while !String::from_utf8_lossy(&ps().stderr).contains(deaf) {
+    while !ask(&run, &["ps", "--check"]).stderr.contains(deaf) {
         assert!(running.poses() == 0, "it was never said");
     }
     running.finish().succeeded();

@@ -46,12 +46,17 @@ pub fn recorded(run: &Run) -> Run {
 
 /// A replay with the configuration that is in the recording.
 pub fn replay(recording: &Path, arguments: &[&str]) -> String {
+    let (run, ended) = replayed(recording, arguments);
+    ended.succeeded();
+    run.odometry()
+}
+
+pub fn replayed(recording: &Path, arguments: &[&str]) -> (Run, Ended) {
     let run = Run::configured("");
     let mut command = gyre();
     command.arg("run").arg("--data").arg(recording);
     command.args(arguments).arg("--out").arg(run.out());
-    Ended::of(command).succeeded();
-    run.odometry()
+    (run, Ended::of(command))
 }
 
 pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {

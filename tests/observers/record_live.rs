@@ -10,8 +10,9 @@ use rustix::process::Signal;
 
 use super::record::{WINDOW, await_recorder, file, recorded, replay};
 use crate::{
-    common::{Ended, Run, gyre, recording, send},
+    common::{Run, recording, send},
     live::radar::Radar,
+    reach::swap_masking,
 };
 
 const SCANS: usize = 70;
@@ -164,9 +165,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
     let mut running = run.start();
     running.await_poses(8).kill("masking");
     running.await_poses(14);
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    Ended::of(swap).succeeded();
+    swap_masking(&run, &[]).succeeded();
     running.finish().succeeded();
     assert_lacks_little(&run);
 }

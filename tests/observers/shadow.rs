@@ -4,7 +4,7 @@
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
+    process::{Child, Stdio},
     sync::OnceLock,
     thread,
     time::{Duration, Instant},
@@ -17,6 +17,7 @@ use crate::{
     common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
+    operate::commands::ask,
     reach::conformance,
 };
 
@@ -306,9 +307,7 @@ fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
     refused(&run, &nowhere, &["cannot start joint-search", nowhere[2]]);
     let words = ["the run has no rotation-search", "joint-search"];
     refused(&run, &["rotation-search"], &words);
-    let mut down = gyre();
-    down.arg("down").arg(run.out());
-    Ended::of(down).succeeded();
+    ask(&run, &["down"]).succeeded();
 }
 
 #[test]
@@ -336,9 +335,7 @@ fn an_interrupted_shadow_reports_and_the_program_of_a_killed_one_ends() {
 }
 
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {
-    let mut command: Command = gyre();
-    command.arg("shadow").args(arguments).arg(run.out());
-    Ended::of(command).refused_with(words);
+    ask(run, &[&["shadow"], arguments].concat()).refused_with(words);
 }
 
 #[test]

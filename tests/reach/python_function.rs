@@ -18,6 +18,7 @@ use crate::{
         processes::{child_with, of_run},
         send, undisturbed,
     },
+    operate::commands::ask,
     reach::{assert_near, only_if, python_has, swap_masking},
 };
 
@@ -143,10 +144,7 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
     let run = failing("masking", &file);
     let place = format!("{}, line 3: KeyError: 'wall'", file.display());
     run.finish().failed_with(&["masking", &place]);
-    let mut logs = gyre();
-    logs.args(["logs", "masking"]).arg(run.out());
-    let output = logs.output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
+    let printed = ask(&run, &["logs", "masking"]).stdout;
     for words in ["Traceback", "in helper"] {
         assert!(printed.contains(words), "{printed}");
     }
