@@ -126,14 +126,9 @@ impl Config {
 
     fn __repr__(&self) -> String {
         let odometry = &self.method.odometry;
-        let format = self
-            .method
-            .dataset
-            .format
-            .map_or("any format", Format::name);
-        format!(
-            "<gyre.Config {format}, masking.kind={:?}, masking.threshold={}>",
-            odometry.masking.kind, odometry.masking.threshold
-        )
+        let (kind, threshold) = (odometry.masking.kind, odometry.masking.threshold);
+        let format = self.method.dataset.format;
+        let format = format.map_or("any format", Format::name);
+        format!("<gyre.Config {format}, masking.kind={kind:?}, masking.threshold={threshold}>")
     }
 }

@@ -36,12 +36,8 @@ pub fn open(
     let method = Config::method(config);
     let options = config.map(|_| method.dataset);
     let opened = py.detach(|| -> PyResult<Opened> {
-        let options = match options {
-            Some(options) => options,
-            None => {
-                radar_constants(&data, &DatasetOptions::default()).map_err(errors::automatic)?
-            }
-        };
+        let found = || radar_constants(&data, &DatasetOptions::default());
+        let options = options.map_or_else(found, Ok).map_err(errors::automatic)?;
         let mut scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
         let (gyro, wheels) = (&method.odometry.gyro, &method.odometry.wheels);
         let samples = ScanSamples::open(gyro, wheels, &data, scans.as_mut());
@@ -79,27 +75,19 @@ pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
 pub struct Dataset {
     data: PathBuf,
     config: Option<Py<Config>>,
+    /// The name of the format, as in `oxford`.
+    #[pyo3(get)]
     format: &'static str,
     len: usize,
+    /// The index of the first scan that can be read; not 0 in a recording of a run that was
+    /// resumed.
+    #[pyo3(get)]
     first: usize,
     dataset: Arc<Guarded<Opened>>,
 }
 
 #[pymethods]
 impl Dataset {
-    /// The name of the format, as in `oxford`.
-    #[getter]
-    fn format(&self) -> &'static str {
-        self.format
-    }
-
-    /// The index of the first scan that can be read; not 0 in a recording of a run that was
-    /// resumed.
-    #[getter]
-    fn first(&self) -> usize {
-        self.first
-    }
-
     /// The files of the scans, in order; of an MCAP recording its parts, of a bag of ROS 2 its
     /// files.
     #[getter]

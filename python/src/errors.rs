@@ -11,8 +11,7 @@ use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 
 /// Returns a function that makes exceptions of one type.
 macro_rules! exception {
-    ($(#[$doc:meta])* $name:ident, $class:literal) => {
-        $(#[$doc])*
+    ($name:ident, $class:literal) => {
         pub fn $name(reason: impl Display) -> PyErr {
             static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
             Python::attach(|py| match CLASS.import(py, "gyre.errors", $class) {
@@ -25,22 +24,10 @@ macro_rules! exception {
 
 exception!(other, "Error");
 exception!(config, "ConfigError");
-exception!(
-    /// A file that cannot be read.
-    read, "ReadError"
-);
-exception!(
-    /// A file that cannot be written.
-    write, "WriteError"
-);
-exception!(
-    /// A scan that cannot be used.
-    scan, "ScanError"
-);
-exception!(
-    /// Trajectories that cannot be compared or drawn.
-    trajectory, "TrajectoryError"
-);
+exception!(read, "ReadError");
+exception!(write, "WriteError");
+exception!(scan, "ScanError");
+exception!(trajectory, "TrajectoryError");
 
 /// A recording that cannot be opened, or options that it cannot have.
 pub fn open(error: OpenError) -> PyErr {
@@ -86,7 +73,6 @@ pub fn registration(error: OdometryError) -> PyErr {
     }
 }
 
-/// Warns that a scan of a recording is skipped.
 pub fn warn_of_skipped(py: Python<'_>, reason: impl Display) -> PyResult<()> {
     let class = py.import("gyre.errors")?.getattr("SkippedScanWarning")?;
     let sentence = CString::new(format!("skipped: {reason}").replace('\0', ""))?;

@@ -111,10 +111,7 @@ impl Evaluation {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "<gyre.Evaluation ate_m={:.3} over {:.1} m>",
-            self.ate_m(),
-            self.path_m()
-        )
+        let (ate_m, path_m) = (self.ate_m(), self.path_m());
+        format!("<gyre.Evaluation ate_m={ate_m:.3} over {path_m:.1} m>")
     }
 }

@@ -16,7 +16,6 @@ use crate::{
     scan::Scan,
 };
 
-/// The fields of a point.
 pub const FIELDS: [&str; 5] = ["x_m", "y_m", "time_s", "weight", "doppler_s"];
 
 /// Rasterises and masks scans, and extracts their sparse points.
@@ -64,7 +63,6 @@ pub fn points<'py>(
     fields.get_item(used)?.call_method1("view", (dtype,))
 }
 
-/// Returns the fields of points, one after the other.
 pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let py = points.py();
     let none = self::points(&PyArray1::from_vec(py, Vec::new()), 0)?;
@@ -76,15 +74,11 @@ pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'
             "points are expected as Odometry.points or Masked.points has them",
         ));
     }
-    let together = py
-        .import("numpy")?
-        .call_method1("ascontiguousarray", (points,))?;
+    let numpy = py.import("numpy")?;
+    let together = numpy.call_method1("ascontiguousarray", (points,))?;
     let fields = together.call_method1("view", (numpy::dtype::<f32>(py),))?;
-    readable(
-        &sliceable::<f32>(&fields)?,
-        "points",
-        "a structured array of points",
-    )
+    let fields = sliceable::<f32>(&fields)?;
+    readable(&fields, "points", "a structured array of points")
 }
 
 impl State {
@@ -101,9 +95,7 @@ impl State {
         scan.check()?;
         scan.check_times()?;
         let stamp_ns = scan.geometry.stamp_ns;
-        let follows = self
-            .last
-            .filter(|(_, last_ns)| continues(*last_ns, stamp_ns));
+        let follows = self.last.filter(|last| continues(last.1, stamp_ns));
         if follows.is_none() {
             self.finder.reset();
         }
@@ -118,10 +110,8 @@ impl State {
         let twist = self.masker.mask(&sweep, follows, raster, previous)?;
         self.last = Some((sweep.number, stamp_ns));
         let count = self.masker.points(&scan, twist, points)?;
-        Ok((
-            count,
-            self.masker.factors(0).map(|factors| factors.to_owned()),
-        ))
+        let factors = self.masker.factors(0);
+        Ok((count, factors.map(|factors| factors.to_owned())))
     }
 }
 
@@ -131,9 +121,8 @@ impl Masker {
     #[pyo3(signature = (config=None))]
     fn new(py: Python<'_>, config: Option<&Bound<'_, Config>>) -> PyResult<Self> {
         let config = Config::method(config).odometry;
-        let masker = py
-            .detach(|| gyre_masking::Masker::new(&config.raster, &config.points, &config.masking));
-        let masker = masker.map_err(errors::config)?;
+        let make = || gyre_masking::Masker::new(&config.raster, &config.points, &config.masking);
+        let masker = py.detach(make).map_err(errors::config)?;
         Ok(Self {
             n: config.raster.n,
             capacity: config.points.capacity,
@@ -179,10 +168,8 @@ impl Masker {
             let mut raster = raster.readwrite();
             let mut previous = previous.as_ref().map(|previous| previous.readwrite());
             let mut fields = fields.readwrite();
-            let (raster, previous) = (
-                raster.as_array_mut(),
-                previous.as_mut().map(|previous| previous.as_array_mut()),
-            );
+            let raster = raster.as_array_mut();
+            let previous = previous.as_mut().map(|previous| previous.as_array_mut());
             let points = bytemuck::cast_slice_mut(fields.as_slice_mut()?);
             let masked = self.masker.with(py, |state| {
                 state.mask(&scan, twist, raster, previous, points)

@@ -12,7 +12,6 @@ use pyo3::{
     types::{IntoPyDict, PyDict},
 };
 
-/// Returns an object as an array of elements `T` in `D` dimensions.
 pub fn given<'py, T: Element, D: Dimension>(
     array: &Bound<'py, PyAny>,
     name: &str,
@@ -21,11 +20,7 @@ pub fn given<'py, T: Element, D: Dimension>(
     let given = array.cast::<PyArray<T, D>>().cloned();
     given.map_err(|_| {
         let is = match array.cast::<PyUntypedArray>() {
-            Ok(array) => format!(
-                "an array of {} with shape {:?}",
-                array.dtype(),
-                array.shape()
-            ),
+            Ok(it) => format!("an array of {} with shape {:?}", it.dtype(), it.shape()),
             Err(_) => format!("of type {}", array.get_type()),
         };
         PyTypeError::new_err(format!("{name} is {is}, expected {expected}"))

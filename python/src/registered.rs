@@ -10,6 +10,8 @@ use crate::pose::Pose;
 #[pyclass(module = "gyre", frozen)]
 pub struct Registered {
     pub registered: gyre_odometry::Registered,
+    /// The time of the scan, ns.
+    #[pyo3(get)]
     pub stamp_ns: i64,
 }
 
@@ -19,12 +21,6 @@ impl Registered {
     #[getter]
     fn seq(&self) -> u64 {
         self.registered.seq
-    }
-
-    /// The time of the scan, ns.
-    #[getter]
-    fn stamp_ns(&self) -> i64 {
-        self.stamp_ns
     }
 
     /// The origin of the motion: `start` (none: the chain starts here), `searched`, `refined`,

@@ -50,10 +50,22 @@ pub struct Scan {
     geometry: SweepGeometry,
     /// The memory of all bytes; `power` is a view of it.
     bytes: Py<PyAny>,
+    /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata
+    /// that a file has before each row. Changes in it affect the registration.
+    #[pyo3(get)]
     power: Py<PyAny>,
+    /// The angle of each azimuth from straight ahead, float32 (azimuths,), rad, in the sense of
+    /// rotation.
+    #[pyo3(get)]
     azimuth_rad: Py<PyAny>,
+    /// The time of each azimuth, int64 (azimuths,), ns.
+    #[pyo3(get)]
     azimuth_stamp_ns: Py<PyAny>,
+    /// Flags of each azimuth, uint8 (azimuths,): 1 measured, 2 rising chirp, 4 the chirp is known.
+    #[pyo3(get)]
     azimuth_flags: Py<PyAny>,
+    /// The index in the dataset; None for a scan of arrays.
+    #[pyo3(get)]
     index: Option<usize>,
     /// Of a gyro and of wheels, since a turn before the sweep.
     samples: Vec<Sample>,
@@ -87,13 +99,11 @@ impl Scan {
             Err(error) => return Ok(Err(error)),
         };
         let first = |array: Bound<'_, PyAny>| -> PyResult<Py<PyAny>> {
-            match array.len()? == geometry.azimuths {
-                true => Ok(array.unbind()),
-                false => {
-                    let part = PySlice::new(py, 0, geometry.azimuths as isize, 1);
-                    Ok(array.get_item(part)?.unbind())
-                }
+            if array.len()? == geometry.azimuths {
+                return Ok(array.unbind());
             }
+            let part = PySlice::new(py, 0, geometry.azimuths as isize, 1);
+            Ok(array.get_item(part)?.unbind())
         };
         Ok(Ok(Self {
             geometry,
@@ -112,7 +122,6 @@ impl Scan {
         &self.samples
     }
 
-    /// Borrows the memory, for [`Borrowed::view`].
     pub fn borrowed<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
         Ok(Borrowed {
             geometry: self.geometry,
@@ -127,12 +136,12 @@ impl Scan {
     fn check(&self, py: Python<'_>) -> PyResult<()> {
         let borrowed = self.borrowed(py)?;
         let scan = borrowed.view()?;
+        let azimuths = self.geometry.azimuths;
         for (name, len) in [
             ("azimuth_rad", scan.azimuth_rad.len()),
             ("azimuth_stamp_ns", scan.stamp_ns.len()),
             ("azimuth_flags", scan.flags.len()),
         ] {
-            let azimuths = self.geometry.azimuths;
             if len != azimuths {
                 return Err(errors::scan(format!(
                     "{name} has {len} elements, but power has {azimuths} azimuths"
@@ -144,7 +153,6 @@ impl Scan {
     }
 }
 
-/// The memory of a scan, borrowed from numpy.
 pub struct Borrowed<'py> {
     geometry: SweepGeometry,
     bytes: PyReadonlyArrayDyn<'py, u8>,
@@ -166,7 +174,6 @@ impl Borrowed<'_> {
     }
 }
 
-/// Returns the powers in the bytes of a scan: a view, whose bounds numpy checks.
 fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<Bound<'py, PyAny>> {
     let py = bytes.py();
     let keywords = PyDict::new(py);
@@ -191,19 +198,16 @@ fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<
     Ok(stamps.collect())
 }
 
-/// Times, ns, and values, as a keyword of this name has them.
-type Pairs = (&'static str, Vec<(i64, f64)>);
+/// Times, ns, and values.
+type Pairs = Vec<(i64, f64)>;
 
-/// Returns the samples of a gyro and of wheels.
-fn samples((gyro, rates): Pairs, (wheels, speeds): Pairs) -> PyResult<Vec<Sample>> {
-    let rates = rates
-        .into_iter()
-        .map(|(ns, radps)| Sample::yaw_rate(ns, radps));
-    let speeds = speeds.into_iter().map(|(ns, mps)| Sample::speed(ns, mps));
+fn samples(rates: Pairs, speeds: Pairs) -> PyResult<Vec<Sample>> {
+    let rates = rates.into_iter().map(|(ns, of)| Sample::yaw_rate(ns, of));
+    let speeds = speeds.into_iter().map(|(ns, of)| Sample::speed(ns, of));
     let expected = format!("rates are at most {MAX_RATE_RADPS} rad/s");
-    let mut samples = checked(gyro, rates.collect(), &expected)?;
+    let mut samples = checked("gyro", rates.collect(), &expected)?;
     let expected = format!("speeds are at most {MAX_SPEED_MPS} m/s");
-    samples.extend(checked(wheels, speeds.collect(), &expected)?);
+    samples.extend(checked("wheels", speeds.collect(), &expected)?);
     samples.sort_by_key(Sample::order);
     Ok(samples)
 }
@@ -221,7 +225,6 @@ fn checked(name: &str, samples: Vec<Sample>, expected: &str) -> PyResult<Vec<Sam
     }
 }
 
-/// The pairs of samples of a kind: times, ns, and one of their values.
 fn pairs(samples: &[Sample], kind: SampleKind, value: usize) -> Vec<(i64, f64)> {
     let of_kind = samples.iter().filter(|sample| sample.is(kind));
     let pair = |sample: &Sample| (sample.stamp_ns, sample.values[value]);
@@ -230,9 +233,8 @@ fn pairs(samples: &[Sample], kind: SampleKind, value: usize) -> Vec<(i64, f64)> 
 
 fn even_angles_rad(azimuths: usize) -> Vec<f32> {
     let step = std::f64::consts::TAU / azimuths as f64;
-    (0..azimuths)
-        .map(|azimuth| (azimuth as f64 * step) as f32)
-        .collect()
+    let angle = |azimuth| (azimuth as f64 * step) as f32;
+    (0..azimuths).map(angle).collect()
 }
 
 #[pymethods]
@@ -308,39 +310,10 @@ impl Scan {
             azimuth_stamp_ns: stamps.into_any().unbind(),
             azimuth_flags: flags.into_any().unbind(),
             index: None,
-            samples: samples(
-                ("gyro", gyro.unwrap_or_default()),
-                ("wheels", wheels.unwrap_or_default()),
-            )?,
+            samples: samples(gyro.unwrap_or_default(), wheels.unwrap_or_default())?,
         };
         scan.check(py)?;
         Ok(scan)
-    }
-
-    /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata
-    /// that a file has before each row. Changes in it affect the registration.
-    #[getter]
-    fn power(&self, py: Python<'_>) -> Py<PyAny> {
-        self.power.clone_ref(py)
-    }
-
-    /// The angle of each azimuth from straight ahead, float32 (azimuths,), rad, in the sense of
-    /// rotation.
-    #[getter]
-    fn azimuth_rad(&self, py: Python<'_>) -> Py<PyAny> {
-        self.azimuth_rad.clone_ref(py)
-    }
-
-    /// The time of each azimuth, int64 (azimuths,), ns.
-    #[getter]
-    fn azimuth_stamp_ns(&self, py: Python<'_>) -> Py<PyAny> {
-        self.azimuth_stamp_ns.clone_ref(py)
-    }
-
-    /// Flags of each azimuth, uint8 (azimuths,): 1 measured, 2 rising chirp, 4 the chirp is known.
-    #[getter]
-    fn azimuth_flags(&self, py: Python<'_>) -> Py<PyAny> {
-        self.azimuth_flags.clone_ref(py)
     }
 
     /// The time of the scan, ns: the middle of the sweep.
@@ -387,20 +360,10 @@ impl Scan {
         pairs(&self.samples, SampleKind::Wheels, 0)
     }
 
-    /// The index in the dataset; None for a scan of arrays.
-    #[getter]
-    fn index(&self) -> Option<usize> {
-        self.index
-    }
-
     fn __repr__(&self) -> String {
-        let SweepGeometry {
-            azimuths,
-            bins,
-            range_resolution_m,
-            stamp_ns,
-            ..
-        } = self.geometry;
-        format!("<gyre.Scan {azimuths} x {bins} at {range_resolution_m} m, stamp_ns={stamp_ns}>")
+        let of = &self.geometry;
+        let (azimuths, bins, stamp_ns) = (of.azimuths, of.bins, of.stamp_ns);
+        let resolution_m = of.range_resolution_m;
+        format!("<gyre.Scan {azimuths} x {bins} at {resolution_m} m, stamp_ns={stamp_ns}>")
     }
 }

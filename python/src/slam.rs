@@ -3,10 +3,10 @@
 use std::convert::Infallible;
 
 use gyre_estimation::EstimationError;
-use gyre_geometry::{Pose, SparsePoint};
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion};
 use gyre_slam::{
-    ClosingError, JudgedLoop, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser,
-    SUBMAP_REACH_M, ScanPose, TrajectoryEstimator,
+    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, SUBMAP_REACH_M, ScanPose,
+    TrajectoryEstimator,
 };
 use pyo3::prelude::*;
 use thiserror::Error;
@@ -33,8 +33,19 @@ pub struct Slam {
 /// Two scans of the same place.
 #[pyclass(module = "gyre", frozen)]
 pub struct Loop {
-    ends: [u64; 2],
-    judged: JudgedLoop,
+    /// The earlier scan, counted from 0.
+    #[pyo3(get)]
+    earlier: u64,
+    /// The later scan, counted from 0.
+    #[pyo3(get)]
+    later: u64,
+    motion: UncertainMotion,
+    /// `used`, `contradicts odometry`, `contradicts loops` or `redundant`.
+    #[pyo3(get)]
+    verdict: String,
+    /// The weight in the graph, 0 to 1; 0 if the loop is not used.
+    #[pyo3(get)]
+    weight: f64,
 }
 
 struct State {
@@ -89,10 +100,8 @@ impl State {
             motion: registered.motion,
             interval_s: registered.interval_ns as f64 * 1e-9,
         });
-        self.odometry
-            .stamp_ns
-            .get_or_insert_default()
-            .push(stamp_ns);
+        let stamps = self.odometry.stamp_ns.get_or_insert_default();
+        stamps.push(stamp_ns);
         self.odometry.poses.push(registered.pose.motion);
         let Some(mut keyframe) = keyframe else {
             return Ok(false);
@@ -135,8 +144,11 @@ impl State {
         self.solve()?;
         let seq = |keyframe: usize| self.keyframes.0[keyframe].seq;
         let judged = self.estimator.loops().iter().map(|judged| Loop {
-            ends: [judged.constraint.from, judged.constraint.to].map(seq),
-            judged: *judged,
+            earlier: seq(judged.constraint.from),
+            later: seq(judged.constraint.to),
+            motion: judged.constraint.motion,
+            verdict: judged.verdict.to_string(),
+            weight: judged.weight,
         });
         Ok(judged.collect())
     }
@@ -145,9 +157,8 @@ impl State {
         self.solve()?;
         let correction = self.estimator.correction();
         let poses = (0..).zip(&self.odometry.poses);
-        let poses: Vec<Pose> = poses
-            .map(|(seq, pose)| correction.correct(seq, pose))
-            .collect();
+        let poses = poses.map(|(seq, pose)| correction.correct(seq, pose));
+        let poses: Vec<Pose> = poses.collect();
         let stamp_ns = self.odometry.stamp_ns.clone();
         Ok(gyre_radar::Trajectory { stamp_ns, poses })
     }
@@ -237,38 +248,14 @@ impl Slam {
 
 #[pymethods]
 impl Loop {
-    /// The earlier scan, counted from 0.
-    #[getter]
-    fn earlier(&self) -> u64 {
-        self.ends[0]
-    }
-
-    /// The later scan, counted from 0.
-    #[getter]
-    fn later(&self) -> u64 {
-        self.ends[1]
+    fn __repr__(&self) -> String {
+        let (earlier, later, verdict) = (self.earlier, self.later, &self.verdict);
+        format!("<gyre.Loop {earlier} to {later}, {verdict}>")
     }
 
     /// The pose of the later scan in the frame of the earlier one.
     #[getter]
     fn motion(&self) -> pose::Pose {
-        pose::Pose(self.judged.constraint.motion)
-    }
-
-    /// `used`, `contradicts odometry`, `contradicts loops` or `redundant`.
-    #[getter]
-    fn verdict(&self) -> String {
-        self.judged.verdict.to_string()
-    }
-
-    /// The weight in the graph, 0 to 1; 0 if the loop is not used.
-    #[getter]
-    fn weight(&self) -> f64 {
-        self.judged.weight
-    }
-
-    fn __repr__(&self) -> String {
-        let ([earlier, later], verdict) = (self.ends, self.judged.verdict);
-        format!("<gyre.Loop {earlier} to {later}, {verdict}>")
+        pose::Pose(self.motion)
     }
 }

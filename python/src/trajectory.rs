@@ -34,7 +34,6 @@ impl Trajectory {
     }
 }
 
-/// Returns poses of an array, or of a sequence of `Pose`.
 fn poses(given_poses: &Bound<'_, PyAny>) -> PyResult<Vec<Pose>> {
     const EXPECTED: &str = "float64 with shape (poses, 3), or a sequence of gyre.Pose";
     if let Ok(poses) = given_poses.extract::<Vec<Bound<'_, pose::Pose>>>() {
@@ -142,10 +141,7 @@ impl Trajectory {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "<gyre.Trajectory {} poses, {:.1} m>",
-            self.0.len(),
-            self.path_m()
-        )
+        let (poses, path_m) = (self.0.len(), self.path_m());
+        format!("<gyre.Trajectory {poses} poses, {path_m:.1} m>")
     }
 }

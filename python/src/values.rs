@@ -15,7 +15,6 @@ use crate::errors;
 /// Maximum depth of nested sections; a deeper value contains itself.
 const MAX_DEPTH: usize = 8;
 
-/// Returns a mapping of sections as TOML.
 pub fn table(sections: &Bound<'_, PyMapping>) -> PyResult<Table> {
     table_within(sections, MAX_DEPTH)
 }
@@ -79,9 +78,8 @@ fn value_within(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<V
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
         let items = value.try_iter()?;
-        let items: PyResult<Vec<Value>> = items
-            .map(|item| value_within(key, &item?, within))
-            .collect();
+        let items = items.map(|item| value_within(key, &item?, within));
+        let items: PyResult<Vec<Value>> = items.collect();
         return Ok(Value::Array(items?));
     }
     // Numbers of numpy do not belong to Python's classes.

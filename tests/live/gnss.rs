@@ -11,14 +11,17 @@ use gyre_messages::FollowerId;
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-use super::{gyro::address, radar::Radar};
+use super::{
+    gyro::address,
+    radar::{Radar, complete},
+};
 use crate::{
     common::{
-        Ended, Run, gyre,
+        Run,
         recording::{self, around_a_block},
         send,
     },
-    observers::record::{file, recorded},
+    observers::record::{self, recorded},
     slam::gnss::{left, log, with_antenna},
 };
 
@@ -29,11 +32,7 @@ pub const FIXES: usize = 58;
 /// The beginning of the drive around a block. All its rows are measured, because a radar sends no
 /// others.
 pub fn drive() -> TempDir {
-    let drive = recording::linked(around_a_block(), |scan| scan < SCANS);
-    for image in recording::images(drive.path()) {
-        recording::complete(&image);
-    }
-    drive
+    complete(recording::linked(around_a_block(), |scan| scan < SCANS))
 }
 
 /// A run of a live radar and a receiver that sends to this address.
@@ -50,10 +49,8 @@ pub fn with_graph(run: Run, address: &str) -> Run {
 /// The messages that the receiver sends during the drive.
 pub fn log_of_drive() -> String {
     let text = log(0.0);
-    text.lines()
-        .take(1 + FIXES)
-        .map(|line| format!("{line}\n"))
-        .collect()
+    let lines = text.lines().take(1 + FIXES);
+    lines.map(|line| format!("{line}\n")).collect()
 }
 
 /// The log of a run's fixes.
@@ -122,12 +119,7 @@ pub fn assert_replays(run: &Run) {
 
 /// The replay of a run's recording.
 fn replayed(run: &Run) -> Run {
-    let again = Run::configured("");
-    let mut replay = gyre();
-    replay.arg("run").arg(file(run));
-    replay.arg("--out").arg(again.out());
-    Ended::of(replay);
-    again
+    record::replayed(&record::file(run), &[]).0
 }
 
 #[test]

@@ -12,7 +12,7 @@ use std::{
 use gyre_simulator::{GyroProfile, SimulationConfig};
 use tempfile::TempDir;
 
-use super::radar::Radar;
+use super::radar::{Radar, complete};
 use crate::{
     common::{Run, recording},
     observers::record::{file, recorded, replay},
@@ -28,11 +28,7 @@ pub fn with_log() -> TempDir {
     config.gyro.profile = GyroProfile::Asm330lhh;
     config.wheels.rate_hz = 20.0;
     let drive = recording::of("live-gyro", &config);
-    let whole = recording::linked(&drive, |_| true);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
-    whole
+    complete(recording::linked(&drive, |_| true))
 }
 
 /// A sensor that sends a log once somebody receives it, in datagrams of ten samples.
@@ -58,10 +54,8 @@ fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
 
 /// Returns an address that stays free: senders take their ports on 127.0.0.1.
 pub fn address(test: u32) -> String {
-    format!(
-        "127.0.0.2:{}",
-        40_000 + test * 3_500 + process::id() % 3_500
-    )
+    let port = 40_000 + test * 3_500 + process::id() % 3_500;
+    format!("127.0.0.2:{port}")
 }
 
 fn recorded_with_logs(recording: &Path) -> String {
@@ -101,10 +95,8 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
 fn a_live_gyro_that_is_silent_leaves_the_radar_alone() {
     let whole = with_log();
     let radar = Radar::playing(whole.path(), &[]);
-    let run = radar
-        .run(SCANS)
-        .set("gyro.kind=udp")
-        .set(&format!("gyro.listen='{}'", address(1)));
+    let run = radar.run(SCANS).set("gyro.kind=udp");
+    let run = run.set(&format!("gyro.listen='{}'", address(1)));
     run.finish().failed_with(&["gyro.kind is set, but none of"]);
     let live = run.odometry();
     assert!(live == Run::small().data(whole.path()).complete(), "{live}");

@@ -17,10 +17,8 @@ const RATE: &str = "4";
 const SLOW_MASKING_MS: u64 = 94;
 
 fn live() -> Run {
-    Run::of_recording()
-        .rate(RATE)
-        .set("run.mode=live")
-        .set(&format!("stages.masking.delay_ms={SLOW_MASKING_MS}"))
+    let run = Run::of_recording().rate(RATE).set("run.mode=live");
+    run.set(&format!("stages.masking.delay_ms={SLOW_MASKING_MS}"))
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
@@ -32,15 +30,8 @@ fn assert_exact(summary: &Value, rows: &[ChainRow]) {
     let chains = count("breaks") + 1;
     assert_eq!(count("processed"), rows.len() as u64 + chains, "{summary}");
     assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert!(
-        count("dropped") > 0,
-        "masking is too slow for every scan: {summary}"
-    );
-    assert_eq!(
-        rows.last().unwrap().scan,
-        recording::SCANS as u64 - 1,
-        "the last scan is nobody's to drop"
-    );
+    assert!(count("dropped") > 0);
+    assert_eq!(rows.last().unwrap().scan, recording::SCANS as u64 - 1);
 }
 
 /// Scans that the chain stepped over.
@@ -60,14 +51,9 @@ fn slow_masking_drops_scans_and_the_chain_does_not_break() {
     odometry::assert_unbroken(&rows);
     assert_eq!(summary["breaks"], 0);
     assert_eq!(summary["dropped"], stepped_over(&rows));
-    assert_eq!(
-        summary["stages"]["radar-replay"]["processed"],
-        summary["published"]
-    );
-    assert_eq!(
-        summary["stages"]["masking"]["processed"],
-        summary["processed"]
-    );
+    let stages = &summary["stages"];
+    assert_eq!(stages["radar-replay"]["processed"], summary["published"]);
+    assert_eq!(stages["masking"]["processed"], summary["processed"]);
 }
 
 /// Behind masking nothing is dropped, so that the chain does not break there. A source that stops
@@ -116,38 +102,10 @@ fn any_process_can_die_and_every_scan_is_accounted_for() {
 
 #[test]
 fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
-    let run = Run::of_recording()
-        .rate("1.5")
-        .set("run.mode=live")
-        .set("source.scans=12");
+    let run = Run::of_recording().rate("1.5").set("run.mode=live");
+    let run = run.set("source.scans=12");
     let lossless = Run::of_recording().set("source.scans=12").complete();
     let live = run.complete();
     assert_eq!(run.summary()["dropped"], 0);
     assert_eq!(live, lossless);
-}
-
-#[test]
-fn a_recording_that_repeats_goes_on_in_numbers_and_times() {
-    let scans = 2 * recording::SCANS + 3;
-    let run = Run::of_recording()
-        .set("source.repeat=true")
-        .set(&format!("source.scans={scans}"));
-    let rows = odometry::rows(&run.complete());
-    odometry::assert_unbroken(&rows);
-    assert_eq!(rows.len(), scans - 1);
-    assert_eq!(run.summary()["published"], scans as u64);
-    assert_eq!(run.summary()["missing"], 0);
-}
-
-#[test]
-fn scans_of_a_burst_become_due_at_once() {
-    let run = Run::of_recording()
-        .rate(RATE)
-        .set("source.burst=4")
-        .set("run.window=8");
-    run.complete();
-    // The first three scans wait for the fourth, at a rate that the pipeline sustains otherwise.
-    let latency = run.summary()["latency"]["sensor_to_pose"]["p50_us"].clone();
-    assert!(latency.as_f64() > Some(0.0), "{latency}");
-    assert_eq!(run.summary()["published"], recording::SCANS as u64);
 }

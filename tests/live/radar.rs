@@ -12,6 +12,7 @@ use std::{
 };
 
 use rustix::process::Signal;
+use tempfile::TempDir;
 
 use crate::{
     common::{Ended, Run, gyre, odometry, recording},
@@ -45,11 +46,8 @@ impl Radar {
             command.args(["--rate", RATE]);
         }
         command.arg(recording).args(arguments);
-        let mut server = command
-            .stderr(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        command.stderr(Stdio::piped()).stdout(Stdio::piped());
+        let mut server = command.spawn().unwrap();
         let mut said = String::new();
         let mut words = BufReader::new(server.stderr.take().unwrap());
         words.read_line(&mut said).unwrap();
@@ -108,6 +106,19 @@ pub(crate) fn run_at(address: &str) -> Run {
         .set("source.silence_s=1")
 }
 
+/// A copy of so many scans of the small recording. All its rows are measured, because a radar sends
+/// no others.
+pub(crate) fn whole(scans: usize) -> TempDir {
+    complete(recording::copy(scans))
+}
+
+/// Makes all rows of a recording measured ones.
+pub(crate) fn complete(drive: TempDir) -> TempDir {
+    let images = recording::images(drive.path());
+    images.iter().for_each(|image| recording::complete(image));
+    drive
+}
+
 impl Drop for Radar {
     fn drop(&mut self) {
         let _ = self.server.kill();
@@ -118,10 +129,7 @@ impl Drop for Radar {
 #[test]
 fn a_radar_gives_the_motions_of_its_recording() {
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
     for clock in [&[][..], &["--big-endian"]] {
         let radar = Radar::playing(whole.path(), clock);
@@ -148,10 +156,7 @@ fn motions(odometry: &str) -> Vec<&str> {
 
 #[test]
 fn datagrams_give_the_motions_of_the_recording() {
-    let whole = recording::copy(recording::SCANS);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(recording::SCANS);
     let scans = recording::SCANS / 2;
     let arguments = ["--double", "0.05", "--repeat"];
     let radar = Radar::sending(&group(1), whole.path(), &arguments);
@@ -167,46 +172,17 @@ fn datagrams_give_the_motions_of_the_recording() {
     let begun = &stamps(&live)[0][0];
     let all = stamps(&all);
     let first = &all.iter().find(|row| row[0] == *begun).unwrap()[1];
-    let recorded = Run::small()
-        .data(whole.path())
-        .set(&format!("source.first={first}"))
-        .set(&format!("source.scans={scans}"));
+    let recorded = Run::small().data(whole.path());
+    let recorded = recorded.set(&format!("source.first={first}"));
+    let recorded = recorded.set(&format!("source.scans={scans}"));
     assert_eq!(motions(&live), motions(&recorded.complete()));
-}
-
-#[test]
-fn lost_doubled_and_swapped_datagrams_are_lost_azimuths_at_most() {
-    let faults = [
-        "--lose",
-        "0.005",
-        "--double",
-        "0.01",
-        "--swap",
-        "0.01",
-        "--garbage-every",
-        "5",
-        "--repeat",
-    ];
-    let radar = Radar::sending(&group(2), recording::small(), &faults);
-    let run = radar.received(20);
-    run.complete();
-    let summary = run.summary();
-    let source = &summary["stages"]["radar-replay"];
-    let count = |key: &str| source[key].as_u64().unwrap();
-    // A two-hundredth of the parts of 20 x 400 azimuths, and those parts that came after the next
-    // azimuth.
-    assert!((20..1000).contains(&count("missing_azimuths")), "{source}");
-    assert!((2..10).contains(&count("damaged_messages")), "{source}");
-    assert_eq!(count("reconnections"), 0, "{source}");
-    assert_eq!(summary["published"], 20);
 }
 
 #[test]
 fn datagrams_without_scans_are_named_in_a_sentence() {
     let to = group(3);
-    let run = Run::small()
-        .option(&format!("udp://{to}"))
-        .set("source.interface='127.0.0.1'");
+    let run = Run::small().option(&format!("udp://{to}"));
+    let run = run.set("source.interface='127.0.0.1'");
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
     let (stop, stopped) = mpsc::channel::<()>();
     let sending = thread::spawn(move || {
@@ -236,27 +212,21 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
 #[test]
 fn a_capture_of_a_radar_is_played_as_that_radar() {
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let radar = Radar::playing(whole.path(), &["--rate", "8"]);
     let file = whole.path().join("radar.capture");
-    let mut command = gyre();
-    command.args(["radar-server", "--radar", &radar.address, "--capture"]);
-    Ended::of({
+    let capture = |address: &str| {
+        let mut command = gyre();
+        command.args(["radar-server", "--radar", address, "--capture"]);
         command.arg(&file);
-        command
-    })
-    .succeeded();
+        Ended::of(command)
+    };
+    capture(&radar.address).succeeded();
     let played = Radar::playing(&file, &["--rate", "0.2"]);
     let live = played.run(scans).complete();
     assert_eq!(live, Run::small().data(whole.path()).complete());
     // It is not overwritten, and is no datagrams.
-    let mut again = gyre();
-    again.args(["radar-server", "--radar", &played.address, "--capture"]);
-    again.arg(&file);
-    Ended::of(again).failed_with(&["File exists"]);
+    capture(&played.address).failed_with(&["File exists"]);
     let mut datagrams = gyre();
     datagrams.args(["radar-server", "--udp", "239.192.43.9:4378"]);
     datagrams.arg(&file);

@@ -3,10 +3,9 @@
 
 use std::{
     io::{self, Read, Write},
-    net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream, UdpSocket},
-    ops::Range,
+    net::{TcpListener, TcpStream, UdpSocket},
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
@@ -14,9 +13,9 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::{
-    common::{Run, Running, gyre, odometry, processes, recording},
+    common::{Run, Running, odometry, recording},
     live::radar::{Played, Radar, group, run_at},
-    operate::commands::await_status,
+    operate::commands::{ask, await_status},
 };
 
 /// Ends a run of a radar that has ended, with a pose of each scan that it has published.
@@ -59,16 +58,8 @@ fn assert_all_counted(summary: &Value, played: &Played) {
 
 #[test]
 fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_dies() {
-    let faults = [
-        "--lose",
-        "0.01",
-        "--reset-every",
-        "5",
-        "--garbage-every",
-        "4",
-        "--rate",
-        "1",
-    ];
+    let faults = "--lose 0.01 --reset-every 5 --garbage-every 4 --rate 1";
+    let faults: Vec<&str> = faults.split(' ').collect();
     let mut radar = Radar::playing(recording::small(), &faults);
     let run = run_at(&radar.address);
     let mut running = run.start();
@@ -84,86 +75,11 @@ fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_d
     odometry::assert_unbroken(&odometry::rows(&run.odometry()));
 }
 
-#[test]
-fn a_source_that_stands_still_does_not_hide_its_delay() {
-    let mut radar = Radar::playing(recording::small(), &["--lose", "0.01", "--rate", "1"]);
-    let run = run_at(&radar.address);
-    let mut running = run.start();
-    let source = running.await_poses(6).await_stage("radar-replay");
-    processes::send(source, Signal::STOP);
-    thread::sleep(Duration::from_millis(1500));
-    processes::send(source, Signal::CONT);
-    let played = radar.played();
-    let summary = interrupt(&run, running);
-    assert_all_counted(&summary, &played);
-    let longest_us = summary["latency"]["sensor_to_pose"]["max_us"].as_f64();
-    // The first scan that it read was complete a turn after it was stopped, at the latest.
-    assert!(longest_us.unwrap() > 1e6, "{}", summary["latency"]);
-}
-
-/// Relays datagrams from one group to another, except datagrams within a time after the first
-/// azimuth.
-fn relay_with_outage(from: &str, to: String, outage: Range<Duration>) {
-    let group = from.parse::<SocketAddrV4>().unwrap();
-    let receiver = UdpSocket::bind(group).unwrap();
-    receiver
-        .join_multicast_v4(group.ip(), &Ipv4Addr::LOCALHOST)
-        .unwrap();
-    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    // It ends with the process of the tests.
-    thread::spawn(move || {
-        let (mut datagram, mut begun) = ([0; 1 << 16], None);
-        loop {
-            let count = receiver.recv(&mut datagram).unwrap();
-            // A description has no powers.
-            if count > 200 {
-                begun.get_or_insert_with(Instant::now);
-            }
-            let is_lost = begun.is_some_and(|it: Instant| outage.contains(&it.elapsed()));
-            if !is_lost {
-                sender.send_to(&datagram[..count], &to).unwrap();
-            }
-        }
-    });
-}
-
-#[test]
-fn scans_of_which_no_datagram_arrives_are_counted() {
-    let outage = Duration::from_secs(2)..Duration::from_millis(4500);
-    relay_with_outage(&group(4), group(6), outage);
-    let mut radar = Radar::sending(&group(4), recording::small(), &["--rate", "1"]);
-    let run = run_at(&format!("udp://{}", group(6)))
-        .set("source.interface='127.0.0.1'")
-        .set("source.silence_s=10");
-    let running = run.start();
-    let mut played = radar.played();
-    let summary = interrupt(&run, running);
-    // On a busy machine the radar may have begun before the run.
-    let begun = odometry::columns(&run.odometry(), &["stamp_ns"])[0][0].clone();
-    let recorded = Run::small().data(recording::small()).complete();
-    let stamps = odometry::columns(&recorded, &["stamp_ns"]);
-    played.scans -= stamps.iter().position(|row| row[0] == begun).unwrap() as u64;
-    let published = summary["published"].as_u64().unwrap();
-    let left_out = count(&summary, "scans_left_out");
-    assert!(left_out >= 5, "{left_out}");
-    assert_eq!(published + left_out, played.scans, "{left_out} left out");
-}
-
-/// The fate of a connection in a relay.
-#[derive(Clone, Copy)]
-enum Connection {
-    /// Passes on what radar and client send.
-    Relayed,
-    /// Sends bytes that are no messages.
-    Junk,
-    /// Describes the radar, and repeatedly reports that it is alive.
-    KeptAlive,
-    /// Describes the radar, and sends that without a pause.
-    Flooded,
-}
+/// Treats a client of a relay in front of a radar.
+type Treatment = fn(TcpStream, &str) -> io::Result<()>;
 
 /// Listens for connections, and treats each by this list; all further connections are relayed.
-fn relay(radar: &str, all: &'static [Connection]) -> String {
+fn relay(radar: &str, all: &'static [Treatment]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let radar = radar.to_owned();
@@ -171,14 +87,8 @@ fn relay(radar: &str, all: &'static [Connection]) -> String {
     thread::spawn(move || {
         for (k, client) in listener.incoming().enumerate() {
             let (client, radar) = (client.unwrap(), radar.clone());
-            thread::spawn(move || match all.get(k) {
-                Some(Connection::Junk) => send_junk(client),
-                Some(Connection::KeptAlive) => {
-                    keep_alive(client, &radar, Duration::from_millis(200))
-                }
-                Some(Connection::Flooded) => keep_alive(client, &radar, Duration::ZERO),
-                _ => pass_on(client, &radar),
-            });
+            let treat = all.get(k).copied().unwrap_or(pass_on);
+            thread::spawn(move || treat(client, &radar));
         }
     });
     address
@@ -191,7 +101,8 @@ fn pass_on(mut client: TcpStream, radar: &str) -> io::Result<()> {
     io::copy(&mut radar, &mut client).map(|_| ())
 }
 
-fn send_junk(mut client: TcpStream) -> io::Result<()> {
+/// Sends bytes that are no messages.
+fn send_junk(mut client: TcpStream, _: &str) -> io::Result<()> {
     for _ in 0..100 {
         client.write_all(&[0x55; 1 << 16])?;
     }
@@ -199,17 +110,25 @@ fn send_junk(mut client: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-fn keep_alive(mut client: TcpStream, radar: &str, pause: Duration) -> io::Result<()> {
+/// Describes the radar, and repeatedly reports that it is alive.
+fn keep_alive(client: TcpStream, radar: &str) -> io::Result<()> {
+    report_life(client, radar, Duration::from_millis(200), 1)
+}
+
+/// As above without a pause.
+fn flood(client: TcpStream, radar: &str) -> io::Result<()> {
+    report_life(client, radar, Duration::ZERO, 4096)
+}
+
+fn report_life(mut to: TcpStream, radar: &str, pause: Duration, at_once: usize) -> io::Result<()> {
     let mut described = [0; 256];
     let count = TcpStream::connect(radar)?.read(&mut described)?;
-    client.write_all(&described[..count])?;
+    to.write_all(&described[..count])?;
     let mut alive = Vec::new();
     write_keep_alive(&mut alive);
-    if pause.is_zero() {
-        alive = alive.repeat(4096);
-    }
+    let alive = alive.repeat(at_once);
     loop {
-        client.write_all(&alive)?;
+        to.write_all(&alive)?;
         thread::sleep(pause);
     }
 }
@@ -218,24 +137,13 @@ fn keep_alive(mut client: TcpStream, radar: &str, pause: Duration) -> io::Result
 fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
     let radar = Radar::playing(recording::small(), &["--repeat"]);
     // Before the run it is asked for its configuration.
-    let connections = &[
-        Connection::Relayed,
-        Connection::Junk,
-        Connection::Junk,
-        Connection::KeptAlive,
-        Connection::Flooded,
-    ];
+    let connections: &[Treatment] = &[pass_on, send_junk, send_junk, keep_alive, flood];
     let run = run_at(&relay(&radar.address, connections)).set("source.scans=12");
     let mut running = run.start();
     running.await_stages();
     // It is not well until azimuths come.
-    let ps = || {
-        let mut ps = gyre();
-        ps.args(["ps", "--check", "--out"]).arg(run.out());
-        ps.output().unwrap()
-    };
     let deaf = "no azimuths arrive from the radar";
-    while !String::from_utf8_lossy(&ps().stderr).contains(deaf) {
+    while !ask(&run, &["ps", "--check"]).stderr.contains(deaf) {
         assert!(running.poses() == 0, "it was never said");
     }
     running.finish().succeeded();
@@ -255,11 +163,8 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     let run = radar.received(12);
     let mut running = run.start();
     running.await_poses(2);
-    let _other = Radar::to(
-        &["--udp", &to],
-        recording::small(),
-        &["--repeat", "--rate", "1"],
-    );
+    let options = ["--repeat", "--rate", "1"];
+    let _other = Radar::to(&["--udp", &to], recording::small(), &options);
     let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
     let large = Configuration {
         azimuth_samples: 400,
@@ -298,10 +203,8 @@ fn a_radar_that_is_silent_is_waited_for_by_name_until_it_sends_again() {
     let run = run_at(&radar.address);
     let mut running = run.start();
     radar.played();
-    running.await_words(&format!(
-        "waiting for the radar at {}: no scan for 3 s",
-        radar.address
-    ));
+    let waits = format!("waiting for the radar at {}: no scan", radar.address);
+    running.await_words(&format!("{waits} for 3 s"));
     running.await_words("no scan for 6 s");
     let again = Radar::to(&["--listen", &radar.address], recording::small(), &[]);
     running.await_words(&format!("the radar at {} sends, after ", again.address));

@@ -10,8 +10,9 @@ use rustix::process::Signal;
 
 use super::record::{WINDOW, await_recorder, file, recorded, replay};
 use crate::{
-    common::{Ended, Run, gyre, recording, send},
+    common::{Run, recording, send},
     live::radar::Radar,
+    reach::swap_masking,
 };
 
 const SCANS: usize = 70;
@@ -22,11 +23,8 @@ const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refine
 /// A live run that is recorded, with a refinement that is slower than the scans: whenever masking
 /// is started again, scans that it had taken are in flight.
 fn slow(run: Run) -> Run {
-    let run = run
-        .set("run.mode=live")
-        .set(WINDOW)
-        .set("stages.refinement.delay_ms=180")
-        .set(TOPICS);
+    let run = run.set("run.mode=live").set(WINDOW).set(TOPICS);
+    let run = run.set("stages.refinement.delay_ms=180");
     recorded(&run)
 }
 
@@ -89,18 +87,6 @@ fn assert_lacks_little(run: &Run) {
 
 #[test]
 #[ignore = ".ci/nightly: kills at many moments"]
-fn a_recording_is_of_the_results_after_masking_was_killed() {
-    let run = played();
-    let mut running = run.start();
-    for poses in [8, 14, 20] {
-        running.await_poses(poses).kill("masking");
-    }
-    running.finish().succeeded();
-    assert_lacks_little(&run);
-}
-
-#[test]
-#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
     let mut running = run.start();
@@ -115,9 +101,8 @@ fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
 
 /// The scans of the poses in the results by their numbers.
 fn scans_of_poses(run: &Run) -> BTreeMap<u64, u64> {
-    let poses = journal::records(&journal::path(run.out()))
-        .unwrap()
-        .unwrap();
+    let records = journal::records(&journal::path(run.out()));
+    let poses = records.unwrap().unwrap();
     let poses = poses.map(|pose| pose.unwrap().item);
     let poses = poses.filter(|item| !item.is(flag::END));
     poses.map(|item| (item.seq, item.scan)).collect()
@@ -163,17 +148,11 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
     for topic in ["masked", "motion"] {
         let entries: Vec<_> = recording.entries(topic).collect();
         for entry in &entries {
-            assert_eq!(
-                scans.get(&entry.seq),
-                Some(&entry.scan),
-                "{topic} {entry:?}"
-            );
+            let scan = scans.get(&entry.seq);
+            assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
         }
         let lacks = (scans.len() - entries.len()) as u64;
-        assert!(
-            lacks > 0,
-            "{topic}: nothing was given anew while no recorder was there"
-        );
+        assert!(lacks > 0);
         assert!(lacks <= recording.missed()[topic], "{topic} lacks {lacks}");
     }
 }
@@ -186,32 +165,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
     let mut running = run.start();
     running.await_poses(8).kill("masking");
     running.await_poses(14);
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    Ended::of(swap).succeeded();
+    swap_masking(&run, &[]).succeeded();
     running.finish().succeeded();
     assert_lacks_little(&run);
-}
-
-#[test]
-#[ignore = ".ci/nightly: kills at many moments"]
-fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
-{
-    assert_goes_on(&played());
-    let radar = radar();
-    assert_goes_on(&slow(radar.run(SCANS)));
-}
-
-/// A recorder that is killed with the run may lack the last half second, and reports it.
-fn assert_goes_on(run: &Run) {
-    let mut running = run.start();
-    running.await_poses(8);
-    running.signal(Signal::INT);
-    running.end();
-    let mut running = run.start();
-    running.await_poses(18);
-    running.kill_supervisor();
-    run.finish().succeeded();
-    assert_eq!(parts(&file(run)).len(), 3);
-    assert!(!assert_is_of(run).contains_key("masked"));
 }

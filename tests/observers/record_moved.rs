@@ -42,11 +42,8 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     let mut inspect = gyre();
     inspect.arg("inspect").arg(file(&run));
     let inspected = Ended::of(inspect);
-    assert!(
-        inspected.stdout.contains("Part 1 of the recording"),
-        "{}",
-        inspected.stdout
-    );
+    let said = &inspected.stdout;
+    assert!(said.contains("Part 1 of the recording"), "{said}");
     let left = parts(&file(&run));
     for part in &left {
         fs::rename(part, other_disk.join(part.file_name().unwrap())).unwrap();

@@ -4,7 +4,7 @@
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
+    process::{Child, Stdio},
     sync::OnceLock,
     thread,
     time::{Duration, Instant},
@@ -17,7 +17,8 @@ use crate::{
     common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
-    reach::{conformance, python_stage},
+    operate::commands::ask,
+    reach::conformance,
 };
 
 const SCANS: usize = 160;
@@ -149,10 +150,7 @@ fn assert_accounted(counts: &Value) {
 fn assert_identical((code, report): (Option<i32>, Value), least: u64) {
     assert_eq!(code, Some(0), "{report:#}");
     assert_eq!(report["verdict"], "identical");
-    assert!(
-        report["counts"]["compared"].as_u64() >= Some(least),
-        "{report:#}"
-    );
+    assert!(report["counts"]["compared"].as_u64() >= Some(least));
     assert!(report["work"]["shadow"]["p50_us"].as_f64() > Some(0.0));
     assert!(report["answer"]["real"]["p50_us"].as_f64() > Some(0.0));
 }
@@ -195,36 +193,21 @@ fn shadows_that_fail_in_any_way_are_named_and_the_run_is_untouched() {
 
     let (code, report) = differs.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"differs".into()));
-    assert!(
-        report["differences"]["rotation_deg"]["max"].as_f64() > Some(0.0),
-        "{report:#}"
-    );
+    assert!(report["differences"]["rotation_deg"]["max"].as_f64() > Some(0.0));
     let (code, report) = slow.end();
     assert_eq!(code, Some(0));
     assert!(report["counts"]["skipped"].as_u64() > Some(0), "{report:#}");
-    assert!(
-        report["work"]["shadow"]["p50_us"].as_f64() > Some(290e3),
-        "{report:#}"
-    );
+    assert!(report["work"]["shadow"]["p50_us"].as_f64() > Some(290e3));
     let (code, report) = floods.end();
     assert_eq!(code, Some(1));
-    assert!(
-        report["breaches"].to_string().contains("it sent item"),
-        "{report:#}"
-    );
+    assert!(report["breaches"].to_string().contains("it sent item"));
     let (code, report) = dies.end();
     assert_eq!(code, Some(1));
-    assert!(
-        report["ends"].to_string().contains("no memory is left"),
-        "{report:#}"
-    );
+    assert!(report["ends"].to_string().contains("no memory is left"));
     let (code, report) = silent.end();
     assert_eq!(code, Some(1));
     assert!(report["counts"]["hangs"].as_u64() > Some(0), "{report:#}");
-    assert!(
-        report["ends"].to_string().contains("has not answered item"),
-        "{report:#}"
-    );
+    assert!(report["ends"].to_string().contains("has not answered item"));
 }
 
 #[test]
@@ -275,10 +258,7 @@ fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
     running.finish().succeeded();
     for shadow in shadows {
         let (code, report) = shadow.end();
-        assert!(
-            report["counts"]["skipped"].as_u64() > Some(20),
-            "{report:#}"
-        );
+        assert!(report["counts"]["skipped"].as_u64() > Some(20));
         assert_identical((code, report), 5);
     }
 }
@@ -299,10 +279,8 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
 
 #[test]
 fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
-    let run = long()
-        .rate(HALF_RATE)
-        .set("run.mode=live")
-        .set("stages.masking.delay_ms=50");
+    let run = long().rate(HALF_RATE).set("run.mode=live");
+    let run = run.set("stages.masking.delay_ms=50");
     let mut running = run.start();
     running.await_poses(1);
     let shadow = Shadow::start(&run, "masking", "masking", &[]);
@@ -315,60 +293,37 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
 
 #[test]
 fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
-    let run = Run::of_recording()
-        .rate("0.3")
-        .set("search.kind=exhaustive")
-        .set("raster.n=63");
+    let run = Run::of_recording().rate("0.3").set("raster.n=63");
+    let run = run.set("search.kind=exhaustive");
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     Ended::of(up).succeeded();
-    let shadow = Shadow::start(
-        &run,
-        "joint",
-        "joint-search",
-        &["--scans", "3", "--nice", "15"],
-    );
+    let options = ["--scans", "3", "--nice", "15"];
+    let shadow = Shadow::start(&run, "joint", "joint-search", &options);
     let (code, report) = shadow.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
     assert_eq!(report["counts"]["compared"], 3);
-    refused(
-        &run,
-        &["joint-search", "--command", "/nowhere/search"],
-        &["cannot start joint-search", "/nowhere/search"],
-    );
-    refused(
-        &run,
-        &["rotation-search"],
-        &["the run has no rotation-search", "joint-search"],
-    );
-    let mut down = gyre();
-    down.arg("down").arg(run.out());
-    Ended::of(down).succeeded();
+    let nowhere = ["joint-search", "--command", "/nowhere/search"];
+    refused(&run, &nowhere, &["cannot start joint-search", nowhere[2]]);
+    let words = ["the run has no rotation-search", "joint-search"];
+    refused(&run, &["rotation-search"], &words);
+    ask(&run, &["down"]).succeeded();
 }
 
 #[test]
-fn an_interrupted_shadow_reports_what_it_has_compared() {
+fn an_interrupted_shadow_reports_and_the_program_of_a_killed_one_ends() {
     let run = Run::of_recording().rate("2");
     let running = held(&run);
-    let shadow = Shadow::start(&run, "interrupted", "rotation-search", &[]);
-    shadow.await_rows(1);
-    send(shadow.child.id(), Signal::INT);
-    let (code, report) = shadow.end();
+    let [interrupted, mut killed] =
+        ["interrupted", "killed"].map(|name| Shadow::start(&run, name, "rotation-search", &[]));
+    interrupted.await_rows(1);
+    send(interrupted.child.id(), Signal::INT);
+    let (code, report) = interrupted.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
-    release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
-    let run = Run::of_recording().rate("2");
-    let running = held(&run);
-    let mut shadow = Shadow::start(&run, "killed", "rotation-search", &[]);
-    shadow.await_rows(1);
-    let process = shadow.await_process();
-    send(shadow.child.id(), Signal::KILL);
-    shadow.child.wait().unwrap();
+    killed.await_rows(1);
+    let process = killed.await_process();
+    send(killed.child.id(), Signal::KILL);
+    killed.child.wait().unwrap();
     let since = Instant::now();
     while Path::new("/proc").join(process.to_string()).exists() {
         assert!(since.elapsed().as_secs() < 30, "it outlives its shadow");
@@ -379,57 +334,23 @@ fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
     assert_eq!(run.odometry(), undisturbed());
 }
 
-#[test]
-#[ignore = ".ci/nightly: a stage in Python beside a run"]
-fn python_masking_beside_the_own_one_is_compared() {
-    if !python_stage::can_start() {
-        return;
-    }
-    let run = long().rate(RATE).set("masking.kind=threshold");
-    let running = held(&run);
-    let [python, script] = python_stage::command();
-    let command = format!("'{python}' '{script}'");
-    let shadow = Shadow::start(
-        &run,
-        "python",
-        "masking",
-        &["--command", &command, "--scans", "8"],
-    );
-    shadow.await_attached();
-    release(&running);
-    let (code, report) = shadow.end();
-    assert_eq!(code, Some(0), "{report:#}");
-    let largest = report["differences"]["mask"]["max"].as_f64();
-    assert!(largest.is_none_or(|largest| largest < 0.05), "{report:#}");
-    running.finish().succeeded();
-}
-
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {
-    let mut command: Command = gyre();
-    command.arg("shadow").args(arguments).arg(run.out());
-    Ended::of(command).refused_with(words);
+    ask(run, &[&["shadow"], arguments].concat()).refused_with(words);
 }
 
 #[test]
 fn what_cannot_have_a_shadow_is_refused_in_a_sentence() {
     let run = Run::of_recording();
-    refused(&run, &["radar-replay"], &["radar-replay", "is a source"]);
-    refused(
-        &run,
-        &["pose-integration"],
-        &["pose-integration", "journal"],
-    );
-    refused(&run, &["trajectory"], &["trajectory", "logs"]);
-    refused(&run, &["steering"], &["no stage `steering`", "masking"]);
-    refused(&run, &["masking"], &["no run is writing to"]);
-    refused(
-        &run,
-        &["masking", "--command", "python3 'x"],
-        &["--command", "quotes"],
-    );
-    refused(
-        &run,
-        &["masking", "--patience-s", "nan"],
-        &["--patience-s", "0 or more"],
-    );
+    for (arguments, words) in [
+        ("radar-replay", "is a source"),
+        ("pose-integration", "journal"),
+        ("trajectory", "logs"),
+        ("steering", "no stage `steering`"),
+        ("masking", "no run is writing to"),
+        ("masking --command 'x", "quotes"),
+        ("masking --patience-s nan", "0 or more"),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        refused(&run, &arguments, &[words]);
+    }
 }

@@ -1,20 +1,18 @@
 //! Observers of a run: faults of observers change no result and leave nothing, and each observer
 //! reports the messages that it missed.
 
-use std::{path::Path, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use rustix::process::Signal;
 
 use crate::common::{
-    Run, Watch, assert_nothing_left, odometry, real_data,
+    Run, Watch, assert_nothing_left,
     recording::{SCANS_AROUND as SCANS, around_a_block},
 };
 
 /// Places for observers of each topic, by default.
 const PLACES: usize = 8;
 
-/// The recording's thirty seconds in four.
-const MODERATE: &str = "8";
 /// In ten: two dozen observers start one after the other meanwhile.
 const SLOW: &str = "3";
 
@@ -22,10 +20,11 @@ fn around() -> Run {
     Run::small().data(around_a_block())
 }
 
-/// Runs with eight observers: two look on, two are stopped, two are killed, and two places are for
-/// ones that come and go.
-fn observers_change_nothing(run: &Run, undisturbed: &str) {
-    let scans = odometry::rows(undisturbed).len() as u64 + 1;
+/// Two of eight look on, two are stopped, two are killed, and two places are for ones that come and
+/// go.
+#[test]
+fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
+    let (run, scans) = (&around().rate(SLOW), SCANS as u64);
     let mut running = run.start();
     running.await_stage("pose-integration");
     // All start at once: one after the other takes longer than the run on a busy machine.
@@ -46,10 +45,10 @@ fn observers_change_nothing(run: &Run, undisturbed: &str) {
         }
     }
     let [resumed, never_resumed] = stopped;
-    running.await_poses_or_end(scans as usize / 2);
+    running.await_poses_or_end(SCANS / 2);
     resumed.signal(Signal::CONT);
     running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(run.odometry(), around().complete());
     for looker in lookers {
         assert!(looker.finish().assert_consistent(scans).total.is_some());
     }
@@ -58,40 +57,6 @@ fn observers_change_nothing(run: &Run, undisturbed: &str) {
     assert!(missed > 0, "{resumed:?}");
     never_resumed.kill().assert_consistent(scans);
     assert_nothing_left(run.out());
-}
-
-#[test]
-fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
-    observers_change_nothing(&around().rate(SLOW), &around().complete());
-}
-
-#[test]
-#[ignore = ".ci/nightly: a whole drive"]
-fn observers_of_a_real_recording_change_nothing() {
-    let Some(data) = real_data("radiate-2019-02-12") else {
-        return;
-    };
-    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = || {
-        let run = Run::of_file(&configuration).data(&data);
-        run.set(&format!("source.scans={SCANS}"))
-    };
-    observers_change_nothing(&run().rate(SLOW), &run().complete());
-}
-
-#[test]
-fn an_observer_sees_each_item_once_although_the_publisher_is_restarted() {
-    let run = around().rate(MODERATE);
-    let mut running = run.start();
-    running.await_stage("pose-integration");
-    let watches = ["masked", "motion"].map(|topic| Watch::start(&run, topic).await_message());
-    running.await_poses(20).kill("masking");
-    running.await_poses(60).kill("translation-search");
-    running.finish().succeeded();
-    for watch in watches {
-        let watched = watch.finish();
-        assert!(watched.assert_consistent(SCANS as u64).total.is_some());
-    }
 }
 
 #[test]

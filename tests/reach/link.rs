@@ -2,9 +2,14 @@
 //! and one can look on from another machine.
 
 use std::{
-    net::TcpListener,
+    io::{Read, Write},
+    net::{Shutdown, TcpListener, TcpStream},
     path::{Path, PathBuf},
-    process::{self, Child, Command},
+    process::{Child, Command},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::{Duration, Instant},
 };
@@ -23,9 +28,8 @@ fn side(side: &str, cut: &str, endpoint: &str) -> Run {
         "robot" => Run::of_recording(),
         _ => Run::small(),
     };
-    run.set(&format!("link.side='{side}'"))
-        .set(&format!("link.cut='{cut}'"))
-        .set(endpoint)
+    let run = run.set(&format!("link.side='{side}'"));
+    run.set(&format!("link.cut='{cut}'")).set(endpoint)
 }
 
 /// Both sides over a free port of this machine: the base, and the robot.
@@ -104,16 +108,8 @@ fn sides_that_do_not_fit_refuse_each_other() {
 
 #[test]
 fn a_link_off_this_machine_needs_certificates() {
-    let refused = |sentence: &str, words: &[&str]| {
-        let run = side("robot", "masked", sentence);
-        run.finish().refused_with(words);
-    };
-    refused(
-        "link.connect=['tcp/192.0.2.1:7447']",
-        &["unencrypted", "tls/"],
-    );
-    refused("link.listen=['tls/0.0.0.0:7447']", &["certificate"]);
-    refused("link.listen=[]", &["no endpoint"]);
+    let plain = side("robot", "masked", "link.connect=['tcp/192.0.2.1:7447']");
+    plain.finish().refused_with(&["unencrypted", "tls/"]);
     let live = side("base", "scan", "link.listen=['tcp/127.0.0.1:7447']").set("run.mode=live");
     live.finish().refused_with(&["link", "masking sheds load"]);
     let mut command = gyre();
@@ -129,10 +125,8 @@ fn a_robot_that_plays_another_drive_is_refused() {
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let [first, second] = [recording::small(), other.path()].map(|data| {
         let robot = Run::small().data(data).rate("2");
-        robot
-            .set("link.side='robot'")
-            .set("link.cut='motion'")
-            .set(&format!("link.connect=['{address}']"))
+        let robot = robot.set("link.side='robot'").set("link.cut='motion'");
+        robot.set(&format!("link.connect=['{address}']"))
     });
     let mut here = first.start();
     here.await_poses(6);
@@ -158,45 +152,15 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     running.finish().succeeded();
     let scans = recording::SCANS;
     for topic in ["pose", "refined"] {
-        let words = format!("received {scans} {topic}");
-        let listed = format!(", {scans} {topic}");
         let said = &received.stderr;
-        assert!(said.contains(&words) || said.contains(&listed), "{said}");
+        let is_listed = |before| said.contains(&format!("{before}{scans} {topic}"));
+        assert!(is_listed("received ") || is_listed(", "), "{said}");
     }
     // Of scans that were gone before it came it knows nothing; of those between it does.
     let (received_part, _) = received.stderr.split_once("; missed").unwrap();
     assert!(received_part.contains(" scan"), "{}", received.stderr);
     sending.join().unwrap().succeeded();
     assert_eq!(poses(&seen) + 1, poses(run.out()), "all but the end");
-}
-
-#[test]
-fn another_machine_gets_what_is_numbered_anew_after_masking_was_killed() {
-    let run = Run::small().data(recording::around_a_block()).rate("2");
-    // Whenever masking is killed, scans that it had taken are in flight.
-    let run = run
-        .set("source.scans=60")
-        .set("run.mode=live")
-        .set("run.window=32")
-        .set("stages.refinement.delay_ms=180");
-    let mut running = run.start();
-    running.await_poses(2);
-    let link = Link::new();
-    let mut send = link.end("send", run.out());
-    send.args(["--topics", "rotation,pose"]);
-    let sending = thread::spawn(move || Ended::of(send));
-    let receiving = link.start("receive", &run.folder().join("seen"));
-    running.await_poses(20).kill("masking");
-    running.finish().succeeded();
-    let received = receiving.join().unwrap();
-    let said = &received.succeeded().stderr;
-    sending.join().unwrap().succeeded();
-    let (received, missed) = said.rsplit_once("; missed").unwrap();
-    let (_, rotations) = received.split_once("pose, ").unwrap();
-    let rotations: usize = rotations.trim_end_matches(" rotation").parse().unwrap();
-    // Each number once would be as many as poses, but for those from before the link.
-    assert!(rotations > poses(run.out()), "{said}");
-    assert!(!missed.contains("pose"), "{said}");
 }
 
 #[test]
@@ -210,10 +174,8 @@ fn a_sender_that_begins_again_is_gone_on_with() {
     running.finish().succeeded();
     let received = receiving.join().unwrap();
     let said = &received.succeeded().stderr;
-    assert!(
-        said.contains(&format!("{} pose", recording::SCANS)),
-        "{said}"
-    );
+    let all = format!("{} pose", recording::SCANS);
+    assert!(said.contains(&all), "{said}");
     second.join().unwrap().succeeded();
 }
 
@@ -238,12 +200,12 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
 
 #[test]
 fn nobody_connects_without_a_certificate_of_the_authority() {
-    let ours = Certificates::of("127.0.0.2", "127.0.0.2");
-    let theirs = Certificates::of("127.0.0.2", "127.0.0.2");
+    let (ours, theirs) = (Certificates::new(), Certificates::new());
     let run = Run::of_recording().rate("0.2");
     let mut running = run.start();
     running.await_poses(2);
-    let link = Link::with_tls();
+    let address = endpoint().replace("tcp/", "tls/");
+    let link = Link { address };
     let sends = |certificates: &Certificates| {
         let mut send = link.end("send", run.out());
         certificates.give(&mut send, "base", ours.path("ca.pem"));
@@ -279,25 +241,16 @@ struct Link {
 
 impl Link {
     fn new() -> Self {
-        Self {
-            address: endpoint(),
-        }
+        let address = endpoint();
+        Self { address }
     }
 
-    fn with_tls() -> Self {
-        Self {
-            address: endpoint().replace("tcp/", "tls/"),
-        }
-    }
-
-    /// Returns the command of an end.
     fn end(&self, end: &str, out: &Path) -> Command {
         let mut command = gyre();
         command.args(["link", end]).arg(out);
-        let option = if end == "send" {
-            "--listen"
-        } else {
-            "--connect"
+        let option = match end {
+            "send" => "--listen",
+            _ => "--connect",
         };
         command.args([option, &self.address]);
         command
@@ -338,26 +291,72 @@ fn await_poses(out: &Path) {
 }
 
 #[test]
-fn a_cut_of_five_seconds_between_two_machines_loses_nothing() {
-    let Some(machines) = Machines::new() else {
-        return;
-    };
-    let base = side("base", "masked", &machines.endpoint("listen"));
-    let robot = side("robot", "masked", &machines.endpoint("connect")).rate("2");
-    let [base, robot] = [base, robot].map(|side| machines.with_certificates(side));
-    let (mut there, here) = (machines.start(0, &base), machines.start(1, &robot));
+fn a_cut_of_five_seconds_between_both_sides_loses_nothing() {
+    let [there, cut] = [endpoint(), endpoint()];
+    let base = side("base", "masked", &format!("link.listen=['{there}']"));
+    let robot = side("robot", "masked", &format!("link.connect=['{cut}']")).rate("2");
+    let cable = Cable::between(&cut, &there);
+    let (mut there, here) = (base.start(), robot.start());
     there.await_poses(6);
-    machines.set_link("down");
+    cable.set_cut(true);
     thread::sleep(CUT / 2);
     let poses = there.poses();
     thread::sleep(CUT / 2);
     assert_eq!(there.poses(), poses, "nothing comes while the link is cut");
-    machines.set_link("up");
+    cable.set_cut(false);
     here.finish().succeeded();
     there.finish().succeeded();
     assert!(poses < recording::SCANS, "it had not ended before");
     assert!(base.odometry() == undisturbed());
     assert!(robot.odometry() == undisturbed());
+}
+
+/// Passes bytes between those who connect to it and an address; while it is cut, they wait in
+/// silence.
+struct Cable {
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Cable {
+    fn between(here: &str, there: &str) -> Self {
+        let [here, there] = [here, there].map(|address| address.replace("tcp/", ""));
+        let listener = TcpListener::bind(here).unwrap();
+        let is_cut = Arc::new(AtomicBool::new(false));
+        let cable = Self {
+            is_cut: is_cut.clone(),
+        };
+        // It ends with the process of the tests.
+        thread::spawn(move || {
+            for here in listener.incoming().flatten() {
+                let Ok(there) = TcpStream::connect(&there) else {
+                    continue;
+                };
+                for (from, to) in [(&here, &there), (&there, &here)] {
+                    let [from, to] = [from, to].map(|end| end.try_clone().unwrap());
+                    let is_cut = is_cut.clone();
+                    thread::spawn(move || pass(from, to, &is_cut));
+                }
+            }
+        });
+        cable
+    }
+
+    fn set_cut(&self, is_cut: bool) {
+        self.is_cut.store(is_cut, Ordering::Relaxed);
+    }
+}
+
+fn pass(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) {
+    let mut bytes = [0; 1 << 16];
+    while let Ok(count @ 1..) = from.read(&mut bytes) {
+        while is_cut.load(Ordering::Relaxed) {
+            thread::sleep(Duration::from_millis(10));
+        }
+        if to.write_all(&bytes[..count]).is_err() {
+            break;
+        }
+    }
+    let _ = to.shutdown(Shutdown::Both);
 }
 
 /// An authority, and the certificates that it has signed for a base and a robot.
@@ -366,22 +365,19 @@ struct Certificates {
 }
 
 impl Certificates {
-    /// Makes them as docs/link.md has it.
-    fn of(base: &str, robot: &str) -> Self {
+    /// Makes them as docs/link.md has it, for both sides on this machine.
+    fn new() -> Self {
         let script = r#"
             set -e
             openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 3650 -subj /CN=gyre-link -keyout ca.key -out ca.pem
-            for side in base:IP:$1 robot:IP:$2; do
-                name=${side%%:*}
+            for name in base robot; do
                 openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=$name -keyout $name.key -out $name.csr
-                printf 'subjectAltName=%s\nextendedKeyUsage=serverAuth,clientAuth\n' ${side#*:} > $name.ext
+                printf 'subjectAltName=IP:127.0.0.2\nextendedKeyUsage=serverAuth,clientAuth\n' > $name.ext
                 openssl x509 -req -in $name.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 825 -extfile $name.ext -out $name.pem
             done"#;
         let folder = crate::common::folder();
         let mut command = Command::new("sh");
-        command
-            .args(["-c", script, "sh", base, robot])
-            .current_dir(folder.path());
+        command.args(["-c", script]).current_dir(folder.path());
         Ended::of(command).succeeded();
         Self { folder }
     }
@@ -390,95 +386,11 @@ impl Certificates {
         self.folder.path().join(name)
     }
 
-    /// Returns the files of a side, by the keys of the configuration.
-    fn files(&self, side: &str) -> [(&'static str, PathBuf); 3] {
-        [
-            ("ca", self.path("ca.pem")),
-            ("certificate", self.path(&format!("{side}.pem"))),
-            ("key", self.path(&format!("{side}.key"))),
-        ]
-    }
-
     /// Has an end of a link show the certificate of a side, and believe an authority.
     fn give(&self, command: &mut Command, side: &str, ca: PathBuf) {
-        let [_, certificate, key] = self.files(side);
-        for (key, path) in [("ca", ca), certificate, key] {
-            command.arg(format!("--{key}")).arg(path);
-        }
+        command.arg("--ca").arg(ca);
+        let certificate = self.path(&format!("{side}.pem"));
+        command.arg("--certificate").arg(certificate);
+        command.arg("--key").arg(self.path(&format!("{side}.key")));
     }
-}
-
-/// Two machines: network namespaces with a cable between them, and certificates of both.
-struct Machines {
-    names: [String; 2],
-    subnet: String,
-    certificates: Certificates,
-}
-
-impl Machines {
-    /// Prints why and returns `None` if the system forbids it.
-    fn new() -> Option<Self> {
-        let id = process::id() % 65536;
-        let subnet = format!("10.{}.{}", 64 + id / 256 % 128, id % 256);
-        let machines = Self {
-            names: ["a", "b"].map(|end| format!("gy{id:x}{end}")),
-            certificates: Certificates::of(&format!("{subnet}.1"), &format!("{subnet}.2")),
-            subnet,
-        };
-        let [a, b] = &machines.names;
-        let made = [a, b].iter().all(|name| ip(&["netns", "add", name]))
-            && ip(&[
-                "link", "add", a, "netns", a, "type", "veth", "peer", "name", b, "netns", b,
-            ])
-            && [(a, 1), (b, 2)].iter().all(|(name, end)| {
-                let address = format!("{}.{end}/24", machines.subnet);
-                ip(&["-n", name, "addr", "add", &address, "dev", name])
-                    && ip(&["-n", name, "link", "set", "lo", "up"])
-                    && ip(&["-n", name, "link", "set", name, "up"])
-            });
-        if !made {
-            println!("skipped: network namespaces need root and iproute2");
-            return None;
-        }
-        Some(machines)
-    }
-
-    fn with_certificates(&self, side: Run) -> Run {
-        let base = side.command().get_args().any(|it| it == "link.side='base'");
-        let name = if base { "base" } else { "robot" };
-        let files = self.certificates.files(name);
-        files.into_iter().fold(side, |side, (key, path)| {
-            side.set(&format!("link.{key}='{}'", path.display()))
-        })
-    }
-
-    /// The first of the machines is the one that listens.
-    fn endpoint(&self, key: &str) -> String {
-        format!("link.{key}=['tls/{}.1:7447']", self.subnet)
-    }
-
-    fn start(&self, machine: usize, run: &Run) -> crate::common::Running {
-        let inside = ["ip", "netns", "exec", &self.names[machine]];
-        run.start_as(wrapped(&inside, &run.command()))
-    }
-
-    /// Pulls the cable at one end, or plugs it in.
-    fn set_link(&self, state: &str) {
-        let [a, _] = &self.names;
-        assert!(ip(&["-n", a, "link", "set", a, state]));
-    }
-}
-
-impl Drop for Machines {
-    fn drop(&mut self) {
-        for name in &self.names {
-            ip(&["netns", "del", name]);
-        }
-    }
-}
-
-/// Returns whether `ip` has done it.
-fn ip(arguments: &[&str]) -> bool {
-    let done = Command::new("ip").args(arguments).output();
-    done.is_ok_and(|output| output.status.success())
 }

@@ -18,3 +18,48 @@ mod ros2_driver;
 mod ros2_map;
 #[cfg(feature = "ros2")]
 mod ros2_objects;
+
+use std::process::Command;
+
+use crate::common::{Ended, Run, gyre, odometry};
+
+/// Ends a test that cannot run here.
+macro_rules! only_if {
+    ($can:expr) => {
+        if !$can {
+            return;
+        }
+    };
+}
+pub(crate) use only_if;
+
+/// Asserts that two odometries have the same motions, but for this distance.
+pub fn assert_near(own: &str, other: &str, limit_m: f64) {
+    let places = |csv| odometry::columns(csv, &["x_m", "y_m"]).concat();
+    let (own, other) = (places(own), places(other));
+    assert_eq!(own.len(), other.len());
+    for (own, other) in own.iter().zip(&other) {
+        let apart_m = own.parse::<f64>().unwrap() - other.parse::<f64>().unwrap();
+        assert!(apart_m.abs() < limit_m, "{apart_m} m");
+    }
+}
+
+/// Asks for another program in place of masking in a running run.
+pub fn swap_masking(run: &Run, command: &[&str]) -> Ended {
+    let mut swap = gyre();
+    swap.args(["swap", "masking"]).arg(run.out()).args(command);
+    Ended::of(swap)
+}
+
+/// Returns whether the Python of `GYRE_PYTHON`, else `python3`, has these modules; prints why a
+/// test is skipped.
+pub fn python_has(modules: &str) -> bool {
+    let python = crate::common::python();
+    let mut import = Command::new(&python);
+    let imported = import.args(["-c", &format!("import {modules}")]).output();
+    let has = imported.is_ok_and(|output| output.status.success());
+    if !has {
+        println!("skipped: {python} cannot import {modules}, or GYRE_PYTHON names another");
+    }
+    has
+}

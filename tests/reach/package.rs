@@ -75,10 +75,8 @@ fn the_debian_package_has_what_its_unit_and_its_configurations_name() {
     assert!(has(of("ExecStart=").unwrap().split(' ').next().unwrap()));
     assert!(has(of("Documentation=file://").unwrap()));
     let folder = of("WorkingDirectory=-").unwrap();
-    let demo: Table = fs::read_to_string(Path::new(PROJECT).join("configs/demo.toml"))
-        .unwrap()
-        .parse()
-        .unwrap();
+    let demo = fs::read_to_string(Path::new(PROJECT).join("configs/demo.toml"));
+    let demo: Table = demo.unwrap().parse().unwrap();
     let model = text(&demo["masking"]["model"]);
     assert!(has(&format!("{folder}/{model}")), "{model}");
 }

@@ -10,26 +10,17 @@ use std::{
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-use crate::common::{
-    Ended, Run, folder, gyre,
-    leftovers::root,
-    odometry::columns,
-    processes::{child_with, of_run},
-    python, send, undisturbed,
+use crate::{
+    common::{
+        Ended, Run, folder, gyre,
+        leftovers::root,
+        odometry::columns,
+        processes::{child_with, of_run},
+        send, undisturbed,
+    },
+    operate::commands::ask,
+    reach::{assert_near, only_if, python_has, swap_masking},
 };
-
-/// Returns whether Python has numpy; prints why a test is skipped.
-fn can_start() -> bool {
-    let imported = Command::new(python()).args(["-c", "import numpy"]).output();
-    let has_numpy = imported.is_ok_and(|output| output.status.success());
-    if !has_numpy {
-        println!(
-            "skipped: {} has no numpy, or GYRE_PYTHON names another",
-            python()
-        );
-    }
-    has_numpy
-}
 
 /// A file with a function.
 fn file(text: &str) -> (TempDir, PathBuf) {
@@ -51,9 +42,7 @@ fn failing(stage: &str, file: &Path) -> Run {
 
 #[test]
 fn factors_of_one_change_no_byte() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     for shape in ["power", "raster"] {
         let text = format!("def mask(scan):\n    return scan.{shape} >= 0\n");
         let (_folder, file) = file(&text);
@@ -64,9 +53,7 @@ fn factors_of_one_change_no_byte() {
 
 #[test]
 fn factors_of_powers_are_a_threshold_where_they_are_one() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
     assert_ne!(threshold, undisturbed());
     // Powers above 90 stay unchanged, and all others are below the threshold of 60.
@@ -76,25 +63,12 @@ fn factors_of_powers_are_a_threshold_where_they_are_one() {
     let masked = run.complete();
     assert_ne!(masked, undisturbed());
     // Powers count from the threshold on, so the rasters differ, but not by where things are.
-    for (a, b) in places(&threshold).iter().zip(places(&masked)) {
-        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.1, "{a:?} {b:?}");
-    }
-}
-
-/// The x and y of all motions, m.
-fn places(odometry: &str) -> Vec<[f64; 2]> {
-    let rows = columns(odometry, &["x_m", "y_m"]);
-    let number = |text: &String| text.parse().unwrap();
-    rows.iter()
-        .map(|row| [number(&row[0]), number(&row[1])])
-        .collect()
+    assert_near(&threshold, &masked, 0.1);
 }
 
 #[test]
 fn a_mask_sees_the_scan_and_its_place() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (folder, file) = file(
         "import json, pathlib, numpy as np\n\
          def mask(scan):\n\
@@ -119,9 +93,7 @@ fn a_mask_sees_the_scan_and_its_place() {
 
 #[test]
 fn searches_return_the_motion_of_the_run() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = file(
         "def rotation(scan, previous):\n\
          \x20   assert scan.stamp_ns > previous.stamp_ns and scan.raster.shape == previous.raster.shape\n\
@@ -167,97 +139,40 @@ fn failing_mask() -> (TempDir, PathBuf) {
 
 #[test]
 fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = failing_mask();
     let run = failing("masking", &file);
     let place = format!("{}, line 3: KeyError: 'wall'", file.display());
     run.finish().failed_with(&["masking", &place]);
-    let mut logs = gyre();
-    logs.args(["logs", "masking"]).arg(run.out());
-    let output = logs.output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
-    assert!(
-        printed.contains("Traceback") && printed.contains("in helper"),
-        "{printed}"
-    );
-}
-
-#[test]
-#[ignore = ".ci/nightly: starts Python often"]
-fn conformance_says_the_line_of_an_exception() {
-    if !can_start() {
-        return;
+    let printed = ask(&run, &["logs", "masking"]).stdout;
+    for words in ["Traceback", "in helper"] {
+        assert!(printed.contains(words), "{printed}");
     }
-    let (_folder, file) = failing_mask();
-    let mut conformance = gyre();
-    conformance
-        .args(["conformance", "masking", "--scans", "12", "--python"])
-        .arg(&file);
-    let output = conformance.output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
-    assert!(
-        !output.status.success() && printed.contains("line 3: KeyError: 'wall'"),
-        "{printed}"
-    );
 }
 
 #[test]
 fn what_cannot_be_loaded_or_returned_is_said() {
-    if !can_start() {
-        return;
-    }
-    for (text, sentence) in [
-        ("def mask(scan)\n    return 1\n", "line 1: SyntaxError"),
-        (
-            "import nothing_of_this_name\n",
-            "line 1: ModuleNotFoundError",
-        ),
-        (
-            "def masks(scan):\n    return 1\n",
-            "there is no function `mask`",
-        ),
-        ("def mask(scan):\n    return scan.power[:, :3]\n", "shape"),
-        (
-            "def mask(scan):\n    return scan.raster + 2.0\n",
-            "not all from 0 to 1",
-        ),
-        (
-            "def mask(scan):\n    return scan.raster * float('nan')\n",
-            "not all from 0 to 1",
-        ),
-        ("def mask(s):\n    return 1j * s.raster\n", "complex"),
-        (
-            "from numpy.ma import *\nmask = lambda _: masked_all(9)\n",
-            "masked",
-        ),
-        (
-            "import os\ndef mask(scan):\n    os._exit(3)\n",
-            "Python has ended",
-        ),
+    only_if!(python_has("numpy"));
+    for row in [
+        "masking | def mask(scan) | line 1: SyntaxError",
+        "masking | masks = 1 | there is no function `mask`",
+        "masking | mask = lambda s: s.power[:, :3] | shape",
+        "masking | mask = lambda s: s.raster + 2.0 | not all from 0 to 1",
+        "masking | mask = lambda s: 1j * s.raster | complex",
+        "masking | from numpy.ma import *\nmask = lambda s: masked_all(9) | masked",
+        "masking | import os\nmask = lambda s: os._exit(3) | Python has ended",
+        "rotation-search | rotation = lambda *s: (7.0, 0.1) | at most half a turn",
+        "rotation-search | rotation = lambda *s: 0.1 | TypeError",
+        "rotation-search | rotation = lambda *s: (float('nan'), 0) | not finite",
+        "translation-search | translation = lambda *s: (1, 0, -0.1) | neither a standard deviation",
+        "translation-search | translation = lambda *s: (1, 0, [[1, 5], [0, 1]]) | nor a covariance",
     ] {
+        let row: Vec<&str> = row.split(" | ").collect();
+        let [stage, text, sentence] = row[..] else {
+            panic!("{row:?}");
+        };
         let (_folder, file) = file(text);
-        let run = failing("masking", &file);
-        run.finish().failed_with(&["mine.py", sentence]);
-    }
-    for (returned, sentence) in [
-        ("7.0, 0.1", "at most half a turn"),
-        ("0.1, -0.1", "0 or more"),
-        ("0.1", "TypeError"),
-        ("float('nan'), 0.1", "not finite"),
-        ("0.1, 1j", "complex numbers"),
-    ] {
-        let text = format!("def rotation(scan, previous):\n    return {returned}\n");
-        let (_folder, file) = file(&text);
-        let run = failing("rotation-search", &file);
-        run.finish().failed_with(&["mine.py", sentence]);
-    }
-    for spread in ["-0.1", "[[-1, 0], [0, 1]]", "[[1, 5], [0, 1]]"] {
-        let text = format!("def translation(scan, previous, turn):\n    return 1, 0, {spread}\n");
-        let (_folder, file) = file(&text);
-        let run = failing("translation-search", &file);
-        let sentence = "neither a standard deviation nor a covariance";
+        let run = failing(stage, &file);
         run.finish().failed_with(&["mine.py", sentence]);
     }
     let run = with(Run::of_recording(), "masking", Path::new("no_such.py"));
@@ -269,9 +184,8 @@ fn what_cannot_be_loaded_or_returned_is_said() {
             "stages.refinement",
             "masking, rotation-search, translation-search",
         ]);
-    with(Run::of_recording(), "rotation-search", &file)
-        .set("search.kind=exhaustive")
-        .finish()
+    let run = with(Run::of_recording(), "rotation-search", &file).set("search.kind=exhaustive");
+    run.finish()
         .refused_with(&["stages.rotation-search", "no such stage"]);
     let run = with(Run::of_recording(), "masking", &file).set("stages.masking.command=['x']");
     run.finish()
@@ -290,20 +204,13 @@ fn an_interpreter_that_is_none_is_tried_once() {
         command.env("GYRE_PYTHON", python);
         let ended = run.start_as(command).finish();
         ended.failed_with(&[sentence, "GYRE_PYTHON"]);
-        assert_eq!(
-            ended.stderr.matches("masking died").count(),
-            1,
-            "{}",
-            ended.stderr
-        );
+        assert_eq!(ended.stderr.matches("masking died").count(), 1);
     }
 }
 
 #[test]
 fn killed_it_leaves_no_interpreter_and_no_other_byte() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
     let run = with(Run::of_recording(), "masking", &file).rate("6");
     let mut running = run.start();
@@ -322,9 +229,7 @@ fn killed_it_leaves_no_interpreter_and_no_other_byte() {
 
 #[test]
 fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let above = |power: u8| format!("def mask(scan):\n    return scan.power > {power}\n");
     let (text, other) = (above(0), above(100));
     let (_folder, file) = file(&text);
@@ -335,9 +240,8 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
     let stage = child_with(running.pid(), file.to_str().unwrap());
     send(stage.unwrap(), Signal::KILL);
     let changed = "mine.py has changed since";
-    running
-        .finish()
-        .failed_with(&["masking has ended", changed]);
+    let ended = running.finish();
+    ended.failed_with(&["masking has ended", changed]);
     let is_another = "the program of masking is another one";
     run.finish()
         .refused_with(&["unfinished run of another program", is_another]);
@@ -365,9 +269,7 @@ fn begun_searches_keep_the_contract_and_drive() {
 }
 
 fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     for (stage, function) in stages {
         let folder = folder();
         let mut new = gyre();
@@ -377,15 +279,11 @@ fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
         let project = folder.path().join(format!("my-{stage}"));
         let file = project.join(format!("{function}.py"));
         let mut conformance = gyre();
-        conformance
-            .args(["conformance", stage, "--scans", "12", "--python"])
-            .arg(&file);
+        conformance.args(["conformance", stage, "--scans", "12", "--python"]);
+        conformance.arg(&file);
         Ended::of(conformance).succeeded();
         let odometry = with(Run::of_recording(), stage, &file).complete();
-        for (own, mine) in places(undisturbed()).iter().zip(places(&odometry)) {
-            let apart_m = (own[0] - mine[0]).hypot(own[1] - mine[1]);
-            assert!(apart_m < 0.5, "{stage}: {apart_m} m");
-        }
+        assert_near(undisturbed(), &odometry, 0.5);
     }
 }
 
@@ -400,10 +298,8 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
         Ended::of(new).succeeded();
         let project = folder.path().join(format!("my-{stage}"));
         let mut build = Command::new("cargo");
-        build
-            .current_dir(&project)
-            .env("CARGO_TARGET_DIR", folder.path().join("target"))
-            .args(["build", "--quiet"]);
+        build.current_dir(&project).args(["build", "--quiet"]);
+        build.env("CARGO_TARGET_DIR", folder.path().join("target"));
         Ended::of(build).succeeded();
         let program = folder.path().join(format!("target/debug/my-{stage}"));
         let mut conformance = gyre();
@@ -415,18 +311,14 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
 
 #[test]
 fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let run = Run::of_recording().rate("0.5");
     let mut running = run.start();
     let own = running.await_poses(4).await_stage("masking");
     let swap = |text: &str| {
         let (folder, file) = file(text);
-        let mut swap = gyre();
-        swap.args(["swap", "masking"]).arg(run.out());
-        swap.arg("--python").arg(&file);
-        (folder, Ended::of(swap))
+        let ended = swap_masking(&run, &["--python", file.to_str().unwrap()]);
+        (folder, ended)
     };
     let (_folder, ended) = swap("def mask(scan):\n    return scan.\n");
     ended.refused_with(&["cannot take over", "line 2: SyntaxError"]);
@@ -443,9 +335,7 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
 
 #[test]
 fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
-    if !can_start() {
-        return;
-    }
+    only_if!(python_has("numpy"));
     let model = "shared/method/masking/tests/models/pair-127.toml";
     let model = Path::new(crate::PROJECT).join(model);
     let run = Run::of_recording().rate("1").masked_by(&model);
@@ -453,10 +343,8 @@ fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
     let mut running = run.start();
     running.await_poses(2);
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.arg("--python").arg(&file);
-    Ended::of(swap).refused_with(&["cannot take over", "one scan at a time"]);
+    let swap = swap_masking(&run, &["--python", file.to_str().unwrap()]);
+    swap.refused_with(&["cannot take over", "one scan at a time"]);
     running.signal(Signal::INT);
     running.end();
     // In a run that begins with it, it takes the network's place.

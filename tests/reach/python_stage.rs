@@ -21,6 +21,7 @@ use serde_json::Value;
 use crate::{
     PROJECT,
     common::{Ended, Run, gyre, python, recording, undisturbed},
+    reach::{assert_near, only_if, python_has, swap_masking},
 };
 
 /// The Python and the script.
@@ -33,16 +34,7 @@ pub fn command() -> [String; 2] {
 
 /// Returns whether the stage can be started; prints why a test is skipped.
 pub fn can_start() -> bool {
-    let mut python = Command::new(&command()[0]);
-    let imported = python.args(["-c", "import iceoryx2, numpy"]).output();
-    let has_packages = imported.is_ok_and(|output| output.status.success());
-    if !has_packages {
-        println!(
-            "skipped: {} has no packages iceoryx2 and numpy, or GYRE_PYTHON names another",
-            command()[0]
-        );
-    }
-    has_packages
+    python_has("iceoryx2, numpy")
 }
 
 pub fn with_python(run: Run) -> Run {
@@ -50,71 +42,41 @@ pub fn with_python(run: Run) -> Run {
     run.set(&format!("stages.masking.command=['{python}', '{script}']"))
 }
 
-/// The size and the offsets of a message.
-type Layout = (usize, BTreeMap<&'static str, usize>);
-
-macro_rules! layout {
-    ($message:ty: $($field:ident),*) => {
-        (size_of::<$message>(), BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]))
+/// The names of messages with their sizes and the offsets of their fields.
+macro_rules! layouts {
+    ($($name:ident $message:ty: $($field:ident)*;)*) => {
+        [$((
+            stringify!($name),
+            size_of::<$message>(),
+            BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]),
+        )),*]
     };
 }
 
-fn layouts() -> [(&'static str, Layout); 12] {
-    [
-        (
-            "gyre_hop_v1",
-            layout!(Hop: received_ns, started_ns, finished_ns, published_ns),
-        ),
-        (
-            "gyre_item_v6",
-            layout!(Item: seq, scan, previous_scan, published, numbered_from, stamp_ns, due_ns, generation,
-                flags, lost, hops),
-        ),
-        (
-            "gyre_scan_header_v7",
-            layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
-                doppler_s, samples, samples_left_out, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
-        ),
-        (
-            "gyre_masked_header_v9",
-            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2, gyro, has_gyro,
-                wheels, has_wheels, doppler, has_doppler),
-        ),
-        (
-            "gyre_gyro_turn_v1",
-            layout!(GyroTurn: yaw_rad, variance_rad2, interval_s, sweep_rate_radps),
-        ),
-        (
-            "gyre_wheel_distance_v1",
-            layout!(WheelDistance: distance_m, variance_m2, side_variance_m2, interval_s),
-        ),
-        (
-            "gyre_doppler_velocity_v1",
-            layout!(DopplerVelocity: velocity_mps, covariance, bearings),
-        ),
-        (
-            "gyre_rotation_estimate_v1",
-            layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
-        ),
-        (
-            "gyre_refinement_v6",
-            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_turn_rad, gyro_scale,
-                gyro_bias_radps, gyro_bias_sigma_radps, wheels, wheel_distance_m, wheel_scale, wheel_scale_sigma, doppler, doppler_scale, doppler_scale_sigma),
-        ),
-        (
-            "gyre_motion_estimate_v8",
-            layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
-                runner_up_score, rotation, searched, refinement),
-        ),
-        (
-            "gyre_motion_header_v11",
-            layout!(MotionHeader: item, motion),
-        ),
-        (
-            "gyre_pose_header_v11",
-            layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
-        ),
-    ]
+fn layouts() -> [(&'static str, usize, BTreeMap<&'static str, usize>); 12] {
+    layouts! {
+        gyre_hop_v1 Hop: received_ns started_ns finished_ns published_ns;
+        gyre_item_v6 Item: seq scan previous_scan published numbered_from stamp_ns due_ns generation
+            flags lost hops;
+        gyre_scan_header_v7 ScanHeader: item azimuths bins stride first_byte range_resolution_m
+            range_offset_m clockwise doppler_s samples samples_left_out azimuth_stamp_ns azimuth_rad
+            azimuth_flags;
+        gyre_masked_header_v9 MaskedHeader: item n rasters cell_m mask twist compensated points
+            azimuth_variance_rad2 gyro has_gyro wheels has_wheels doppler has_doppler;
+        gyre_gyro_turn_v1 GyroTurn: yaw_rad variance_rad2 interval_s sweep_rate_radps;
+        gyre_wheel_distance_v1 WheelDistance: distance_m variance_m2 side_variance_m2 interval_s;
+        gyre_doppler_velocity_v1 DopplerVelocity: velocity_mps covariance bearings;
+        gyre_rotation_estimate_v1 RotationEstimate: angle_rad variance_rad2 score runner_up_rad
+            runner_up_score;
+        gyre_refinement_v6 RefinementRecord: outcome initial_guess overlap support stationary gyro
+            gyro_turn_rad gyro_scale gyro_bias_radps gyro_bias_sigma_radps wheels wheel_distance_m
+            wheel_scale wheel_scale_sigma doppler doppler_scale doppler_scale_sigma;
+        gyre_motion_estimate_v8 MotionEstimate: x_m y_m yaw_rad covariance drift_share scale_sigma
+            interval_ns score runner_up_score rotation searched refinement;
+        gyre_motion_header_v11 MotionHeader: item motion;
+        gyre_pose_header_v11 PoseHeader: item motion x_m y_m yaw_rad covariance
+            accumulated_covariance trajectory_version;
+    }
 }
 
 #[test]
@@ -124,13 +86,9 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
     let Ok(output) = python.output() else {
         return println!("skipped: there is no python3");
     };
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{output:?}");
     let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
-    for (name, (size, offsets)) in layouts() {
+    for (name, size, offsets) in layouts() {
         let of_python = &printed[name];
         assert_eq!(of_python["size"], size, "{name}");
         let fields = serde_json::to_value(&offsets).unwrap();
@@ -147,123 +105,50 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
 #[test]
 #[ignore = ".ci/nightly: starts Python often"]
 fn it_keeps_the_contract_of_masking() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     let mut command = gyre();
-    command.args([
-        "conformance",
-        "masking",
-        "--command",
-        &self::command().join(" "),
-    ]);
-    command.args([
-        "--scans",
-        "12",
-        "--set",
-        "raster.n=63",
-        "--stop-timeout-s",
-        "30",
-    ]);
-    command.args(["--patience-s", "60"]);
+    let words =
+        "conformance masking --scans 12 --set raster.n=63 --stop-timeout-s 30 --patience-s 60";
+    command.args(words.split(' '));
+    command.args(["--command", &self::command().join(" ")]);
     Ended::of(command).succeeded();
 }
 
 #[test]
 fn its_motions_are_those_of_the_own_masking_to_a_centimetre() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     let python = with_python(Run::of_recording()).complete();
-    let (own, python) = (motions(undisturbed()), motions(&python));
-    assert_eq!(own.len(), python.len());
-    for (own, python) in own.iter().zip(&python) {
-        let apart_m = (own[0] - python[0]).hypot(own[1] - python[1]);
-        assert!(apart_m < 0.01, "{apart_m} m");
-    }
-}
-
-/// The x and y of all motions, m.
-fn motions(odometry: &str) -> Vec<[f64; 2]> {
-    let mut rows = csv::Reader::from_reader(odometry.as_bytes());
-    let columns = rows.headers().unwrap().clone();
-    let column = |name| columns.iter().position(|column| column == name).unwrap();
-    let (x, y) = (column("x_m"), column("y_m"));
-    let number = |row: &csv::StringRecord, at: usize| row[at].parse().unwrap();
-    rows.records()
-        .map(|row| row.unwrap())
-        .map(|row| [number(&row, x), number(&row, y)])
-        .collect()
+    assert_near(undisturbed(), &python, 0.01);
 }
 
 #[test]
 fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
-    if !can_start() {
-        return;
-    }
+    only_if!(can_start());
     // Twelve seconds: Python starts slowly where the machine is busy.
     let run = Run::of_recording().rate("0.5");
     let mut running = run.start();
     running.await_poses(4);
-    swap_masking(&run, &["--command", &command().join(" ")]);
+    swap_masking(&run, &["--command", &command().join(" ")]).succeeded();
     running.await_poses(12);
-    swap_masking(&run, &[]);
+    swap_masking(&run, &[]).succeeded();
     running.finish().succeeded();
     let summary = run.summary();
-    assert_eq!(
-        (&summary["dropped"], &summary["processed"]),
-        (&0.into(), &recording::SCANS.into())
-    );
+    assert_eq!(summary["dropped"], 0);
+    assert_eq!(summary["processed"], recording::SCANS);
     assert_eq!(summary["swaps"].as_array().unwrap().len(), 2);
-    for (own, mixed) in motions(undisturbed()).iter().zip(motions(&run.odometry())) {
-        let apart_m = (own[0] - mixed[0]).hypot(own[1] - mixed[1]);
-        assert!(apart_m < 0.01, "{apart_m} m");
-    }
-}
-
-#[test]
-fn it_takes_over_in_a_live_run_and_gives_way_again_and_every_scan_is_accounted_for() {
-    if !can_start() {
-        return;
-    }
-    let run = Run::of_recording().rate("0.4").set("run.mode=live");
-    let mut running = run.start();
-    running.await_poses(4);
-    // Each returns after the first pose of the program that has taken over.
-    swap_masking(&run, &["--command", &command().join(" ")]);
-    swap_masking(&run, &[]);
-    swap_masking(&run, &["--command", &command().join(" ")]);
-    running.finish().succeeded();
-    let summary = run.summary();
-    let count = |key: &str| summary[key].as_u64().unwrap();
-    assert_eq!(count("published"), recording::SCANS as u64);
-    assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert_eq!(count("breaks"), 0, "the chain goes on");
-    assert_eq!(summary["swaps"].as_array().unwrap().len(), 3);
+    assert_near(undisturbed(), &run.odometry(), 0.01);
 }
 
 #[test]
 fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
-    if !can_start() {
-        return;
-    }
-    let run = Run::of_recording()
-        .rate("0.5")
-        .set("masking.undo_doppler=true");
+    only_if!(can_start());
+    let run = Run::of_recording().rate("0.5");
+    let run = run.set("masking.undo_doppler=true");
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.args(["--command", &command().join(" ")]);
-    Ended::of(swap).refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
+    let swap = swap_masking(&run, &["--command", &command().join(" ")]);
+    swap.refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
     assert_eq!(running.await_stage("masking"), own);
     running.signal(Signal::INT);
     running.end();
-}
-
-fn swap_masking(run: &Run, command: &[&str]) {
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out());
-    swap.args(command);
-    Ended::of(swap).succeeded();
 }

@@ -9,31 +9,20 @@ use std::{
     process::{self, Child, ChildStdout, Command, Stdio},
 };
 
-use gyre_geometry::{ComposedMotion, OdometryMotion, UncertainMotion, covariance, pose};
-use nalgebra::{Matrix3, Vector3};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::common::{Run, gyre, odometry, python};
+use crate::{
+    common::{Run, gyre, odometry, python},
+    reach::{only_if, python_has},
+};
 
 /// The variance of an unmeasured quantity.
 const UNKNOWN: f64 = 1e6;
-/// Where x, y and yaw are among the values of ROS.
-const PLANAR: [usize; 3] = [0, 1, 5];
 
 /// Returns whether the peer can be started; prints why a test is skipped.
 pub(crate) fn can_speak() -> bool {
-    let can = Command::new(python())
-        .args(["-c", "import cyclonedds"])
-        .output()
-        .is_ok_and(|output| output.status.success());
-    if !can {
-        println!(
-            "skipped: {} has no package cyclonedds, or GYRE_PYTHON names another",
-            python()
-        );
-    }
-    can
+    python_has("cyclonedds")
 }
 
 /// A domain that only this test of this process uses. Those above 101 share their ports with other
@@ -62,11 +51,8 @@ impl Program {
     /// A peer in Python.
     pub(crate) fn peer(script: &str, arguments: &[&str]) -> Self {
         let scripts = Path::new(crate::PROJECT).join("tests/reach/ros2");
-        Self::start(
-            Command::new(python())
-                .arg(scripts.join(script))
-                .args(arguments),
-        )
+        let mut command = Command::new(python());
+        Self::start(command.arg(scripts.join(script)).args(arguments))
     }
 
     /// A bridge that waits for the run. Its sentences for the terminal count as its lines.
@@ -106,11 +92,8 @@ pub(crate) fn received(peer: Program) -> BTreeMap<String, Vec<Value>> {
     let mut topics: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for line in peer.rest() {
         let mut line: Value = serde_json::from_str(&line).unwrap();
-        let topic = line["topic"].as_str().unwrap().to_owned();
-        topics
-            .entry(topic)
-            .or_default()
-            .push(line["message"].take());
+        let topic = topics.entry(line["topic"].as_str().unwrap().to_owned());
+        topic.or_default().push(line["message"].take());
     }
     topics
 }
@@ -124,164 +107,35 @@ pub(crate) fn stamp_ns(header: &Value) -> i64 {
     part("sec") * 1_000_000_000 + part("nanosec")
 }
 
-/// A pose and its covariance as they are expected.
-struct Expected {
-    stamp_ns: i64,
-    pose: UncertainMotion,
-    /// The velocity, 0 at the first scan.
-    velocity: [f64; 3],
-    /// The covariance, if it was measured.
-    covariance: Option<Matrix3<f64>>,
-}
-
-/// Returns each pose by `odometry.csv`: the motions composed with their covariances, after the
-/// first scan's pose.
-fn expected(run: &Run) -> Vec<Expected> {
-    let names = [
-        "stamp_ns",
-        "interval_ns",
-        "x_m",
-        "y_m",
-        "yaw_rad",
-        "cov_xx",
-        "cov_xy",
-        "cov_xyaw",
-        "cov_yy",
-        "cov_yyaw",
-        "cov_yawyaw",
-        "drift_share",
-        "scale_sigma",
-        "outcome",
-    ];
-    let rows = odometry::columns(&run.odometry(), &names);
-    let mut composed = ComposedMotion::new();
-    let mut poses = Vec::new();
-    for row in rows {
-        let [stamp_ns, interval_ns] =
-            [0, 1].map(|column: usize| row[column].parse::<i64>().unwrap());
-        let at = |column: usize| row[column].parse::<f64>().unwrap();
-        if poses.is_empty() {
-            poses.push(Expected {
-                stamp_ns: stamp_ns - interval_ns,
-                pose: UncertainMotion::identity(),
-                velocity: [0.0; 3],
-                covariance: None,
-            });
-        }
-        let motion = OdometryMotion {
-            motion: pose(at(2), at(3), at(4)),
-            covariance: covariance::unpack(&[5, 6, 7, 8, 9, 10].map(at)),
-            drift_share: at(11),
-            scale_sigma: at(12),
-        };
-        composed = composed.then(&motion);
-        let interval_s = interval_ns as f64 * 1e-9;
-        poses.push(Expected {
-            stamp_ns,
-            pose: composed.motion(),
-            velocity: velocity([2, 3, 4].map(at), interval_s),
-            covariance: (row[13] != "predicted")
-                .then(|| velocity_covariance([2, 3, 4].map(at), &motion.covariance, interval_s)),
-        });
-    }
-    poses
-}
-
-/// The constant velocity in the frame of the vehicle.
-fn velocity([x_m, y_m, yaw_rad]: [f64; 3], interval_s: f64) -> [f64; 3] {
-    let twist = gyre_geometry::Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s);
-    [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps]
-}
-
-/// The covariance of the velocity, from what small errors of the motion do to it.
-fn velocity_covariance(
-    motion: [f64; 3],
-    covariance: &Matrix3<f64>,
-    interval_s: f64,
-) -> Matrix3<f64> {
-    const STEP: f64 = 1e-5;
-    let columns = [0, 1, 2].map(|value| {
-        let [after, before] = [STEP, -STEP].map(|by| {
-            let mut moved = motion;
-            moved[value] += by;
-            Vector3::from(velocity(moved, interval_s))
-        });
-        (after - before) / (2.0 * STEP)
-    });
-    let jacobian = Matrix3::from_columns(&columns);
-    jacobian * covariance * jacobian.transpose()
-}
-
-/// Asserts that 36 numbers are a covariance of (x, y, yaw) in the order of ROS.
-fn assert_covariance(found: &Value, planar: Option<&Matrix3<f64>>, what: &str) {
-    for row in 0..6 {
-        for column in 0..6 {
-            let found = number(&found[6 * row + column]);
-            let place = |value: usize| PLANAR.iter().position(|planar| *planar == value);
-            let expected = match (planar, place(row), place(column)) {
-                (Some(planar), Some(row), Some(column)) => planar[(row, column)],
-                _ if row == column => UNKNOWN,
-                _ => 0.0,
-            };
-            let limit = 1e-9 + 1e-5 * expected.abs();
-            assert!(
-                (found - expected).abs() <= limit,
-                "{what} ({row}, {column}): {found}, expected {expected}"
-            );
-        }
-    }
-}
-
-/// Asserts that odometry equals the results of the run, field by field.
+/// Asserts that odometry has the poses of the results, and no measured velocity where nothing was
+/// measured. Covariances and velocities have tests beside their conversion.
 fn assert_odometry(found: &[Value], run: &Run) {
-    let poses = expected(run);
+    let of_pose = ["stamp_ns", "x_m", "y_m", "yaw_rad", "cov_xx"];
+    let poses = odometry::columns(&run.result("poses.csv"), &of_pose);
+    let outcomes = odometry::columns(&run.odometry(), &["outcome"]).concat();
     assert_eq!(found.len(), poses.len());
-    for (found, expected) in found.iter().zip(&poses) {
-        assert_eq!(stamp_ns(&found["header"]), expected.stamp_ns);
-        assert_eq!(
-            (&found["header"]["frame_id"], &found["child_frame_id"]),
-            (&"odom".into(), &"base_link".into())
-        );
-        let place = &found["pose"]["pose"];
-        let [x_m, y_m, yaw_rad] = gyre_geometry::xy_yaw(&expected.pose.motion);
-        let turn = &place["orientation"];
-        let found_yaw = 2.0 * number(&turn["z"]).atan2(number(&turn["w"]));
-        for (found, expected) in [
-            (number(&place["position"]["x"]), x_m),
-            (number(&place["position"]["y"]), y_m),
-            (gyre_geometry::wrap_angle(found_yaw - yaw_rad), 0.0),
-            (number(&place["position"]["z"]), 0.0),
-            (number(&turn["x"]), 0.0),
-            (number(&turn["y"]), 0.0),
-        ] {
-            // Rounding of the file, composed.
-            assert!(
-                (found - expected).abs() < 1e-5,
-                "{}: {found} {expected}",
-                poses.len()
-            );
+    for (index, (found, row)) in found.iter().zip(&poses).enumerate() {
+        assert_eq!(stamp_ns(&found["header"]).to_string(), row[0]);
+        assert_eq!(found["header"]["frame_id"], "odom");
+        assert_eq!(found["child_frame_id"], "base_link");
+        let (pose, covariance) = (&found["pose"]["pose"], &found["pose"]["covariance"]);
+        let [x_m, y_m] = ["x", "y"].map(|axis| number(&pose["position"][axis]));
+        let [sine, cosine] = ["z", "w"].map(|part| number(&pose["orientation"][part]));
+        let yaw_rad = gyre_geometry::wrap_angle(2.0 * sine.atan2(cosine));
+        let values = [x_m, y_m, yaw_rad, number(&covariance[0])];
+        for (found, expected) in values.iter().zip(&row[1..]) {
+            let apart = found - expected.parse::<f64>().unwrap();
+            assert!(apart.abs() < 1e-5, "{index}: {found} {expected}");
         }
-        assert_covariance(
-            &found["pose"]["covariance"],
-            Some(&expected.pose.covariance),
-            "pose",
-        );
-        let twist = &found["twist"]["twist"];
-        let found_velocity = [
-            &twist["linear"]["x"],
-            &twist["linear"]["y"],
-            &twist["angular"]["z"],
-        ]
-        .map(number);
-        for (found, expected) in found_velocity.iter().zip(expected.velocity) {
-            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
-        }
-        assert_covariance(
-            &found["twist"]["covariance"],
-            expected.covariance.as_ref(),
-            "twist",
-        );
+        let outcome = index.checked_sub(1).map(|before| &outcomes[before]);
+        let is_measured = outcome.is_some_and(|outcome| outcome != "predicted");
+        let of_velocity = number(&found["twist"]["covariance"][0]);
+        assert_eq!(of_velocity < UNKNOWN, is_measured);
     }
+}
+
+fn planar(place: &Value, turn: &Value) -> [f64; 4] {
+    [&place["x"], &place["y"], &turn["z"], &turn["w"]].map(number)
 }
 
 /// The transforms of a topic as the frames that they are between, with each pose.
@@ -290,26 +144,21 @@ pub(crate) fn transforms(messages: &[Value]) -> Vec<(i64, String, [f64; 4])> {
         .iter()
         .flat_map(|message| message["transforms"].as_array().unwrap());
     all.map(|it| {
-        let frames = format!(
-            "{} -> {}",
-            it["header"]["frame_id"].as_str().unwrap(),
-            it["child_frame_id"].as_str().unwrap()
-        );
-        let (place, turn) = (
-            &it["transform"]["translation"],
-            &it["transform"]["rotation"],
-        );
-        let values = [&place["x"], &place["y"], &turn["z"], &turn["w"]].map(number);
-        (stamp_ns(&it["header"]), frames, values)
+        let [from, to] = [&it["header"]["frame_id"], &it["child_frame_id"]];
+        let frames = format!("{} -> {}", from.as_str().unwrap(), to.as_str().unwrap());
+        let (of, stamp_ns) = (&it["transform"], stamp_ns(&it["header"]));
+        (
+            stamp_ns,
+            frames,
+            planar(&of["translation"], &of["rotation"]),
+        )
     })
     .collect()
 }
 
 #[test]
 fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     // The queue holds four seconds, should the bridge be late.
     let run = Run::of_recording().rate("1");
     let domain = domain(0);
@@ -318,58 +167,30 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
     let undisturbed = run.complete();
     let topics = received(peer);
     let said = bridge.interrupt();
-    assert!(
-        said.iter()
-            .any(|line| line.contains("0 poses missed; 0 messages not sent")),
-        "{said:?}"
-    );
+    let is_whole = |line: &String| line.contains("0 poses missed; 0 messages not sent");
+    assert!(said.iter().any(is_whole), "{said:?}");
 
     assert_odometry(&topics["/odom"], &run);
-    assert_eq!(
-        Run::of_recording().complete(),
-        undisturbed,
-        "an observer changed the result"
-    );
+    assert_eq!(Run::of_recording().complete(), undisturbed);
     let of_poses = transforms(&topics["/tf"]);
     assert_eq!(of_poses.len(), topics["/odom"].len());
     for ((stamp, frames, values), odometry) in of_poses.iter().zip(&topics["/odom"]) {
-        let (place, turn) = (
-            &odometry["pose"]["pose"]["position"],
-            &odometry["pose"]["pose"]["orientation"],
-        );
-        assert_eq!(
-            (*stamp, frames.as_str()),
-            (stamp_ns(&odometry["header"]), "odom -> base_link")
-        );
-        assert_eq!(
-            *values,
-            [&place["x"], &place["y"], &turn["z"], &turn["w"]].map(number)
-        );
+        let pose = &odometry["pose"]["pose"];
+        assert_eq!(*stamp, stamp_ns(&odometry["header"]));
+        assert_eq!(frames, "odom -> base_link");
+        assert_eq!(*values, planar(&pose["position"], &pose["orientation"]));
     }
     let [(_, frames, values)] = &transforms(&topics["/tf_static"])[..] else {
         panic!("{:?}", topics["/tf_static"]);
     };
-    assert_eq!(
-        (frames.as_str(), *values),
-        ("base_link -> radar", [0.0, 0.0, 0.0, 1.0])
-    );
-    assert!(
-        !topics.contains_key("/map"),
-        "a run without SLAM has no map"
-    );
-    assert!(
-        !topics.contains_key("/objects"),
-        "a run that tracks no objects publishes none"
-    );
-    let parts: Vec<_> = topics["/diagnostics"]
-        .iter()
-        .flat_map(|it| it["status"].as_array().unwrap())
-        .collect();
-    let is_well = |name: &str| {
-        parts
-            .iter()
-            .any(|part| part["name"] == name && part["level"] == 0)
-    };
+    assert_eq!(frames, "base_link -> radar");
+    assert_eq!(*values, [0.0, 0.0, 0.0, 1.0]);
+    assert!(!topics.contains_key("/map"));
+    assert!(!topics.contains_key("/objects"));
+    let parts = topics["/diagnostics"].iter().map(|it| &it["status"]);
+    let parts: Vec<_> = parts.flat_map(|it| it.as_array().unwrap()).collect();
+    let is = |part: &Value, name: &str| part["name"] == name && part["level"] == 0;
+    let is_well = |name| parts.iter().any(|part| is(part, name));
     assert!(is_well("gyre") && is_well("gyre: masking"), "{parts:?}");
 }
 
@@ -377,9 +198,7 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
 /// where nothing was measured.
 #[test]
 fn a_filter_can_have_its_own_transforms_and_sees_which_velocities_are_predicted() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let settings = ["refinement.min_overlap=1", "refinement.firm_overlap=1"];
     let run = settings.into_iter().fold(Run::of_recording(), Run::set);
     let run = run.rate("1");

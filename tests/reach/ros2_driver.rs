@@ -3,21 +3,23 @@
 
 use std::{
     fs,
-    io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Stdio},
 };
 
 use rustix::process::Signal;
 
 use crate::{
-    common::{Run, gyre, odometry, recording, recording::with_constants},
+    common::{Run, odometry, recording, recording::with_constants},
     live::{
         gnss,
         gyro::{SCANS, address, with_log},
+        radar::{Radar, whole},
     },
     observers::record::recorded,
-    reach::ros2::{Program, can_speak, domain},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain},
+    },
 };
 
 /// The topic of a driver's azimuths.
@@ -27,8 +29,8 @@ const B_SCANS: &str = "/radar_data/b_scan_msg";
 
 /// A radar of a recording, behind a driver in ROS 2.
 struct Driver {
-    server: Child,
     _driver: Program,
+    _radar: Radar,
 }
 
 impl Driver {
@@ -44,43 +46,25 @@ impl Driver {
         options: &[&str],
         logs: &[PathBuf],
     ) -> Self {
-        let mut command = gyre();
-        command.args(["radar-server", "--listen", "127.0.0.1:0"]);
-        let mut server = command
-            .arg(recording)
-            .args(options)
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        BufReader::new(server.stderr.take().unwrap())
-            .read_line(&mut said)
-            .unwrap();
-        let address = said.trim().rsplit(' ').next().unwrap();
-        let mut arguments = vec![domain, address, publishes];
+        // At the radar's own rate, unless the options have another.
+        let radar = Radar::playing(recording, &[&["--rate", "1"], options].concat());
+        let mut arguments = vec![domain, &radar.address, publishes];
         arguments.extend(logs.iter().filter_map(|log| log.to_str()));
         let driver = Program::peer("driver.py", &arguments);
         Self {
-            server,
             _driver: driver,
+            _radar: radar,
         }
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
     }
 }
 
 /// A run that receives so many scans from a topic in a domain.
 fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
-    run.argument("--ros2", topic)
-        .set(&format!("source.domain={domain}"))
-        .set("source.interface='127.0.0.1'")
-        .set(&format!("source.scans={scans}"))
+    let run = run
+        .argument("--ros2", topic)
+        .set("source.interface='127.0.0.1'");
+    let run = run.set(&format!("source.domain={domain}"));
+    run.set(&format!("source.scans={scans}"))
 }
 
 #[test]
@@ -99,14 +83,9 @@ fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
 }
 
 fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
+    let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
     let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
     let run = receiving(with_constants(Run::small()), &domain, topic, scans);
@@ -126,20 +105,10 @@ fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String)
 
 #[test]
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
-    assert_configuration_is_found("silent", FFT_DATA, domain(3));
-}
-
-#[test]
-fn the_turns_of_a_driver_that_publishes_no_configuration_tell_it() {
-    assert_configuration_is_found("silent-turns", B_SCANS, domain(8));
-}
-
-fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
-    if !can_speak() {
-        return;
-    }
-    let _driver = Driver::playing(recording::small(), &domain, publishes, &["--repeat"]);
-    let run = receiving(with_constants(Run::small()), &domain, topic, 6);
+    only_if!(can_speak());
+    let domain = domain(3);
+    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
+    let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, 6);
     let motions = odometry::rows(&run.complete());
     assert_eq!(motions.len(), 5);
     odometry::assert_unbroken(&motions);
@@ -149,9 +118,7 @@ fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
 
 #[test]
 fn a_gyro_and_wheels_beside_the_driver_are_used() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let whole = with_log();
     let logs = ["imu.csv", "wheels.csv"].map(|log| whole.path().join(log));
     let domain = domain(9);
@@ -162,24 +129,16 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let live = run.complete();
     let summary = run.summary();
     let used = ["gyro", "wheels"].map(|of| summary[of]["motions"].as_u64().unwrap_or(0) as usize);
-    assert!(
-        used.iter().all(|used| *used > SCANS / 2),
-        "{used:?}: samples are sent once, and may be lost"
-    );
+    assert!(used.iter().all(|used| *used > SCANS / 2));
     if used == [SCANS - 1; 2] {
         let recorded = Run::small().data(whole.path()).set("gyro.kind=auto");
-        assert!(
-            live == recorded.set("wheels.kind=auto").complete(),
-            "{live}"
-        );
+        assert!(live == recorded.set("wheels.kind=auto").complete());
     }
 }
 
 #[test]
 fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let drive = gnss::drive();
     let log = drive.path().join("fixes.csv");
     fs::write(&log, gnss::log_of_drive()).unwrap();

@@ -4,14 +4,15 @@ use serde_json::Value;
 
 use crate::{
     common::{Ended, Run, gyre, recording},
-    reach::ros2::{Program, can_speak, domain, number, received, transforms},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain, number, received, transforms},
+    },
 };
 
 #[test]
 fn a_run_with_slam_has_a_map_frame_and_a_map() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let data = recording::around_a_block();
     let run = Run::small().data(data).set("slam.kind=graph").rate("20");
     let domain = domain(1);
@@ -31,21 +32,16 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
 
     let odometry = &topics["/car/odom"];
     assert_eq!(odometry[0]["header"]["frame_id"], "odo");
-    let frames: Vec<String> = transforms(&topics["/tf"])
-        .into_iter()
-        .map(|it| it.1)
-        .collect();
-    assert!(
-        frames.iter().any(|it| it == "world -> odo") && frames.iter().any(|it| it == "odo -> car")
-    );
+    let transformed = transforms(&topics["/tf"]).into_iter();
+    let frames: Vec<String> = transformed.map(|it| it.1).collect();
+    let has = |of: &str| frames.iter().any(|it| it == of);
+    assert!(has("world -> odo") && has("odo -> car"));
     // The radar looks to the left of the car, which so drives to the right of the radar's first
     // scan.
     let (_, mounted, values) = &transforms(&topics["/tf_static"])[0];
     assert_eq!(mounted, "car -> top");
-    assert!(
-        (values[0] - 1.0).abs() < 1e-12 && (values[2] - values[3]).abs() < 1e-12,
-        "{values:?}"
-    );
+    let apart = [values[0] - 1.0, values[2] - values[3]];
+    assert!(apart.iter().all(|it| it.abs() < 1e-12), "{values:?}");
     let message = topics["/car/map"].last().unwrap();
     assert_eq!(message["header"]["frame_id"], "world");
     let map = Grid::of(message);
@@ -99,17 +95,14 @@ struct Grid {
 impl Grid {
     fn of(message: &Value) -> Self {
         let (info, origin) = (&message["info"], &message["info"]["origin"]);
-        assert_eq!(
-            ["x", "y", "z", "w"].map(|part| number(&origin["orientation"][part])),
-            [0.0, 0.0, 0.0, 1.0]
-        );
+        let turn = ["x", "y", "z", "w"].map(|part| number(&origin["orientation"][part]));
+        assert_eq!(turn, [0.0, 0.0, 0.0, 1.0]);
         let runs = message["data"].as_array().unwrap();
         let runs = runs
             .iter()
             .map(|run| [0, 1].map(|part: usize| run[part].as_u64().unwrap()));
-        let cells: Vec<u8> = runs
-            .flat_map(|[value, count]| vec![value as u8; count as usize])
-            .collect();
+        let cells = runs.flat_map(|[value, count]| vec![value as u8; count as usize]);
+        let cells: Vec<u8> = cells.collect();
         let width = info["width"].as_u64().unwrap() as usize;
         assert_eq!(number(&info["height"]) * width as f64, cells.len() as f64);
         Self {

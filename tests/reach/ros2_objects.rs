@@ -6,7 +6,10 @@ use serde_json::Value;
 
 use crate::{
     common::{Run, odometry, recording},
-    reach::ros2::{Program, can_speak, domain, number, received, stamp_ns},
+    reach::{
+        only_if,
+        ros2::{Program, can_speak, domain, number, received, stamp_ns},
+    },
 };
 
 /// An object of a scan, by `objects.csv`.
@@ -45,20 +48,10 @@ fn assert_is(detection: &Value, row: &Row) {
     };
     let class = if row.moving { "moving" } else { "standing" };
     assert_eq!(result["hypothesis"]["class_id"], class);
-    let (at, size) = (
-        &detection["bbox"]["center"]["position"],
-        &detection["bbox"]["size"],
-    );
-    assert_eq!(detection["bbox"]["center"], result["pose"]["pose"]);
-    let covariance = &result["pose"]["covariance"];
-    let found = [
-        &at["x"],
-        &at["y"],
-        &size["x"],
-        &size["y"],
-        &covariance[7],
-        &covariance[0],
-    ];
+    let (center, size) = (&detection["bbox"]["center"], &detection["bbox"]["size"]);
+    assert_eq!(*center, result["pose"]["pose"]);
+    let (at, of) = (&center["position"], &result["pose"]["covariance"]);
+    let found = [&at["x"], &at["y"], &size["x"], &size["y"], &of[7], &of[0]];
     let [x_m, y_m, length_m, width_m, cov_xx, cov_yy] = row.values;
     let expected = [1.0 - y_m, x_m, length_m, width_m, cov_xx, cov_yy];
     for (found, expected) in found.map(number).into_iter().zip(expected) {
@@ -69,9 +62,7 @@ fn assert_is(detection: &Value, row: &Row) {
 
 #[test]
 fn a_node_of_ros_receives_the_objects_of_each_scan_as_detections_and_markers() {
-    if !can_speak() {
-        return;
-    }
+    only_if!(can_speak());
     let run = Run::small().data(recording::around_a_block());
     let run = run.set("objects.kind=tracks").rate("10");
     let domain = domain(10);

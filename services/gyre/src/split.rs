@@ -45,7 +45,7 @@ pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
             gyre_terminal::print::note(format_args!(
                 "link {name}: waiting for the robot, which knows how large its scans are"
             ));
-            Ok(gyre_link::ask_robot(link)?.bytes)
+            Ok(gyre_link::ask_robot(link)?)
         }
         _ => Ok(0),
     }

@@ -3,19 +3,22 @@
 use gyre_geometry::{Pose, interpolate};
 use serde::Serialize;
 
-use crate::{EvaluationError, MatchedPoses, Side, gaps::max_gap_ns, matched::require_poses};
+use crate::{
+    EvaluationError, MatchedPoses,
+    error::{ESTIMATE, TRUTH},
+    gaps::max_gap_ns,
+    matched::require_poses,
+};
 
 /// A trajectory: poses, and their stamps where they have any.
 #[derive(Debug, Clone, Copy)]
 pub struct TimedPoses<'a> {
     /// One stamp a pose, ns, in order. Association by index ignores them.
     pub stamps_ns: &'a [i64],
-    /// Poses of the sensor in one fixed frame.
     pub poses: &'a [Pose],
 }
 
 impl<'a> TimedPoses<'a> {
-    /// The poses with their stamps.
     pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
         Self { stamps_ns, poses }
     }
@@ -30,8 +33,7 @@ impl<'a> TimedPoses<'a> {
 }
 
 /// The rule that associates estimated poses with ground-truth poses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(tag = "by", rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Association {
     /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the
     /// shorter way round.
@@ -57,20 +59,15 @@ impl Default for Association {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
-    /// Associated by time.
     Time {
-        /// Estimated poses with a ground-truth pose.
         matched: usize,
         /// Estimated poses before the first or after the last stamp of the ground truth: left out.
         outside_span: usize,
         /// Estimated poses in gaps of the ground truth wider than allowed: left out.
         in_gaps: usize,
-        /// The widest gap allowed, ns.
         max_gap_ns: i64,
     },
-    /// Associated by index.
     Index {
-        /// Estimated poses with a ground-truth pose.
         matched: usize,
         /// Estimated poses beyond the end of the ground truth: left out.
         estimate_surplus: usize,
@@ -102,15 +99,13 @@ impl Coverage {
     }
 }
 
-/// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have
-/// none.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
     association: Association,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-    require_poses(Side::Estimate, estimate.poses)?;
-    require_poses(Side::Truth, truth.poses)?;
+    require_poses(ESTIMATE, estimate.poses)?;
+    require_poses(TRUTH, truth.poses)?;
     match association {
         Association::Time { max_gap_ns } => by_time(estimate, truth, max_gap_ns),
         Association::Index => by_index(estimate.poses, truth.poses),
@@ -123,21 +118,16 @@ fn by_index(
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     let matched = estimate.len().min(truth.len());
     if matched < 2 {
-        return Err(EvaluationError::TooFew {
-            matched,
-            estimate: estimate.len(),
-            truth: truth.len(),
-        });
+        let given = [estimate.len(), truth.len()];
+        return Err(EvaluationError::too_few(matched, given));
     }
     let coverage = Coverage::Index {
         matched,
         estimate_surplus: estimate.len() - matched,
         truth_surplus: truth.len() - matched,
     };
-    Ok((
-        MatchedPoses::new(estimate[..matched].to_vec(), truth[..matched].to_vec())?,
-        coverage,
-    ))
+    let [estimate, truth] = [estimate, truth].map(|poses| poses[..matched].to_vec());
+    Ok((MatchedPoses::new(estimate, truth)?, coverage))
 }
 
 fn by_time(
@@ -145,8 +135,8 @@ fn by_time(
     truth: TimedPoses<'_>,
     least_gap_ns: i64,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-    let estimate_ns = require_stamps(Side::Estimate, &estimate)?;
-    let truth_ns = require_stamps(Side::Truth, &truth)?;
+    let estimate_ns = require_stamps(ESTIMATE, &estimate)?;
+    let truth_ns = require_stamps(TRUTH, &truth)?;
     let max_gap_ns = max_gap_ns(truth.stamps_ns, least_gap_ns);
     let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
@@ -165,17 +155,18 @@ fn by_time(
         && in_gaps == 0
         && let (Some(estimate_ns), Some(truth_ns)) = (estimate_ns, truth_ns)
     {
-        return Err(EvaluationError::NoOverlap {
-            estimate_ns,
-            truth_ns,
-        });
+        let span_s = |(first_ns, last_ns): (i64, i64)| {
+            let [first_s, last_s] = [first_ns, last_ns].map(|ns| ns as f64 * 1e-9);
+            format!("{first_s:.3} s to {last_s:.3} s")
+        };
+        let (estimate, truth) = (span_s(estimate_ns), span_s(truth_ns));
+        return Err(EvaluationError(format!(
+            "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
+        )));
     }
     if matched < 2 {
-        return Err(EvaluationError::TooFew {
-            matched,
-            estimate: estimate.poses.len(),
-            truth: truth.poses.len(),
-        });
+        let given = [estimate.poses.len(), truth.poses.len()];
+        return Err(EvaluationError::too_few(matched, given));
     }
     let coverage = Coverage::Time {
         matched,
@@ -189,29 +180,25 @@ fn by_time(
 /// Returns the first and last stamp, `None` of an empty trajectory; refuses a wrong count and
 /// decreasing stamps.
 pub(crate) fn require_stamps(
-    side: Side,
+    side: &str,
     trajectory: &TimedPoses<'_>,
 ) -> Result<Option<(i64, i64)>, EvaluationError> {
     let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
     if stamps.len() != poses {
-        return Err(EvaluationError::StampCount {
-            side,
-            poses,
-            stamps: stamps.len(),
-        });
+        let stamps = stamps.len();
+        return Err(EvaluationError(format!(
+            "the {side} has {poses} poses but {stamps} stamps"
+        )));
     }
     if let Some(k) = stamps.windows(2).position(|w| w[1] < w[0]) {
-        return Err(EvaluationError::DecreasingStamps {
-            side,
-            index: k + 1,
-            previous_ns: stamps[k],
-            stamp_ns: stamps[k + 1],
-        });
+        let (before, later, k) = (stamps[k], stamps[k + 1], k + 1);
+        return Err(EvaluationError(format!(
+            "the stamps of the {side} decrease at pose {k}: {later} ns after {before} ns"
+        )));
     }
     Ok(stamps.first().copied().zip(stamps.last().copied()))
 }
 
-/// The ground truth at one instant.
 pub(crate) enum At {
     Pose(Pose),
     Outside,
@@ -225,15 +212,9 @@ const ROUNDING_NS: u64 = 1_000;
 /// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a
 /// gap.
 pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
-    let ends = truth
-        .stamps_ns
-        .first()
-        .into_iter()
-        .chain(truth.stamps_ns.last());
-    let end = ends
-        .copied()
-        .find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
-    let stamp_ns = end.unwrap_or(stamp_ns);
+    let ends = [truth.stamps_ns.first(), truth.stamps_ns.last()];
+    let is_end = |end: &&i64| stamp_ns.abs_diff(**end) <= ROUNDING_NS;
+    let stamp_ns = *ends.into_iter().flatten().find(is_end).unwrap_or(&stamp_ns);
     let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
     let Some(before) = after.checked_sub(1) else {
         return At::Outside;
@@ -250,11 +231,8 @@ pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) ->
         return At::Gap;
     }
     let share = since(stamp_ns) as f64 / since(after_ns) as f64;
-    At::Pose(interpolate(
-        &truth.poses[before],
-        &truth.poses[after],
-        share,
-    ))
+    let [before, after] = [before, after].map(|at| &truth.poses[at]);
+    At::Pose(interpolate(before, after, share))
 }
 
 #[cfg(test)]
@@ -274,6 +252,16 @@ mod tests {
         s.iter().map(|s| (s * SECOND as f64) as i64).collect()
     }
 
+    fn by_time(
+        estimate_ns: &[i64],
+        truth_ns: &[i64],
+    ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+        let (estimate, truth) = (line(estimate_ns.len()), line(truth_ns.len()));
+        let estimate = TimedPoses::new(estimate_ns, &estimate);
+        let truth = TimedPoses::new(truth_ns, &truth);
+        associate(estimate, truth, Association::default())
+    }
+
     #[test]
     fn the_ground_truth_is_interpolated_where_the_yaw_wraps() {
         let truth = [pose(0.0, 0.0, PI - 0.1), pose(4.0, 2.0, -PI + 0.3)];
@@ -291,172 +279,65 @@ mod tests {
 
     #[test]
     fn poses_outside_the_span_and_in_gaps_are_left_out_and_counted() {
-        let (matched, coverage) = associate(
-            TimedPoses::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 5.1]), &line(7)),
-            TimedPoses::new(&seconds(&[0.0, 1.0, 4.0, 5.0]), &line(4)),
-            Association::default(),
-        )
-        .unwrap();
-        let max_gap_ns = 3 * SECOND / 2;
-        assert_eq!(
-            coverage,
-            Coverage::Time {
-                matched: 4,
-                outside_span: 2,
-                in_gaps: 1,
-                max_gap_ns
-            }
-        );
+        let estimate = seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 5.1]);
+        let (matched, coverage) = by_time(&estimate, &seconds(&[0.0, 1.0, 4.0, 5.0])).unwrap();
+        let expected = Coverage::Time {
+            matched: 4,
+            outside_span: 2,
+            in_gaps: 1,
+            max_gap_ns: 3 * SECOND / 2,
+        };
+        assert_eq!(coverage, expected);
         assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
     }
 
     #[test]
-    fn a_slow_ground_truth_that_jitters_has_no_gaps() {
-        let truth_s: Vec<f64> = (0..60)
-            .map(|k| f64::from(k) + 0.002 * f64::from(k % 3))
-            .collect();
-        let estimate_s: Vec<f64> = (0..200).map(|k| 0.25 * f64::from(k)).collect();
-        let (_, coverage) = associate(
-            TimedPoses::new(&seconds(&estimate_s), &line(200)),
-            TimedPoses::new(&seconds(&truth_s), &line(60)),
-            Association::default(),
-        )
-        .unwrap();
-        assert_eq!((coverage.matched(), coverage.left_out()), (200, 0));
-        // The steps are of 1.002 s.
-        assert!(coverage.to_string().ends_with("in its gaps above 1.5 s"));
-    }
-
-    #[test]
-    fn a_stamp_rounded_beyond_an_end_of_the_ground_truth_is_that_end() {
-        let (truth, estimate) = (line(2), line(3));
-        let found = |stamps: [i64; 3]| {
-            let estimate = TimedPoses::new(&stamps, &estimate);
-            associate(
-                estimate,
-                TimedPoses::new(&[5_000, 9_000], &truth),
-                Association::default(),
-            )
-            .unwrap()
-            .1
-            .left_out()
-        };
-        assert_eq!(
-            (found([4_500, 7_000, 9_999]), found([3_000, 7_000, 9_000])),
-            (0, 1)
-        );
+    fn slow_steps_rounded_ends_and_the_ends_of_the_clock_leave_nothing_out() {
+        let jittering = |k: i64| k * SECOND + 2_000_000 * (k % 3);
+        let slow: Vec<i64> = (0..60).map(jittering).collect();
+        let fast: Vec<i64> = (0..200).map(|k| k * SECOND / 4).collect();
+        let left_out = |estimate: &[i64], truth: &[i64]| by_time(estimate, truth).unwrap().1;
+        assert_eq!(left_out(&fast, &slow).left_out(), 0);
+        for (estimate, expected) in [([4_500, 7_000, 9_999], 0), ([3_000, 7_000, 9_000], 1)] {
+            assert_eq!(left_out(&estimate, &[5_000, 9_000]).left_out(), expected);
+        }
+        let whole = [i64::MIN, i64::MAX];
+        assert_eq!(left_out(&[i64::MIN, 0, i64::MAX], &whole).matched(), 2);
     }
 
     #[test]
     fn association_by_index_cuts_the_longer_trajectory_and_counts() {
-        let (matched, coverage) = associate(
-            TimedPoses::untimed(&line(3)),
-            TimedPoses::untimed(&line(5)),
-            Association::Index,
-        )
-        .unwrap();
-        assert_eq!(
-            coverage,
-            Coverage::Index {
-                matched: 3,
-                estimate_surplus: 0,
-                truth_surplus: 2
-            }
-        );
-        assert_eq!(matched.len(), 3);
-    }
-
-    #[test]
-    fn trajectories_without_common_time_are_refused_with_both_spans() {
-        let error = associate(
-            TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
-            TimedPoses::new(&seconds(&[10.0, 12.5]), &line(2)),
-            Association::default(),
-        )
-        .unwrap_err();
-        let message = error.to_string();
-        assert!(
-            message.contains("1.000 s to 2.000 s, ground truth 10.000 s to 12.500 s"),
-            "{message}"
-        );
-    }
-
-    #[test]
-    fn one_common_stamp_is_too_few() {
-        let error = associate(
-            TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
-            TimedPoses::new(&seconds(&[2.0, 3.0]), &line(2)),
-            Association::default(),
-        );
-        assert_eq!(
-            error.unwrap_err(),
-            EvaluationError::TooFew {
-                matched: 1,
-                estimate: 2,
-                truth: 2
-            }
-        );
-    }
-
-    #[test]
-    fn decreasing_and_missing_stamps_are_refused() {
-        let good = seconds(&[0.0, 1.0, 2.0]);
-        let error = |estimate: &[i64], truth: &[i64]| {
-            let (e, t) = (line(3), line(3));
-            associate(
-                TimedPoses::new(estimate, &e),
-                TimedPoses::new(truth, &t),
-                Association::default(),
-            )
-            .unwrap_err()
+        let (estimate, truth) = (line(3), line(5));
+        let (estimate, truth) = (TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth));
+        let (matched, coverage) = associate(estimate, truth, Association::Index).unwrap();
+        let expected = Coverage::Index {
+            matched: 3,
+            estimate_surplus: 0,
+            truth_surplus: 2,
         };
-        assert_eq!(
-            error(&good, &[0, 7, 5]),
-            EvaluationError::DecreasingStamps {
-                side: Side::Truth,
-                index: 2,
-                previous_ns: 7,
-                stamp_ns: 5
-            }
-        );
-        assert_eq!(
-            error(&good[..2], &good),
-            EvaluationError::StampCount {
-                side: Side::Estimate,
-                poses: 3,
-                stamps: 2
-            }
-        );
+        assert_eq!((matched.len(), coverage), (3, expected));
     }
 
     #[test]
-    fn stamps_at_the_ends_of_the_clock_do_not_overflow() {
-        let (matched, _) = associate(
-            TimedPoses::new(&[i64::MIN, 0, i64::MAX], &line(3)),
-            TimedPoses::new(&[i64::MIN, i64::MAX], &line(2)),
-            Association::Time {
-                max_gap_ns: i64::MAX,
-            },
-        )
-        .unwrap();
-        assert_eq!(matched.len(), 2);
-    }
-
-    #[test]
-    fn empty_trajectories_are_refused() {
-        let empty = TimedPoses::untimed(&[]);
-        for association in [Association::default(), Association::Index] {
-            let error = associate(empty, empty, association).unwrap_err();
-            assert_eq!(
-                error,
-                EvaluationError::TooFew {
-                    matched: 0,
-                    estimate: 0,
-                    truth: 0
-                }
-            );
+    fn trajectories_that_cannot_be_associated_are_refused_with_the_reason() {
+        let (two, three) = (seconds(&[1.0, 2.0]), seconds(&[0.0, 1.0, 2.0]));
+        let refused = |estimate: &[i64], truth: &[i64]| by_time(estimate, truth).unwrap_err().0;
+        let (later, apart) = (seconds(&[2.0, 3.0]), seconds(&[10.0, 12.5]));
+        let spans = "1.000 s to 2.000 s, ground truth 10.000 s to 12.500 s";
+        for (refused, words) in [
+            (refused(&two, &apart), spans),
+            (refused(&two, &later), "1 of 2 estimated"),
+            (refused(&three, &[0, 7, 5]), "truth decrease at pose 2"),
+            (refused(&[], &[]), "0 of 0 estimated"),
+        ] {
+            assert!(refused.contains(words), "{refused}");
         }
+        let (poses, empty) = (line(3), TimedPoses::untimed(&[]));
+        let short = TimedPoses::new(&two, &poses);
+        let refused = associate(short, short, Association::default()).unwrap_err();
+        assert!(refused.0.contains("estimate has 3 poses but 2 stamps"));
+        assert!(associate(empty, empty, Association::Index).is_err());
     }
 }

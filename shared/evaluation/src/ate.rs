@@ -4,7 +4,7 @@
 //! Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, in the plane;
 //! the alignment has no scale.
 
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, xy_yaw};
 use serde::{Serialize, Serializer};
 
 use crate::MatchedPoses;
@@ -14,7 +14,6 @@ use crate::MatchedPoses;
 pub struct Ate {
     /// Root of the mean squared distance, m: the figure that papers give.
     pub rmse_m: f64,
-    /// Mean distance, m.
     pub mean_m: f64,
     /// Largest distance, m.
     pub max_m: f64,
@@ -26,11 +25,8 @@ pub struct Ate {
 /// Returns the distances between the positions of the ground truth and of the aligned estimate.
 pub fn ate(matched: &MatchedPoses) -> Ate {
     let truth_from_estimate = align(matched);
-    let distances = || {
-        matched
-            .iter()
-            .map(|(e, t)| distance_m(&truth_from_estimate, e, t))
-    };
+    let distance = |(e, t): (&Pose, &Pose)| distance_m(&truth_from_estimate, e, t);
+    let distances = || matched.iter().map(distance);
     let n = matched.len() as f64;
     Ate {
         rmse_m: (distances().map(|d| d * d).sum::<f64>() / n).sqrt(),
@@ -70,11 +66,8 @@ fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
 }
 
 fn centroid(poses: &[Pose]) -> nalgebra::Vector2<f64> {
-    poses
-        .iter()
-        .map(|p| p.translation.vector)
-        .sum::<nalgebra::Vector2<f64>>()
-        / poses.len() as f64
+    let positions = poses.iter().map(|p| p.translation.vector);
+    positions.sum::<nalgebra::Vector2<f64>>() / poses.len() as f64
 }
 
 fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 {
@@ -84,18 +77,8 @@ fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 
 
 /// Writes a pose as `{ x_m, y_m, yaw_rad }`.
 fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Planar {
-        x_m: f64,
-        y_m: f64,
-        yaw_rad: f64,
-    }
-    Planar {
-        x_m: pose.translation.x,
-        y_m: pose.translation.y,
-        yaw_rad: pose.rotation.angle(),
-    }
-    .serialize(serializer)
+    let [x_m, y_m, yaw_rad] = xy_yaw(pose);
+    serializer.collect_map([("x_m", x_m), ("y_m", y_m), ("yaw_rad", yaw_rad)])
 }
 
 #[cfg(test)]

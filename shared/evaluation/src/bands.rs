@@ -1,5 +1,6 @@
 //! The error of composed poses over time, with the standard deviation that their covariance states.
 
+use gyre_geometry::UncertainMotion;
 use nalgebra::Vector3;
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
@@ -16,7 +17,6 @@ pub struct Bands {
     pub truth_sigma: TruthSigma,
 }
 
-/// The error of one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandSample {
     /// Time since the first motion began, s.
@@ -32,10 +32,8 @@ pub struct BandSample {
 /// one.
 pub fn bands(matched: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
     let start_ns = matched.span_ns().0;
-    let chains = matched
-        .chains
-        .iter()
-        .map(|chain| samples(chain, start_ns, truth_sigma));
+    let of_chain = |chain| samples(chain, start_ns, truth_sigma);
+    let chains = matched.chains.iter().map(of_chain);
     Bands {
         chains: chains.filter(|samples| samples.len() > 1).collect(),
         truth_sigma,
@@ -52,19 +50,16 @@ fn samples(chain: &Chain, start_ns: i64, truth_sigma: TruthSigma) -> Vec<BandSam
         error: Vector3::zeros(),
         sigma: Vector3::zeros(),
     };
-    let later = chain
-        .composed(first)
-        .zip(first + 1..)
-        .filter_map(|(pose, node)| {
-            let truth = chain.true_motion(first, node)?;
-            let covariance = pose.covariance + truth_sigma.of_motion(&truth);
-            let sigma = covariance.diagonal().map(f64::sqrt);
-            Some(BandSample {
-                time_s: time_s(node),
-                error: pose.error(&truth),
-                sigma,
-            })
-        });
+    let sample = |(pose, node): (UncertainMotion, usize)| {
+        let truth = chain.true_motion(first, node)?;
+        let covariance = pose.covariance + truth_sigma.of_motion(&truth);
+        Some(BandSample {
+            time_s: time_s(node),
+            error: pose.error(&truth),
+            sigma: covariance.diagonal().map(f64::sqrt),
+        })
+    };
+    let later = chain.composed(first).zip(first + 1..).filter_map(sample);
     std::iter::once(aligned).chain(later).collect()
 }
 
@@ -74,9 +69,8 @@ impl Bands {
     pub fn inside_percent(&self, sigmas: f64) -> [f64; 3] {
         let later = || self.chains.iter().flat_map(|chain| chain.iter().skip(1));
         let inside = |part: usize| {
-            later()
-                .filter(|s| s.error[part].abs() <= sigmas * s.sigma[part])
-                .count()
+            let is_inside = |s: &&BandSample| s.error[part].abs() <= sigmas * s.sigma[part];
+            later().filter(is_inside).count()
         };
         [0, 1, 2].map(|part| 100.0 * inside(part) as f64 / later().count().max(1) as f64)
     }

@@ -18,16 +18,12 @@ impl fmt::Display for Evaluation {
                 ""
             )?;
         }
-        writeln!(
+        let (path_m, estimated_m) = (self.path_m, self.estimated_path_m);
+        write!(
             f,
-            "path length   {:.2} m, estimate {:.2} m{}",
-            self.path_m,
-            self.estimated_path_m,
-            match self.truth_stands {
-                true => "; the ground truth stands still: is it of this drive?",
-                false => "",
-            }
+            "path length   {path_m:.2} m, estimate {estimated_m:.2} m"
         )?;
+        writeln!(f, "{}", if self.truth_stands { STANDS } else { "" })?;
         match &self.kitti {
             Some(kitti) => writeln!(f, "KITTI         {kitti}")?,
             None => writeln!(f, "KITTI         none: {}", self.why_no_kitti())?,
@@ -36,12 +32,12 @@ impl fmt::Display for Evaluation {
             Some(seg) => writeln!(f, "seg           {seg}")?,
             None => writeln!(f, "seg           none: {TOO_SHORT}")?,
         }
-        let ate = &self.ate;
-        writeln!(
+        let (rmse, mean, max) = (self.ate.rmse_m, self.ate.mean_m, self.ate.max_m);
+        write!(
             f,
-            "ATE           {:.3} m rmse, {:.3} m mean, {:.3} m max, after SE(2) alignment",
-            ate.rmse_m, ate.mean_m, ate.max_m
+            "ATE           {rmse:.3} m rmse, {mean:.3} m mean, {max:.3} m max, "
         )?;
+        writeln!(f, "after SE(2) alignment")?;
         if let Some(end) = &self.end {
             writeln!(f, "end point     {end}")?;
         }
@@ -52,14 +48,14 @@ impl fmt::Display for Evaluation {
                 write!(f, "RPE           none: {why}")?;
             }
         }
-        if f.alternate() {
-            self.fmt_lengths(f)
-        } else {
-            Ok(())
+        match f.alternate() {
+            true => self.fmt_lengths(f),
+            false => Ok(()),
         }
     }
 }
 
+const STANDS: &str = "; the ground truth stands still: is it of this drive?";
 const TOO_SHORT: &str = "the path is not longer than 100 m";
 
 impl Evaluation {
@@ -70,7 +66,6 @@ impl Evaluation {
         }
     }
 
-    /// Writes a line for each length that has segments.
     fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(seg) = &self.seg else { return Ok(()) };
         write!(f, "\n\n  length  segments  translation    rotation     seg")?;
@@ -78,11 +73,10 @@ impl Evaluation {
         for (k, length) in seg.by_length.iter().enumerate() {
             write!(f, "\n{:8.0} {:10}", length.length_m, length.segments)?;
             match self.kitti.as_ref().and_then(|kitti| kitti.by_length.get(k)) {
-                Some(kitti) => write!(
-                    f,
-                    " {:12.4} {:11.4}",
-                    kitti.translation_percent, kitti.rotation_deg_per_100m
-                )?,
+                Some(kitti) => {
+                    write!(f, " {:12.4}", kitti.translation_percent)?;
+                    write!(f, " {:11.4}", kitti.rotation_deg_per_100m)?;
+                }
                 None => write!(f, " {:>12} {:>11}", "-", "-")?,
             }
             write!(f, " {:7.4}", length.percent)?;
@@ -124,25 +118,17 @@ impl fmt::Display for Coverage {
 
 impl fmt::Display for Kitti {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} segments, step {}",
-            self.translation_percent,
-            self.rotation_deg_per_100m,
-            self.rotation_deg_per_km,
-            self.segments,
-            self.step
-        )
+        write!(f, "{:.5} % translation, ", self.translation_percent)?;
+        let (per_100m, per_km) = (self.rotation_deg_per_100m, self.rotation_deg_per_km);
+        write!(f, "{per_100m:.5} deg/100 m ({per_km:.4} deg/km) rotation; ")?;
+        write!(f, "{} segments, step {}", self.segments, self.step)
     }
 }
 
 impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:.4} % of the length; rmse after SE(2) alignment of each segment",
-            self.percent
-        )
+        write!(f, "{:.4} % of the length; rmse after SE(2) ", self.percent)?;
+        write!(f, "alignment of each segment")
     }
 }
 
@@ -152,35 +138,26 @@ impl fmt::Display for EndError {
         if let Some(percent) = self.percent {
             write!(f, ", {percent:.2} % of the path")?;
         }
-        write!(
-            f,
-            ", heading {:.2} deg; first poses aligned",
-            self.heading_deg
-        )
+        let heading_deg = self.heading_deg;
+        write!(f, ", heading {heading_deg:.2} deg; first poses aligned")
     }
 }
 
 impl fmt::Display for Rpe {
     /// Writes two lines, the second indented as the rows of an evaluation are.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "translation {:.4} m rmse, {:.4} m mean",
-            self.translation_rmse_m, self.translation_mean_m
-        )?;
+        let (rmse, mean) = (self.translation_rmse_m, self.translation_mean_m);
+        write!(f, "translation {rmse:.4} m rmse, {mean:.4} m mean")?;
         if let Some(ratio) = self.forward_ratio {
             write!(f, "; forward distance {ratio:.4} of the true one")?;
         }
-        let (rmse, mean, pairs) = (
-            self.rotation_rmse_deg,
-            self.rotation_mean_deg,
-            self.pairs.len(),
-        );
+        let (rmse, mean) = (self.rotation_rmse_deg, self.rotation_mean_deg);
         write!(
             f,
-            "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs",
+            "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean",
             ""
-        )
+        )?;
+        write!(f, "; {} pairs", self.pairs.len())
     }
 }
 
@@ -188,40 +165,23 @@ impl fmt::Display for Nees {
     /// Writes a table of all segments; the alternate form has lines for each half of the drive,
     /// too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (motions, without_truth) = (self.motions, self.without_truth);
+        let (without_covariance, sigma) = (self.without_covariance, self.truth_sigma);
         write!(
             f,
-            "covariance    {} motions; left out: {} without ground truth, ",
-            self.motions, self.without_truth
-        )?;
-        writeln!(
-            f,
-            "{} without covariance; ground truth {}",
-            self.without_covariance, self.truth_sigma
-        )?;
-        writeln!(
-            f,
-            "{:14}mean NEES over its degrees of freedom (1: consistent, above: overconfident)",
+            "covariance    {motions} motions; left out: {without_truth} without ground truth, \
+             {without_covariance} without covariance; ground truth {sigma}\n\
+             {0:14}mean NEES over its degrees of freedom (1: consistent, above: overconfident)\n\
+             {0:14}[95 % acceptance interval of independent errors]  share outside the 95 % region\n\
+             \n motions      half   segments            pose                     translation                      yaw",
             ""
-        )?;
-        writeln!(
-            f,
-            "{:14}[95 % acceptance interval of independent errors]  share outside the 95 % region",
-            ""
-        )?;
-        write!(
-            f,
-            "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
-            "motions", "half", "segments", "pose", "translation", "yaw"
         )?;
         self.by_length.iter().try_for_each(|length| length.fmt(f))?;
         let lengths = self.by_length.iter();
         let factors = lengths.map(|length| format!("{:.2}", length.all.pose.ratio.sqrt()));
-        write!(
-            f,
-            "\n\n{:14}poses err {} times as much as their covariances say",
-            "",
-            factors.collect::<Vec<_>>().join(", ")
-        )
+        let factors = factors.collect::<Vec<_>>().join(", ");
+        write!(f, "\n\n{:14}poses err {factors} times as much ", "")?;
+        write!(f, "as their covariances say")
     }
 }
 
@@ -230,13 +190,10 @@ impl fmt::Display for NeesLength {
     /// half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
-        let halves = [("first", &self.first_half), ("second", &self.second_half)];
-        let halves = if f.alternate() { &halves[..] } else { &[] };
-        for (half, figures) in halves
-            .iter()
-            .filter_map(|(half, figures)| Some((half, figures.as_ref()?)))
-        {
-            write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
+        for (half, figures) in [("first", &self.first_half), ("second", &self.second_half)] {
+            if let Some(figures) = figures.as_ref().filter(|_| f.alternate()) {
+                write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
+            }
         }
         Ok(())
     }
@@ -246,12 +203,10 @@ impl fmt::Display for TruthSigma {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self == Self::default() {
             true => write!(f, "exact"),
-            false => write!(
-                f,
-                "sigma {} m, {:.3} deg",
-                self.position_m,
-                self.yaw_rad.to_degrees()
-            ),
+            false => {
+                let (position_m, yaw_deg) = (self.position_m, self.yaw_rad.to_degrees());
+                write!(f, "sigma {position_m} m, {yaw_deg:.3} deg")
+            }
         }
     }
 }
@@ -260,11 +215,11 @@ impl fmt::Display for NeesFigures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:11}", self.segments)?;
         for figure in [self.pose, self.translation, self.yaw] {
-            let [low, high] = figure.acceptance_interval;
+            let ([low, high], outside) = (figure.acceptance_interval, figure.outside_percent);
             write!(
                 f,
-                "{:8.2} [{low:.2}, {high:.2}]{:6.1} %",
-                figure.ratio, figure.outside_percent
+                "{:8.2} [{low:.2}, {high:.2}]{outside:6.1} %",
+                figure.ratio
             )?;
         }
         Ok(())

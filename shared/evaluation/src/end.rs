@@ -8,7 +8,6 @@ use crate::MatchedPoses;
 /// al., Fig. 3, its last sample).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndError {
-    /// Distance between the last positions, m.
     pub position_m: f64,
     /// The same as a share of the path length, %; `None` if the ground truth does not move.
     pub percent: Option<f64>,
@@ -20,20 +19,14 @@ pub struct EndError {
 pub fn end_error(matched: &MatchedPoses) -> EndError {
     let last = matched.len() - 1;
     let (estimate, truth) = (matched.estimate(), matched.truth());
-    let (estimated, actual) = (
-        estimate[0].inv_mul(&estimate[last]),
-        truth[0].inv_mul(&truth[last]),
-    );
+    let [estimated, actual] = [estimate, truth].map(|poses| poses[0].inv_mul(&poses[last]));
     let position_m = (estimated.translation.vector - actual.translation.vector).norm();
+    let turn = actual.rotation.rotation_to(&estimated.rotation);
     let path_m = crate::matched::path_m(truth);
     EndError {
         position_m,
         percent: (path_m > 0.0).then(|| 100.0 * position_m / path_m),
-        heading_deg: actual
-            .rotation
-            .rotation_to(&estimated.rotation)
-            .angle()
-            .to_degrees(),
+        heading_deg: turn.angle().to_degrees(),
     }
 }
 
@@ -45,23 +38,15 @@ mod tests {
 
     #[test]
     fn only_the_motion_from_the_first_to_the_last_pose_counts() {
-        let truth = vec![
-            pose(5.0, 5.0, 0.0),
-            pose(15.0, 5.0, 0.0),
-            pose(25.0, 5.0, 0.1),
-        ];
+        let truth = [(5.0, 0.0), (15.0, 0.0), (25.0, 0.1)];
+        let truth = truth.map(|(x, yaw)| pose(x, 5.0, yaw)).to_vec();
         // Another start and heading, errors on the way, and an end 3 m ahead and 4 m to the left.
         let start = pose(-7.0, 2.0, 1.0);
-        let estimate = vec![
-            start,
-            start * pose(99.0, 0.0, 2.0),
-            start * pose(23.0, 4.0, 0.2),
-        ];
+        let [on_the_way, last] = [pose(99.0, 0.0, 2.0), pose(23.0, 4.0, 0.2)];
+        let estimate = vec![start, start * on_the_way, start * last];
         let end = end_error(&MatchedPoses::new(estimate, truth).unwrap());
-        assert!(
-            (end.position_m - 5.0).abs() < 1e-9
-                && (end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9
-        );
+        assert!((end.position_m - 5.0).abs() < 1e-9);
+        assert!((end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9);
         assert!((end.percent.unwrap() - 25.0).abs() < 1e-9, "of 20 m");
     }
 

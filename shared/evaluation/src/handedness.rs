@@ -16,7 +16,6 @@ use crate::{MatchedPoses, ate::aligned_rmse_m};
 pub struct Axes {
     /// y was negated: the path was mirrored.
     pub y_negated: bool,
-    /// yaw was negated.
     pub heading_negated: bool,
     /// Set if only one of the two was negated: then heading and path of one of the trajectories
     /// contradict each other.
@@ -56,10 +55,8 @@ pub enum HeadingFault {
     Unclear,
 }
 
-/// The sign of an axis that fits clearly better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sign {
-    /// The sign as given.
     AsGiven,
     /// The opposite sign.
     Negated,
@@ -71,7 +68,6 @@ enum Sign {
 const CLEAR_SHARE: f64 = 0.5;
 /// ...and the other's misfit is more than rounding: for positions, m.
 const MIN_MISFIT_M: f64 = 0.01;
-/// For headings, rad.
 const MIN_MISFIT_RAD: f64 = 1e-3;
 /// A heading that varies by less than this is constant, rad (TUM files have nine decimals).
 const CONSTANT_RAD: f64 = 1e-6;
@@ -88,23 +84,14 @@ const COURSE_STEP_M: f64 = 5.0;
 /// for both. So a left-handed sensor frame is always found, and a poor estimate is not mirrored
 /// because its mirror image happens to be a little nearer.
 pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
-    let (estimate_yaw, truth_yaw) = (
-        unwrapped_yaw(matched.estimate()),
-        unwrapped_yaw(matched.truth()),
-    );
-    let given_m = aligned_rmse_m(matched.estimate(), matched.truth());
-    let mirror_image: Vec<_> = matched
-        .estimate()
-        .iter()
-        .map(|p| negate(p, true, true))
-        .collect();
-    let mirrored_m = aligned_rmse_m(&mirror_image, matched.truth());
+    let (estimate, truth) = (matched.estimate(), matched.truth());
+    let (estimate_yaw, truth_yaw) = (unwrapped_yaw(estimate), unwrapped_yaw(truth));
+    let given_m = aligned_rmse_m(estimate, truth);
+    let mirror_image: Vec<_> = estimate.iter().map(|p| negate(p, true, true)).collect();
+    let mirrored_m = aligned_rmse_m(&mirror_image, truth);
     let y = sense(given_m, mirrored_m, MIN_MISFIT_M);
-    let heading = sense(
-        heading_misfit(&estimate_yaw, &truth_yaw, 1.0),
-        heading_misfit(&estimate_yaw, &truth_yaw, -1.0),
-        MIN_MISFIT_RAD,
-    );
+    let [given, negated] = [1.0, -1.0].map(|sign| heading_misfit(&estimate_yaw, &truth_yaw, sign));
+    let heading = sense(given, negated, MIN_MISFIT_RAD);
     let (y_negated, heading_negated) = decide(y, heading, mirrored_m < given_m + MIN_MISFIT_M);
     let lacks =
         |yaw: &[f64], other: &[f64]| range(yaw) < CONSTANT_RAD && range(other) > MIN_TURN_RAD;
@@ -115,13 +102,10 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
         truth_lacks_heading: lacks(&truth_yaw, &estimate_yaw),
         estimate_lacks_heading: lacks(&estimate_yaw, &truth_yaw),
     };
-    (
-        matched.map_estimate(|p| negate(p, y_negated, heading_negated)),
-        axes,
-    )
+    let change = |pose: &Pose| negate(pose, y_negated, heading_negated);
+    (matched.map_estimate(change), axes)
 }
 
-/// Returns whether to negate y and heading, by the votes of both.
 fn decide(y: Sign, heading: Sign, mirror_no_worse: bool) -> (bool, bool) {
     use Sign::{AsGiven, Negated, Open};
     match (y, heading) {
@@ -156,23 +140,19 @@ fn negate(pose: &Pose, y: bool, heading: bool) -> Pose {
 /// Returns the yaw of each pose without jumps of a full turn, rad.
 fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
     let mut yaw = poses.first().map_or(0.0, |p| p.rotation.angle());
-    let turns = poses
-        .windows(2)
-        .map(|w| w[0].rotation.angle_to(&w[1].rotation));
-    std::iter::once(0.0)
-        .chain(turns)
-        .map(|turn| {
-            yaw += turn;
-            yaw
-        })
-        .take(poses.len())
-        .collect()
+    let turn = |w: &[Pose]| w[0].rotation.angle_to(&w[1].rotation);
+    let turns = poses.windows(2).map(turn);
+    let add = |turn| {
+        yaw += turn;
+        yaw
+    };
+    let unwrapped = std::iter::once(0.0).chain(turns).map(add);
+    unwrapped.take(poses.len()).collect()
 }
 
 fn range(values: &[f64]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    let grow = |(low, high): (f64, f64), &it: &f64| (low.min(it), high.max(it));
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), grow);
     high - low
 }
 
@@ -185,13 +165,9 @@ fn heading_misfit(estimate: &[f64], truth: &[f64], sign: f64) -> f64 {
 }
 
 fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
-    let (estimate, truth) = (
-        turns_with_path(matched.estimate()),
-        turns_with_path(matched.truth()),
-    );
-    match (estimate < 0.0, truth < 0.0) {
-        (true, false) => HeadingFault::Estimate,
-        (false, true) => HeadingFault::Truth,
+    match [matched.estimate(), matched.truth()].map(|poses| turns_with_path(poses) < 0.0) {
+        [true, false] => HeadingFault::Estimate,
+        [false, true] => HeadingFault::Truth,
         _ => HeadingFault::Unclear,
     }
 }
@@ -271,36 +247,19 @@ mod tests {
     #[test]
     fn each_combination_of_signs_is_found_with_the_trajectory_at_fault() {
         for (y, heading) in [(false, false), (true, true), (true, false), (false, true)] {
-            let fault = |side| (y != heading).then_some(side);
-            let estimate = resolve(with(drive(), y, heading), drive());
-            let expected = Axes {
+            let axes = |side| Axes {
                 y_negated: y,
                 heading_negated: heading,
+                heading_fault: (y != heading).then_some(side),
                 ..Axes::default()
             };
-            assert_eq!(
-                estimate,
-                Axes {
-                    heading_fault: fault(HeadingFault::Estimate),
-                    ..expected
-                }
-            );
-            let truth = resolve(drive(), with(drive(), y, heading));
-            assert_eq!(
-                truth,
-                Axes {
-                    heading_fault: fault(HeadingFault::Truth),
-                    ..expected
-                }
-            );
+            let changed = with(drive(), y, heading);
+            let matched = MatchedPoses::new(changed.clone(), drive()).unwrap();
+            let (resolved, found) = resolve_axes(matched);
+            assert_eq!(resolved.estimate(), drive());
+            assert_eq!(found, axes(HeadingFault::Estimate));
+            assert_eq!(resolve(drive(), changed), axes(HeadingFault::Truth));
         }
-    }
-
-    #[test]
-    fn the_estimate_is_converted_to_the_signs_of_the_ground_truth() {
-        let matched = MatchedPoses::new(with(drive(), true, true), drive()).unwrap();
-        let (resolved, _) = resolve_axes(matched);
-        assert_eq!(resolved.estimate(), drive());
     }
 
     #[test]
@@ -311,30 +270,20 @@ mod tests {
 
     #[test]
     fn a_poor_estimate_is_not_mirrored_for_a_small_gain() {
-        assert_eq!(
-            decide(sense(20.0, 15.0, 0.01), Sign::AsGiven, true),
-            (false, false)
-        );
-        assert_eq!(
-            decide(sense(20.0, 15.0, 0.01), Sign::Negated, true),
-            (true, true)
-        );
+        let y = sense(20.0, 15.0, 0.01);
+        assert_eq!(decide(y, Sign::AsGiven, true), (false, false));
+        assert_eq!(decide(y, Sign::Negated, true), (true, true));
     }
 
     #[test]
     fn a_ground_truth_without_heading_is_recognised() {
-        let positions: Vec<Pose> = drive()
-            .iter()
-            .map(|p| pose(p.translation.x, p.translation.y, 0.0))
-            .collect();
+        let position = |p: &Pose| pose(p.translation.x, p.translation.y, 0.0);
+        let positions: Vec<Pose> = drive().iter().map(position).collect();
         let axes = resolve(with(drive(), true, true), positions.clone());
         assert!(axes.truth_lacks_heading && axes.y_negated && axes.heading_negated);
         assert_eq!(axes.heading_fault, None);
         let axes = resolve(positions, drive());
         assert!(axes.estimate_lacks_heading && !axes.truth_lacks_heading);
-        assert!(
-            axes.to_string().contains("the estimate has no heading"),
-            "{axes}"
-        );
+        assert!(axes.to_string().contains("the estimate has no heading"));
     }
 }

@@ -19,7 +19,6 @@ use crate::{
 pub struct Kitti {
     /// Translation error, % of the segment length.
     pub translation_percent: f64,
-    /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
     /// The same in degrees per km: 1000 times the "deg/m" of the KITTI leaderboard.
     pub rotation_deg_per_km: f64,
@@ -30,13 +29,11 @@ pub struct Kitti {
     pub by_length: Vec<KittiLength>,
 }
 
-/// The KITTI errors of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KittiLength {
     pub length_m: f64,
     /// Translation error, % of the segment length.
     pub translation_percent: f64,
-    /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
     pub segments: usize,
 }
@@ -52,25 +49,30 @@ pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
         errors.add(segment.length, segment_error(matched, segment));
     }
     let ([translation_percent, rotation_deg_per_100m], segments) = errors.mean()?;
+    let by_length = errors.means();
+    let by_length = by_length.map(
+        |(length_m, [translation, rotation], segments)| KittiLength {
+            length_m,
+            translation_percent: translation,
+            rotation_deg_per_100m: rotation,
+            segments,
+        },
+    );
     Some(Kitti {
         translation_percent,
         rotation_deg_per_100m,
         rotation_deg_per_km: 10.0 * rotation_deg_per_100m,
         segments,
         step,
-        by_length: errors.means().map(length_mean).collect(),
+        by_length: by_length.collect(),
     })
 }
 
-/// Returns the translation error (%) and the rotation error (deg/100 m) of one segment.
 fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
     let estimated = Motion::within(matched.estimate(), segment);
     let error = estimated.to(&Motion::within(matched.truth(), segment));
     let per_100m = 100.0 / segment.length_m();
-    [
-        error.translation.norm() * per_100m,
-        error.angle_rad().to_degrees() * per_100m,
-    ]
+    [error.translation.norm(), error.angle_rad().to_degrees()].map(|it| it * per_100m)
 }
 
 /// A planar rigid motion in complex numbers: x -> rotation x + translation.
@@ -91,12 +93,10 @@ impl Motion {
         }
     }
 
-    /// inverse(first pose) * last pose.
     fn within(poses: &[Pose], segment: Segment) -> Self {
         Self::of(&poses[segment.first]).to(&Self::of(&poses[segment.last]))
     }
 
-    /// inverse(self) * other.
     fn to(&self, other: &Self) -> Self {
         Self {
             rotation: other.rotation / self.rotation,
@@ -107,16 +107,5 @@ impl Motion {
     /// acos((trace - 1) / 2) of the rotation as a 3 x 3 matrix, whose trace is 1 + 2 cos.
     fn angle_rad(&self) -> f64 {
         self.rotation.re.clamp(-1.0, 1.0).acos()
-    }
-}
-
-fn length_mean(
-    (length_m, [translation_percent, rotation_deg_per_100m], segments): (f64, [f64; 2], usize),
-) -> KittiLength {
-    KittiLength {
-        length_m,
-        translation_percent,
-        rotation_deg_per_100m,
-        segments,
     }
 }

@@ -58,7 +58,7 @@ pub use associate::{Association, Coverage, TimedPoses, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
 pub use end::{EndError, end_error};
-pub use error::{EvaluationError, Side};
+pub use error::EvaluationError;
 pub use gaps::max_gap_ns;
 pub use handedness::{Axes, HeadingFault};
 pub use kitti::{Kitti, kitti};

@@ -7,7 +7,6 @@ use serde::Serialize;
 /// Differences between measured relative poses and a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoopErrors {
-    /// The number of relative poses.
     pub loops: usize,
     /// RMS of the distance, m.
     pub translation_rmse_m: f64,

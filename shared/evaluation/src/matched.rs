@@ -2,7 +2,10 @@
 
 use gyre_geometry::Pose;
 
-use crate::{EvaluationError, Side, error::LARGEST_COORDINATE_M};
+use crate::{
+    EvaluationError,
+    error::{ESTIMATE, LARGEST_COORDINATE_M, TRUTH},
+};
 
 /// Estimated and ground-truth poses, associated by index: valid, at least two, equally many. The
 /// fixed frames may differ.
@@ -13,24 +16,18 @@ pub struct MatchedPoses {
 }
 
 impl MatchedPoses {
-    /// Associates the poses one by one.
     pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
         let (n, m) = (estimate.len(), truth.len());
         if n != m {
-            return Err(EvaluationError::LengthMismatch {
-                estimate: n,
-                truth: m,
-            });
+            return Err(EvaluationError(format!(
+                "{n} estimated poses cannot be compared one by one with {m} poses of the ground truth"
+            )));
         }
         if n < 2 {
-            return Err(EvaluationError::TooFew {
-                matched: n,
-                estimate: n,
-                truth: m,
-            });
+            return Err(EvaluationError::too_few(n, [n, m]));
         }
-        require_poses(Side::Estimate, &estimate)?;
-        require_poses(Side::Truth, &truth)?;
+        require_poses(ESTIMATE, &estimate)?;
+        require_poses(TRUTH, &truth)?;
         Ok(Self { estimate, truth })
     }
 
@@ -60,13 +57,10 @@ impl MatchedPoses {
             travelled += step;
             travelled
         };
-        std::iter::once(0.0)
-            .chain(steps_m(&self.truth))
-            .map(add)
-            .collect()
+        let steps_m = std::iter::once(0.0).chain(steps_m(&self.truth));
+        steps_m.map(add).collect()
     }
 
-    /// Applies `change`, which must keep poses valid, to each estimated pose.
     pub(crate) fn map_estimate(self, change: impl FnMut(&Pose) -> Pose) -> Self {
         Self {
             estimate: self.estimate.iter().map(change).collect(),
@@ -79,40 +73,32 @@ impl MatchedPoses {
 const LARGEST_ROUNDING: f64 = 1e-3;
 
 /// Refuses positions that are not finite or too far out, and invalid rotations.
-pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), EvaluationError> {
+pub(crate) fn require_poses(side: &str, poses: &[Pose]) -> Result<(), EvaluationError> {
     for (index, pose) in poses.iter().enumerate() {
         let (x_m, y_m) = (pose.translation.x, pose.translation.y);
         // NaN fails these comparisons.
         let within = |v: f64| v.abs() <= LARGEST_COORDINATE_M;
         if !(within(x_m) && within(y_m)) {
-            return Err(EvaluationError::BadPosition {
-                side,
-                index,
-                x_m,
-                y_m,
-            });
+            return Err(EvaluationError(format!(
+                "the position of pose {index} of the {side} is not within {LARGEST_COORDINATE_M:e} m: ({x_m}, {y_m})"
+            )));
         }
         let length = pose.rotation.complex().norm();
         let on_circle = (length - 1.0).abs() <= LARGEST_ROUNDING;
         if !on_circle {
-            return Err(EvaluationError::BadRotation {
-                side,
-                index,
-                length,
-            });
+            return Err(EvaluationError(format!(
+                "the rotation of pose {index} of the {side} is invalid: its cosine and sine have length {length}, not 1"
+            )));
         }
     }
     Ok(())
 }
 
-/// The distances from pose to pose, m.
 fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
-    poses
-        .windows(2)
-        .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
+    let step = |w: &[Pose]| (w[1].translation.vector - w[0].translation.vector).norm();
+    poses.windows(2).map(step)
 }
 
-/// The length of the path, m.
 pub fn path_m(poses: &[Pose]) -> f64 {
     steps_m(poses).sum()
 }
@@ -124,68 +110,32 @@ mod tests {
     use gyre_geometry::pose;
 
     #[test]
-    fn lists_of_unequal_length_or_below_two_poses_are_refused() {
+    fn unequal_short_and_invalid_lists_are_refused_with_the_reason() {
         let still = Pose::identity();
-        assert_eq!(
-            MatchedPoses::new(vec![still; 3], vec![still; 2]),
-            Err(EvaluationError::LengthMismatch {
-                estimate: 3,
-                truth: 2
-            })
-        );
-        assert_eq!(
-            MatchedPoses::new(vec![still], vec![still]),
-            Err(EvaluationError::TooFew {
-                matched: 1,
-                estimate: 1,
-                truth: 1
-            })
-        );
-    }
-
-    #[test]
-    fn an_invalid_position_is_refused_with_its_index() {
-        for x in [f64::NAN, f64::INFINITY, -2e9] {
-            let mut poses = vec![Pose::identity(); 3];
-            poses[2].translation.x = x;
-            let error = MatchedPoses::new(vec![Pose::identity(); 3], poses).unwrap_err();
-            assert!(matches!(
-                error,
-                EvaluationError::BadPosition {
-                    side: Side::Truth,
-                    index: 2,
-                    ..
-                }
-            ));
+        let far = |x| vec![still, pose(x, 0.0, 0.0)];
+        let scaled = |length: f64| {
+            let rotation = nalgebra::Unit::new_unchecked(nalgebra::Complex::new(0.0, length));
+            vec![Pose::from_parts(Default::default(), rotation); 2]
+        };
+        let two = vec![still; 2];
+        assert!(MatchedPoses::new(scaled(1.0 + 1e-6), two.clone()).is_ok());
+        for (estimate, truth, words) in [
+            (vec![still; 3], two.clone(), "one by one with 2 poses"),
+            (vec![still], vec![still], "1 of 1 estimated"),
+            (two.clone(), far(f64::NAN), "pose 1 of the ground truth"),
+            (two.clone(), far(f64::INFINITY), "1 of the ground truth"),
+            (far(-2e9), two.clone(), "pose 1 of the estimate"),
+            (scaled(0.5), two, "rotation of pose 0 of the estimate"),
+        ] {
+            let refused = MatchedPoses::new(estimate, truth).unwrap_err().0;
+            assert!(refused.contains(words), "{refused}");
         }
     }
 
     #[test]
-    fn a_rotation_off_the_unit_circle_is_refused_beyond_rounding() {
-        let scaled = |length: f64| {
-            let rotation = nalgebra::Unit::new_unchecked(nalgebra::Complex::new(0.0, length));
-            MatchedPoses::new(
-                vec![Pose::from_parts(Default::default(), rotation); 2],
-                vec![Pose::identity(); 2],
-            )
-        };
-        assert!(scaled(1.0 + 1e-6).is_ok());
-        let refused = EvaluationError::BadRotation {
-            side: Side::Estimate,
-            index: 0,
-            length: 0.5,
-        };
-        assert_eq!(scaled(0.5), Err(refused));
-    }
-
-    #[test]
     fn distance_is_the_path_length_of_the_ground_truth() {
-        let at = |x, y| pose(x, y, 0.0);
-        let matched = MatchedPoses::new(
-            vec![at(0.0, 0.0); 3],
-            vec![at(1.0, 1.0), at(4.0, 5.0), at(4.0, 3.0)],
-        )
-        .unwrap();
+        let truth = [(1.0, 1.0), (4.0, 5.0), (4.0, 3.0)].map(|(x, y)| pose(x, y, 0.0));
+        let matched = MatchedPoses::new(vec![Pose::identity(); 3], truth.to_vec()).unwrap();
         assert_eq!(matched.distance_m(), [0.0, 5.0, 7.0]);
     }
 }

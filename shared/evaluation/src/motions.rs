@@ -1,10 +1,11 @@
 //! Association of reported motions with the ground truth at their stamps.
 
-use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, UncertainMotion};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, UncertainMotion, xy_yaw};
 
 use crate::{
-    EvaluationError, Side, TimedPoses,
+    EvaluationError, TimedPoses,
     associate::{At, require_stamps, truth_at},
+    error::{ESTIMATE, TRUTH},
     matched::require_poses,
 };
 
@@ -15,7 +16,6 @@ pub struct TimedMotion {
     pub from_ns: i64,
     /// Stamp of the later frame, ns.
     pub to_ns: i64,
-    /// The later frame in the earlier one.
     pub estimate: OdometryMotion,
 }
 
@@ -59,7 +59,6 @@ impl Part {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedMotions {
     pub(crate) chains: Vec<Chain>,
-    /// Motions given.
     pub motions: usize,
     /// Motions without ground truth at both ends.
     pub without_truth: usize,
@@ -83,8 +82,8 @@ impl MatchedMotions {
         truth: TimedPoses<'_>,
         max_gap_ns: i64,
     ) -> Result<Self, EvaluationError> {
-        require_poses(Side::Truth, truth.poses)?;
-        require_stamps(Side::Truth, &truth)?;
+        require_poses(TRUTH, truth.poses)?;
+        require_stamps(TRUTH, &truth)?;
         require_motions(motions)?;
         let at = |stamp_ns| match truth_at(truth, stamp_ns, max_gap_ns) {
             At::Pose(pose) => Some(pose),
@@ -109,11 +108,8 @@ impl MatchedMotions {
 
     /// Adds a motion to the last chain if it starts where that ends, else to a new one.
     fn add(&mut self, motion: &TimedMotion, from: Option<Pose>, to: Option<Pose>) {
-        match self
-            .chains
-            .last_mut()
-            .filter(|chain| chain.stamps_ns.last() == Some(&motion.from_ns))
-        {
+        let follows = |chain: &&mut Chain| chain.stamps_ns.last() == Some(&motion.from_ns);
+        match self.chains.last_mut().filter(follows) {
             Some(chain) => {
                 chain.motions.push(motion.estimate);
                 chain.stamps_ns.push(motion.to_ns);
@@ -128,38 +124,25 @@ impl MatchedMotions {
     }
 
     fn require_some(self) -> Result<Self, EvaluationError> {
-        let both_ends = |chain: &Chain| {
-            chain
-                .truth
-                .windows(2)
-                .any(|w| w[0].is_some() && w[1].is_some())
-        };
-        match self.chains.iter().any(both_ends) {
+        let mut ends = self.chains.iter().flat_map(|chain| chain.truth.windows(2));
+        match ends.any(|w| w[0].is_some() && w[1].is_some()) {
             true => Ok(self),
-            false => Err(EvaluationError::NoMatchedMotion {
-                motions: self.motions,
-                without_truth: self.without_truth,
-                without_covariance: self.without_covariance,
-            }),
+            false => Err(EvaluationError(format!(
+                "none of {} motions has ground truth and covariance: {} without ground truth at both ends (same clock?), {} without a positive definite covariance",
+                self.motions, self.without_truth, self.without_covariance
+            ))),
         }
     }
 
     /// Returns the first and last stamp of the chains, ns.
     pub(crate) fn span_ns(&self) -> (i64, i64) {
-        let first = self
-            .chains
-            .first()
-            .and_then(|chain| chain.stamps_ns.first());
-        let last = self.chains.last().and_then(|chain| chain.stamps_ns.last());
-        (
-            first.copied().unwrap_or_default(),
-            last.copied().unwrap_or_default(),
-        )
+        let mut stamps = self.chains.iter().flat_map(|chain| &chain.stamps_ns);
+        let first = stamps.next().copied().unwrap_or_default();
+        (first, stamps.last().copied().unwrap_or(first))
     }
 }
 
 impl Chain {
-    /// Returns the composed motions from node `first` to nodes `first + 1`, `first + 2`, ...
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()
@@ -181,36 +164,19 @@ impl Chain {
 
 fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
     let mut previous_ns = motions.first().map_or(0, |first| first.from_ns);
-    for (
-        index,
-        &TimedMotion {
-            from_ns,
-            to_ns,
-            estimate,
-        },
-    ) in motions.iter().enumerate()
-    {
-        let motion = estimate.motion;
-        if require_poses(Side::Estimate, &[motion]).is_err() {
-            let (x_m, y_m, yaw_rad) = (
-                motion.translation.x,
-                motion.translation.y,
-                motion.rotation.angle(),
-            );
-            return Err(EvaluationError::BadMotion {
-                index,
-                x_m,
-                y_m,
-                yaw_rad,
-            });
+    for (index, motion) in motions.iter().enumerate() {
+        let TimedMotion { from_ns, to_ns, .. } = *motion;
+        let motion = motion.estimate.motion;
+        if require_poses(ESTIMATE, &[motion]).is_err() {
+            let [x_m, y_m, yaw_rad] = xy_yaw(&motion);
+            return Err(EvaluationError(format!(
+                "motion {index} is invalid: ({x_m} m, {y_m} m, {yaw_rad} rad)"
+            )));
         }
         if from_ns < previous_ns || to_ns <= from_ns {
-            return Err(EvaluationError::MotionOutOfOrder {
-                index,
-                previous_ns,
-                from_ns,
-                to_ns,
-            });
+            return Err(EvaluationError(format!(
+                "motion {index} is out of order: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
+            )));
         }
         previous_ns = to_ns;
     }
@@ -259,16 +225,11 @@ mod tests {
             motion(50, 60, 1.0),
         ];
         let found = matched(&motions, &[0, 20, 40, 60]).unwrap();
-        let stamps: Vec<_> = found
-            .chains
-            .iter()
-            .map(|chain| chain.stamps_ns.iter().map(|t| t / MS).collect::<Vec<_>>())
-            .collect();
+        let in_ms = |chain: &Chain| chain.stamps_ns.iter().map(|t| t / MS).collect();
+        let stamps: Vec<Vec<i64>> = found.chains.iter().map(in_ms).collect();
         assert_eq!(stamps, [vec![0, 10, 20], vec![30, 40], vec![50, 60]]);
-        assert_eq!(
-            (found.motions, found.without_truth, found.without_covariance),
-            (5, 0, 1)
-        );
+        let counts = (found.motions, found.without_truth, found.without_covariance);
+        assert_eq!(counts, (5, 0, 1));
         assert_eq!(found.span_ns(), (0, 60 * MS));
     }
 
@@ -277,66 +238,39 @@ mod tests {
         let motions = [0, 10, 20, 30].map(|t| motion(t, t + 10, 1.0));
         let found = matched(&motions, &[0, 10, 40]).unwrap();
         assert_eq!((found.chains.len(), found.without_truth), (1, 3));
-        assert_eq!(
-            found.chains[0].true_motion(0, 4),
-            Some(pose(40.0, 0.0, 0.0))
-        );
+        let whole = found.chains[0].true_motion(0, 4);
+        assert_eq!(whole, Some(pose(40.0, 0.0, 0.0)));
         assert_eq!(found.chains[0].true_motion(1, 2), None);
     }
 
     #[test]
     fn adjoining_parts_share_no_motion_and_leave_none_out() {
         let motions = [0, 10, 20, 30, 45].map(|t| motion(t, t + 10, 1.0));
-        let starts = |from, to| {
-            Part::new(from, to)
-                .unwrap()
-                .of(&motions)
-                .iter()
-                .map(|m| m.from_ns / MS)
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(
-            (starts(0.0, 0.5), starts(0.5, 1.0)),
-            (vec![0, 10, 20], vec![30, 45])
-        );
+        let of = |from, to| Part::new(from, to).unwrap().of(&motions);
+        assert_eq!((of(0.0, 0.5), of(0.5, 1.0)), motions.split_at(3));
         assert_eq!(Part::ALL.of(&motions), motions);
-        assert_eq!(starts(0.4, 0.5), Vec::<i64>::new());
-        for (from, to) in [
-            (0.5, 0.5),
-            (0.6, 0.5),
-            (-0.1, 0.5),
-            (0.0, 1.1),
-            (f64::NAN, 1.0),
-        ] {
+        assert!(of(0.4, 0.5).is_empty());
+        for (from, to) in [(0.5, 0.5), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.1)] {
             assert_eq!(Part::new(from, to), None);
         }
+        assert_eq!(Part::new(f64::NAN, 1.0), None);
     }
 
     #[test]
     fn motions_that_cannot_be_matched_are_refused_with_the_reason() {
-        let none = matched(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
-        assert_eq!(
-            none,
-            EvaluationError::NoMatchedMotion {
-                motions: 2,
-                without_truth: 1,
-                without_covariance: 1
-            }
-        );
-        assert!(matches!(
-            matched(&[], &[0, 10]),
-            Err(EvaluationError::NoMatchedMotion { motions: 0, .. })
-        ));
-        let backwards = matched(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
-        assert!(matches!(
-            backwards,
-            Err(EvaluationError::MotionOutOfOrder { index: 1, .. })
-        ));
         let mut broken = motion(0, 10, 1.0);
         broken.estimate.motion.translation.x = f64::NAN;
-        assert!(matches!(
-            matched(&[broken], &[0, 10]),
-            Err(EvaluationError::BadMotion { index: 0, .. })
-        ));
+        let unmatched = [motion(0, 10, 0.0), motion(100, 110, 1.0)];
+        for (motions, words) in [
+            (&unmatched[..], "none of 2 motions"),
+            (&unmatched, ": 1 without ground truth"),
+            (&unmatched, "(same clock?), 1 without"),
+            (&[], "none of 0 motions"),
+            (&[motion(0, 10, 1.0), motion(9, 19, 1.0)], "motion 1 is out"),
+            (&[broken], "motion 0 is invalid"),
+        ] {
+            let refused = matched(motions, &[0, 10]).unwrap_err().0;
+            assert!(refused.contains(words), "{refused}");
+        }
     }
 }

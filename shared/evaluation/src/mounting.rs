@@ -55,11 +55,7 @@ mod tests {
         }
         assert_eq!(found(drive(0.05), drive(0.0)), None);
         let turning = |k: usize, p: &Pose| *p * pose(0.0, 0.0, 0.02 * k as f64);
-        let turning = drive(0.0)
-            .iter()
-            .enumerate()
-            .map(|(k, p)| turning(k, p))
-            .collect();
+        let turning = (0..).zip(&drive(0.0)).map(|(k, p)| turning(k, p)).collect();
         assert_eq!(found(turning, drive(0.0)), None);
     }
 }

@@ -5,7 +5,7 @@
 //! *required*: vehicles that move, are near and have been seen in some scans. An object that
 //! matches one that is there but not required, as a pedestrian, counts neither for nor against.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use gyre_objects::assign;
@@ -18,7 +18,7 @@ mod hota;
 pub use bands::ObjectBand;
 pub use hota::Hota;
 
-use bands::{Band, RANGES_M, SPEEDS_MPS, Sums};
+use bands::{ALL, Band, RANGES_M, SPEEDS_MPS, Sums};
 use hota::Compared;
 
 /// A true object at the time of a scan, in the frame of the sensor.
@@ -44,26 +44,20 @@ pub struct TrackedObject {
     pub position: Point2<f64>,
     /// Velocity over ground, m/s.
     pub velocity: Vector2<f64>,
-    /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
     pub yaw_rad: f64,
     /// True if it is reported as moving. The others are not judged.
     pub moving: bool,
 }
 
-/// The objects of a scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjectScan {
-    /// The true ones.
     pub truth: Vec<TrueObject>,
-    /// The tracked ones.
     pub tracked: Vec<TrackedObject>,
 }
 
-/// Which objects are required and what matches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectOptions {
-    /// Largest range of a required object, m.
     pub max_range_m: f64,
     /// Lowest speed of a required object, m/s.
     pub min_speed_mps: f64,
@@ -84,15 +78,11 @@ impl Default for ObjectOptions {
     }
 }
 
-/// The figures of a drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
     pub scans: usize,
-    /// Required objects, each once.
     pub objects: usize,
-    /// Required objects, once for each scan.
     pub required: usize,
-    /// Those that were matched.
     pub matched: usize,
     /// Tracked objects that move, once for each scan, where nothing is.
     pub false_positives: usize,
@@ -107,7 +97,6 @@ pub struct ObjectErrors {
     /// Detection and association in one figure, and each.
     #[serde(flatten)]
     pub hota: Hota,
-    /// Switches for each required object.
     pub switches_per_object: f64,
     /// Root mean square of the distance of the centres, m.
     pub position_rmse_m: f64,
@@ -127,32 +116,26 @@ pub struct ObjectErrors {
 
 impl fmt::Display for ObjectErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            scans,
-            objects,
-            required,
-            matched,
-            ..
-        } = self;
-        writeln!(
-            f,
-            "objects       {objects} in {scans} scans, {matched} of {required} matched"
-        )?;
-        writeln!(f, "recall        {:.1} %", 100.0 * self.recall)?;
-        let wrong = self.false_positives;
-        writeln!(
-            f,
-            "precision     {:.1} %, {wrong} false",
-            100.0 * self.precision
-        )?;
-        writeln!(f, "MOTA          {:.3}", self.mota)?;
-        writeln!(f, "HOTA          {}", self.hota)?;
+        let (objects, scans, hota) = (self.objects, self.scans, &self.hota);
+        let (matched, required) = (self.matched, self.required);
+        let (recall, precision) = (100.0 * self.recall, 100.0 * self.precision);
+        let (wrong, mota) = (self.false_positives, self.mota);
         let (switches, each) = (self.switches, self.switches_per_object);
-        writeln!(f, "ID switches   {switches}, {each:.3} an object")?;
-        writeln!(f, "position      {:.2} m RMSE", self.position_rmse_m)?;
-        writeln!(f, "velocity      {:.2} m/s RMSE", self.velocity_rmse_mps)?;
-        writeln!(f, "heading       {:.1} deg RMSE", self.heading_rmse_deg)?;
-        write!(f, "velocity NEES {:.2}", self.velocity_nees)?;
+        let (position, velocity) = (self.position_rmse_m, self.velocity_rmse_mps);
+        let (heading, nees) = (self.heading_rmse_deg, self.velocity_nees);
+        write!(
+            f,
+            "objects       {objects} in {scans} scans, {matched} of {required} matched\n\
+             recall        {recall:.1} %\n\
+             precision     {precision:.1} %, {wrong} false\n\
+             MOTA          {mota:.3}\n\
+             HOTA          {hota}\n\
+             ID switches   {switches}, {each:.3} an object\n\
+             position      {position:.2} m RMSE\n\
+             velocity      {velocity:.2} m/s RMSE\n\
+             heading       {heading:.1} deg RMSE\n\
+             velocity NEES {nees:.2}"
+        )?;
         for (bands, unit) in [(&self.by_range, "m"), (&self.by_speed, "m/s")] {
             for band in bands {
                 write!(f, "\n{}", band.line(unit))?;
@@ -162,7 +145,6 @@ impl fmt::Display for ObjectErrors {
     }
 }
 
-/// Compares the tracked objects of a drive, scan by scan, with the true ones.
 pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErrors {
     let mut count = Count::default();
     for scan in scans {
@@ -171,14 +153,12 @@ pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErr
     count.errors(scans.len())
 }
 
-/// The sums over the scans so far.
 #[derive(Default)]
 struct Count {
     /// Scans that show each true object within the range.
     seen: BTreeMap<u64, usize>,
-    /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,
-    objects: BTreeMap<u64, ()>,
+    objects: BTreeSet<u64>,
     switches: usize,
     all: Sums,
     by_range: [Sums; RANGES_M.len()],
@@ -189,12 +169,8 @@ struct Count {
 impl Count {
     fn add(&mut self, scan: &ObjectScan, options: &ObjectOptions) {
         let (required, others) = self.split(scan, options);
-        let tracked: Vec<TrackedObject> = scan
-            .tracked
-            .iter()
-            .filter(|tracked| tracked.moving)
-            .copied()
-            .collect();
+        let tracked = scan.tracked.iter().filter(|tracked| tracked.moving);
+        let tracked: Vec<TrackedObject> = tracked.copied().collect();
         let pairs = self.pairs(&required, &tracked, options.gate_m);
         let found_as = |truth: usize| {
             let pair = pairs.iter().find(|pair| pair.0 == truth)?;
@@ -215,16 +191,12 @@ impl Count {
         for found in &wrong {
             self.add_false(&tracked[*found]);
         }
-        let judged: Vec<&TrackedObject> = [matched, wrong]
-            .concat()
-            .iter()
-            .map(|f| &tracked[*f])
-            .collect();
+        let judged = matched.iter().chain(&wrong).map(|found| &tracked[*found]);
+        let judged: Vec<&TrackedObject> = judged.collect();
         self.compared
             .push(Compared::new(&required, &judged, options.gate_m));
     }
 
-    /// Splits the true objects into those that are required and the others.
     fn split(
         &mut self,
         scan: &ObjectScan,
@@ -234,9 +206,7 @@ impl Count {
             let is_near = range_m(&truth.position) <= options.max_range_m;
             let seen = self.seen.entry(truth.id).or_default();
             *seen += usize::from(is_near && truth.is_seen);
-            let speed_mps = truth
-                .velocity
-                .map_or(f64::INFINITY, |velocity| velocity.norm());
+            let speed_mps = truth.velocity.map_or(f64::INFINITY, |it| it.norm());
             is_near
                 && truth.is_seen
                 && truth.is_vehicle
@@ -270,9 +240,8 @@ impl Count {
             }
         }
         let free = |count: usize, of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<usize> {
-            (0..count)
-                .filter(|index| pairs.iter().all(|pair| of(pair) != *index))
-                .collect()
+            let is_free = |index: &usize| pairs.iter().all(|pair| of(pair) != *index);
+            (0..count).filter(is_free).collect()
         };
         let (rows, columns) = (free(truth.len(), &|p| p.0), free(tracked.len(), &|p| p.1));
         let costs = |t: &usize| columns.iter().map(|f| within(*t, *f)).collect();
@@ -283,9 +252,8 @@ impl Count {
         pairs
     }
 
-    /// Adds a required object, and what matches it.
     fn add_required(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
-        self.objects.insert(truth.id, ());
+        self.objects.insert(truth.id);
         if let Some(found) = found {
             let before = self.matches.insert(truth.id, found.id);
             self.switches += usize::from(before.is_some_and(|id| id != found.id));
@@ -296,7 +264,6 @@ impl Count {
         }
     }
 
-    /// Adds a tracked object where nothing is.
     fn add_false(&mut self, found: &TrackedObject) {
         let (range_m, speed_mps) = (range_m(&found.position), found.velocity.norm());
         for sums in self.sums_of(range_m, Some(speed_mps)) {
@@ -304,7 +271,6 @@ impl Count {
         }
     }
 
-    /// Returns the sums that an object at a range and of a speed counts in.
     fn sums_of(&mut self, range_m: f64, speed_mps: Option<f64>) -> impl Iterator<Item = &mut Sums> {
         let by_range = RANGES_M.iter().position(|band| band.contains(range_m));
         let speed_of = |mps| SPEEDS_MPS.iter().position(|band| band.contains(mps));
@@ -315,12 +281,9 @@ impl Count {
     }
 
     fn errors(&self, scans: usize) -> ObjectErrors {
-        let Sums {
-            required,
-            matched,
-            false_positives,
-            ..
-        } = self.all;
+        let (sums, all) = (&self.all, self.all.in_band(&ALL));
+        let (required, matched) = (sums.required, sums.matched);
+        let false_positives = sums.false_positives;
         let wrong = required - matched + false_positives + self.switches;
         let by = |bands: &[Band], sums: &[Sums]| -> Vec<ObjectBand> {
             let both = bands.iter().zip(sums);
@@ -333,15 +296,15 @@ impl Count {
             matched,
             false_positives,
             switches: self.switches,
-            recall: self.all.recall(),
-            precision: self.all.precision(),
+            recall: all.recall,
+            precision: all.precision,
             mota: 1.0 - share(wrong as f64, required),
             hota: Hota::of(&self.compared),
             switches_per_object: share(self.switches as f64, self.objects.len()),
-            position_rmse_m: self.all.position_rmse_m(),
-            velocity_rmse_mps: self.all.velocity_rmse_mps(),
-            heading_rmse_deg: self.all.heading_rmse_deg(),
-            velocity_nees: self.all.velocity_nees(),
+            position_rmse_m: all.position_rmse_m,
+            velocity_rmse_mps: all.velocity_rmse_mps,
+            heading_rmse_deg: all.heading_rmse_deg,
+            velocity_nees: sums.velocity_nees(),
             by_range: by(&RANGES_M, &self.by_range),
             by_speed: by(&SPEEDS_MPS, &self.by_speed),
         }
@@ -394,6 +357,15 @@ mod tests {
         }
     }
 
+    /// The errors where each object is required from its first scan on.
+    fn at_once(scans: &[ObjectScan]) -> ObjectErrors {
+        let options = ObjectOptions {
+            min_scans: 1,
+            ..ObjectOptions::default()
+        };
+        object_errors(scans, &options)
+    }
+
     #[test]
     fn an_object_is_required_from_its_third_scan_on() {
         let scans = vec![scan(&[truth(1, 20.0)], &[]); 5];
@@ -409,21 +381,15 @@ mod tests {
 
     #[test]
     fn a_pair_is_kept_while_it_fits_and_another_identity_is_a_switch() {
-        let options = ObjectOptions {
-            min_scans: 1,
-            ..ObjectOptions::default()
-        };
         let scans = [
             scan(&[truth(1, 20.0)], &[tracked(5, 21.0)]),
             // A nearer one comes, and is false as long as the first one fits.
             scan(&[truth(1, 20.0)], &[tracked(5, 21.0), tracked(6, 20.0)]),
             scan(&[truth(1, 20.0)], &[tracked(6, 20.0)]),
         ];
-        let errors = object_errors(&scans, &options);
-        assert_eq!(
-            (errors.matched, errors.false_positives, errors.switches),
-            (3, 1, 1)
-        );
+        let errors = at_once(&scans);
+        let counts = (errors.matched, errors.false_positives, errors.switches);
+        assert_eq!(counts, (3, 1, 1));
         assert!((errors.mota - (1.0 - 2.0 / 3.0)).abs() < 1e-12, "{errors}");
         assert!((errors.velocity_rmse_mps - 1.0).abs() < 1e-12);
         assert!((errors.velocity_nees - 0.5).abs() < 1e-12);
@@ -432,22 +398,18 @@ mod tests {
 
     #[test]
     fn what_is_there_but_not_required_excuses_and_what_is_far_too() {
-        let options = ObjectOptions {
-            min_scans: 1,
-            ..ObjectOptions::default()
-        };
         let walker = TrueObject {
             is_vehicle: false,
             ..truth(2, -20.0)
         };
         let found = [tracked(1, -21.0), tracked(2, 70.0), tracked(3, 20.0)];
-        let errors = object_errors(&[scan(&[walker], &found)], &options);
+        let errors = at_once(&[scan(&[walker], &found)]);
         assert_eq!((errors.required, errors.false_positives), (0, 1));
         let standing = TrackedObject {
             moving: false,
             ..tracked(3, 20.0)
         };
-        let errors = object_errors(&[scan(&[], &[standing])], &options);
+        let errors = at_once(&[scan(&[], &[standing])]);
         assert_eq!(errors.false_positives, 0);
     }
 }

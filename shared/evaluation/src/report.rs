@@ -11,13 +11,11 @@ use crate::{
     mounting::heading_offset_rad, rpe, seg,
 };
 
-/// The options of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Poses from the start of a segment of KITTI and seg to the start of the next; published
     /// figures use 10 or 4.
     pub step: NonZeroUsize,
-    /// The rule that associates poses.
     pub association: Association,
 }
 
@@ -35,7 +33,6 @@ impl Default for Options {
 /// length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// The numbers of poses that were compared.
     pub coverage: Coverage,
     /// The axes that were negated in the estimate.
     pub axes: Axes,
@@ -52,7 +49,6 @@ pub struct Evaluation {
     pub truth_stands: bool,
     /// KITTI odometry errors; `None` for a path up to 100 m or a trajectory without heading.
     pub kitti: Option<Kitti>,
-    /// Absolute trajectory error.
     pub ate: Ate,
     /// Segment error; `None` for a path up to 100 m.
     pub seg: Option<Seg>,
@@ -124,12 +120,8 @@ mod tests {
             association: Association::Index,
             ..Options::default()
         };
-        evaluate(
-            TimedPoses::untimed(estimate),
-            TimedPoses::untimed(truth),
-            &options,
-        )
-        .unwrap()
+        let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
+        evaluate(estimate, truth, &options).unwrap()
     }
 
     #[test]

@@ -9,11 +9,8 @@ use crate::MatchedPoses;
 /// The errors of the motions from each matched pose to the next.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rpe {
-    /// RMSE of the translation of a pair, m.
     pub translation_rmse_m: f64,
-    /// Mean translation error of a pair, m.
     pub translation_mean_m: f64,
-    /// RMSE of the rotation of a pair, degrees.
     pub rotation_rmse_deg: f64,
     /// Mean magnitude of the rotation error of a pair, degrees.
     pub rotation_mean_deg: f64,
@@ -30,13 +27,11 @@ pub struct Rpe {
 pub struct PairError {
     /// Distance travelled along the ground truth up to the later pose, m.
     pub distance_m: f64,
-    /// Length of the translation error, m.
     pub translation_m: f64,
     /// Rotation error with its sign (ground truth less estimate), degrees in (-180, 180].
     pub rotation_deg: f64,
 }
 
-/// The least forward translation for a ratio, m.
 const MIN_FORWARD_M: f64 = 1.0;
 
 /// Compares the motion from each pose to the next with the true one.
@@ -107,9 +102,7 @@ mod tests {
     #[test]
     fn standing_still_has_no_forward_ratio() {
         let still = vec![Pose::identity(); 4];
-        assert_eq!(
-            rpe(&MatchedPoses::new(still.clone(), still).unwrap()).forward_ratio,
-            None
-        );
+        let matched = MatchedPoses::new(still.clone(), still).unwrap();
+        assert_eq!(rpe(&matched).forward_ratio, None);
     }
 }

@@ -25,7 +25,6 @@ pub struct Seg {
     pub by_length: Vec<SegLength>,
 }
 
-/// The segment error of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SegLength {
     pub length_m: f64,
@@ -44,13 +43,12 @@ pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
         errors.add(segment.length, [100.0 * rmse_m / segment.length_m()]);
     }
     let ([percent], segments) = errors.mean()?;
-    let by_length = errors
-        .means()
-        .map(|(length_m, [percent], segments)| SegLength {
-            length_m,
-            percent,
-            segments,
-        });
+    let by_length = errors.means();
+    let by_length = by_length.map(|(length_m, [percent], segments)| SegLength {
+        length_m,
+        percent,
+        segments,
+    });
     Some(Seg {
         percent,
         segments,

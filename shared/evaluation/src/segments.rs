@@ -10,7 +10,6 @@ pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.
 pub(crate) struct Segment {
     pub first: usize,
     pub last: usize,
-    /// Index into [`SEGMENT_LENGTHS_M`].
     pub length: usize,
 }
 
@@ -44,7 +43,6 @@ pub(crate) fn segments(
     (0..distance_m.len()).step_by(step.get()).flat_map(ends)
 }
 
-/// Sums and counts for each of [`SEGMENT_LENGTHS_M`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PerLength<const N: usize> {
     sums: [[f64; N]; SEGMENT_LENGTHS_M.len()],
@@ -71,12 +69,8 @@ impl<const N: usize> PerLength<N> {
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();
-        (count > 0).then(|| {
-            (
-                std::array::from_fn(|value| total(value) / count as f64),
-                count,
-            )
-        })
+        let mean = |value| total(value) / count as f64;
+        (count > 0).then(|| (std::array::from_fn(mean), count))
     }
 
     /// Returns length (m), mean and count for each length that has segments.
@@ -100,14 +94,17 @@ mod tests {
     fn a_segment_ends_strictly_beyond_its_length() {
         let distance = [0.0, 100.0, 100.0, 101.0];
         let found: Vec<_> = segments(&distance, EVERY).collect();
-        assert_eq!(
-            found,
-            [Segment {
-                first: 0,
-                last: 3,
-                length: 0
-            }]
-        );
+        let [
+            Segment {
+                first,
+                last,
+                length,
+            },
+        ] = found[..]
+        else {
+            panic!("{found:?}");
+        };
+        assert_eq!((first, last, length), (0, 3, 0));
         assert_eq!(segments(&[0.0, 100.0], EVERY).count(), 0);
     }
 
@@ -115,13 +112,10 @@ mod tests {
     fn segments_of_every_length_start_at_every_step() {
         let distance: Vec<f64> = (0..=250).map(f64::from).collect();
         let step = NonZeroUsize::new(50).unwrap_or(EVERY);
-        let found: Vec<_> = segments(&distance, step)
-            .map(|s| (s.first, s.last, s.length))
-            .collect();
-        assert_eq!(
-            found,
-            [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)]
-        );
+        let found = segments(&distance, step).map(|s| (s.first, s.last, s.length));
+        let found: Vec<_> = found.collect();
+        let expected = [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)];
+        assert_eq!(found, expected);
     }
 
     #[test]
@@ -132,9 +126,7 @@ mod tests {
         per_length.add(0, [3.0]);
         per_length.add(2, [8.0]);
         assert_eq!(per_length.mean(), Some(([4.0], 3)));
-        assert_eq!(
-            per_length.means().collect::<Vec<_>>(),
-            [(100.0, [2.0], 2), (300.0, [8.0], 1)]
-        );
+        let means: Vec<_> = per_length.means().collect();
+        assert_eq!(means, [(100.0, [2.0], 2), (300.0, [8.0], 1)]);
     }
 }

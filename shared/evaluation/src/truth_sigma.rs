@@ -9,7 +9,6 @@ use serde::Serialize;
 pub struct TruthSigma {
     /// Of x, and of y, m.
     pub position_m: f64,
-    /// Of the heading, rad.
     pub yaw_rad: f64,
 }
 
@@ -18,11 +17,8 @@ impl TruthSigma {
     /// grows into a lateral error of the second end.
     pub fn of_motion(&self, truth: &Pose) -> Matrix3<f64> {
         let variance_m2 = self.position_m * self.position_m;
-        let pose = Matrix3::from_diagonal(&Vector3::new(
-            variance_m2,
-            variance_m2,
-            self.yaw_rad * self.yaw_rad,
-        ));
+        let variances = Vector3::new(variance_m2, variance_m2, self.yaw_rad * self.yaw_rad);
+        let pose = Matrix3::from_diagonal(&variances);
         let by_first = lever(truth.translation.x, truth.translation.y);
         by_first * pose * by_first.transpose() + pose
     }

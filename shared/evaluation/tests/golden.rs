@@ -1,9 +1,9 @@
 //! The KITTI errors of published trajectories, compared with the published figures.
 
-use std::{fs, num::NonZeroUsize, path::PathBuf};
+use std::{fs, path::PathBuf};
 
-use crate::common::chain;
-use gyre_evaluation::{Association, Coverage, Evaluation, Kitti, Options, TimedPoses, evaluate};
+use crate::common::{by_index, chain};
+use gyre_evaluation::{Coverage, Evaluation};
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Complex, Unit};
 
@@ -20,20 +20,13 @@ fn data() -> Option<PathBuf> {
 /// normalised, because the fifth decimal of the published figures depends on their rounding.
 fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     let parse = |line: &str| {
-        let m: Vec<f64> = line
-            .split_whitespace()
-            .map(|v| v.parse().unwrap())
-            .collect();
-        Pose::from_parts(
-            [m[3], m[7]].into(),
-            Unit::new_unchecked(Complex::new(m[0], m[4])),
-        )
+        let numbers = line.split_whitespace().map(|v| v.parse().unwrap());
+        let m: Vec<f64> = numbers.collect();
+        let rotation = Unit::new_unchecked(Complex::new(m[0], m[4]));
+        Pose::from_parts([m[3], m[7]].into(), rotation)
     };
-    fs::read_to_string(path)
-        .unwrap()
-        .lines()
-        .map(parse)
-        .collect()
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().map(parse).collect()
 }
 
 /// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw
@@ -47,51 +40,25 @@ fn chained_csv(path: PathBuf) -> Vec<Pose> {
     chain(Pose::identity(), motions)
 }
 
-fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
-    let options = Options {
-        step: NonZeroUsize::new(step).unwrap(),
-        association: Association::Index,
-    };
-    evaluate(
-        TimedPoses::untimed(estimate),
-        TimedPoses::untimed(truth),
-        &options,
-    )
-    .unwrap()
-}
-
 /// Returns translation (%) and rotation (deg/100 m) to five decimals, as published.
-fn five_decimals(kitti: Option<&Kitti>) -> (String, String) {
-    let kitti = kitti.unwrap();
-    (
-        format!("{:.5}", kitti.translation_percent),
-        format!("{:.5}", kitti.rotation_deg_per_100m),
-    )
-}
-
-fn figures(translation: &str, rotation: &str) -> (String, String) {
-    (translation.to_owned(), rotation.to_owned())
+fn five_decimals(evaluation: &Evaluation) -> [String; 2] {
+    let kitti = evaluation.kitti.as_ref().unwrap();
+    [kitti.translation_percent, kitti.rotation_deg_per_100m].map(|it| format!("{it:.5}"))
 }
 
 #[test]
 fn kitti_errors_equal_the_published_figures_at_all_steps() {
     let Some(data) = data() else { return };
     let case = data.join("golden/kitti-metric");
-    let (estimate, truth) = (
-        kitti_poses(case.join("estimate.txt")),
-        kitti_poses(case.join("ground_truth.txt")),
-    );
+    let [estimate, truth] =
+        ["estimate.txt", "ground_truth.txt"].map(|name| kitti_poses(case.join(name)));
     for (step, expected) in [
-        (10, figures("1.16688", "0.34558")),
-        (4, figures("1.16084", "0.34663")),
-        (1, figures("1.16168", "0.34696")),
+        (10, ["1.16688", "0.34558"]),
+        (4, ["1.16084", "0.34663"]),
+        (1, ["1.16168", "0.34696"]),
     ] {
         let evaluation = by_index(&estimate, &truth, step);
-        assert_eq!(
-            five_decimals(evaluation.kitti.as_ref()),
-            expected,
-            "step {step}"
-        );
+        assert_eq!(five_decimals(&evaluation), expected, "step {step}");
         assert!(!evaluation.axes.y_negated && !evaluation.axes.heading_negated);
     }
 }
@@ -102,16 +69,11 @@ fn kitti_errors_of_chained_motions_equal_the_published_figures_in_both_handednes
     let estimate = kitti_poses(data.join("golden/csv-chain/estimate.txt"));
     let y_right =
         chained_csv(data.join("trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv"));
-    let y_left: Vec<_> = y_right
-        .iter()
-        .map(|p| pose(p.translation.x, -p.translation.y, -p.rotation.angle()))
-        .collect();
+    let mirrored = |p: &Pose| pose(p.translation.x, -p.translation.y, -p.rotation.angle());
+    let y_left: Vec<_> = y_right.iter().map(mirrored).collect();
     let evaluations = [&y_right, &y_left].map(|truth| by_index(&estimate, truth, 10));
     for evaluation in &evaluations {
-        assert_eq!(
-            five_decimals(evaluation.kitti.as_ref()),
-            figures("1.22286", "0.39305")
-        );
+        assert_eq!(five_decimals(evaluation), ["1.22286", "0.39305"]);
         assert_eq!(evaluation.axes.y_negated, evaluation.axes.heading_negated);
         assert!(matches!(
             evaluation.coverage,

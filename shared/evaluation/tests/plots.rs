@@ -1,8 +1,8 @@
 //! The SVG documents.
 
-use crate::common::drive;
+use crate::common::{by_index, drive};
 use gyre_evaluation::{
-    Association, Evaluation, MatchedPoses, Options, PlotError, TimedPoses, evaluate,
+    Evaluation, PlotError,
     plot::{errors_svg, trajectory_svg},
 };
 use gyre_geometry::{Pose, pose};
@@ -11,32 +11,16 @@ fn evaluation(n: usize) -> Evaluation {
     let truth = drive(n, 120.0);
     let moved_by = pose(50.0, 20.0, 1.0);
     let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
-    let options = Options {
-        association: Association::Index,
-        ..Options::default()
-    };
-    evaluate(
-        TimedPoses::untimed(&estimate),
-        TimedPoses::untimed(&truth),
-        &options,
-    )
-    .unwrap()
+    by_index(&estimate, &truth, 10)
 }
 
 /// Returns the points of the longest polyline of a colour, in canvas units.
 fn polyline(svg: &str, colour: &str) -> Vec<(f64, f64)> {
-    let line = svg
-        .lines()
-        .filter(|l| l.starts_with("<polyline") && l.contains(colour))
-        .max_by_key(|l| l.len())
-        .unwrap();
-    let points = line
-        .split("points=\"")
-        .nth(1)
-        .unwrap()
-        .split('"')
-        .next()
-        .unwrap();
+    let is_one = |l: &&str| l.starts_with("<polyline") && l.contains(colour);
+    let lines = svg.lines().filter(is_one);
+    let line = lines.max_by_key(|l| l.len()).unwrap();
+    let (_, points) = line.split_once("points=\"").unwrap();
+    let (points, _) = points.split_once('"').unwrap();
     let point = |p: &str| {
         let (x, y) = p.split_once(',').unwrap();
         (x.parse().unwrap(), y.parse().unwrap())
@@ -53,10 +37,8 @@ fn axes_are_equal_and_y_points_up() {
         let corners = [(0.0, 0.0), (side.0, 0.0), (side.0, side.1)].map(|(x, y)| pose(x, y, 0.0));
         let points = polyline(&trajectory_svg(&corners, None).unwrap(), ESTIMATE);
         let (right, up) = (points[1].0 - points[0].0, points[1].1 - points[2].1);
-        assert!(
-            (right / side.0 - up / side.1).abs() * side.0.min(side.1) < 2.5,
-            "{side:?}: {right} {up}"
-        );
+        let apart = (right / side.0 - up / side.1) * side.0.min(side.1);
+        assert!(apart.abs() < 2.5, "{side:?}: {right} {up}");
     }
 }
 
@@ -66,15 +48,12 @@ fn an_estimate_in_another_frame_is_drawn_over_its_ground_truth() {
     let svg = trajectory_svg(e.matched.estimate(), Some(&e.matched)).unwrap();
     let (estimate, truth) = (polyline(&svg, ESTIMATE), polyline(&svg, TRUTH));
     assert_eq!(estimate.len(), truth.len());
-    assert!(
-        estimate
-            .iter()
-            .zip(&truth)
-            .all(|(a, b)| (a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0)
-    );
-    assert!(
-        svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("ground truth")
-    );
+    for (a, b) in estimate.iter().zip(&truth) {
+        assert!((a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0);
+    }
+    for words in ["SE(2) alignment", "start", "ground truth"] {
+        assert!(svg.contains(words), "{words}");
+    }
 }
 
 #[test]
@@ -86,24 +65,12 @@ fn long_paths_have_kitti_errors_and_short_ones_the_relative_pose_error() {
 }
 
 #[test]
-fn missing_and_invalid_poses_are_errors() {
-    assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
-    assert!(MatchedPoses::new(drive(5, 10.0), drive(6, 10.0)).is_err());
-    let invalid = [pose(f64::NAN, 0.0, 0.0)];
-    assert!(matches!(
-        trajectory_svg(&invalid, None),
-        Err(PlotError::Poses(_))
-    ));
-}
-
-#[test]
-fn a_single_pose_and_a_standing_sensor_are_drawn() {
+fn paths_of_any_extent_are_drawn_and_missing_and_invalid_poses_are_errors() {
     assert!(trajectory_svg(&[Pose::identity()], None).is_ok());
     assert!(trajectory_svg(&[Pose::identity(); 9], None).is_ok());
-}
-
-#[test]
-fn paths_far_from_the_origin_and_of_any_extent_are_drawn() {
+    assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
+    let invalid = trajectory_svg(&[pose(f64::NAN, 0.0, 0.0)], None);
+    assert!(matches!(invalid, Err(PlotError::Poses(_))));
     for extent in [1e-9, 1.0, 1e4, 1e9] {
         let far = [pose(1e9 - extent, -1e9, 0.0), pose(1e9, extent - 1e9, 0.0)];
         assert!(trajectory_svg(&far, None).unwrap().contains("<polyline"));

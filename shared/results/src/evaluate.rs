@@ -15,7 +15,7 @@ use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    judgement::{Judgement, judge, judge_motions, note_time_offset, without_time_offset},
+    judgement::{Judgement, judge, judge_motions, note_time_offset, take_time_offset_out},
     odometry,
     out::{Content, Out, require_results},
     results::truth_of,
@@ -28,38 +28,36 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {
         return evaluate_objects(arguments);
     }
-    let files = Files::of(arguments)?;
-    let estimate = read_trajectory(&files.estimate)?;
-    let truth = read_trajectory(&files.truth)?;
-    let (truth, offset) = match arguments.find_time_offset {
-        true => {
-            without_time_offset(&estimate, truth).map(|(truth, offset)| (truth, Some(offset)))?
-        }
-        false => {
-            note_time_offset(&estimate, &truth);
-            (truth, None)
-        }
+    let [file, truth] = files(arguments)?;
+    let (estimate, mut truth) = (read_trajectory(&file)?, read_trajectory(&truth)?);
+    let mut offset = None;
+    match arguments.find_time_offset {
+        true => offset = Some(take_time_offset_out(&estimate, &mut truth)?),
+        false => note_time_offset(&estimate, &truth),
+    }
+    let options = Options {
+        step: arguments.step,
+        ..Options::default()
     };
-    let evaluation = judge(
-        &estimate,
-        &truth,
-        Options {
-            step: arguments.step,
-            ..Options::default()
+    let evaluation = judge(&estimate, &truth, options)?;
+    let motions = judged_motions(arguments, &file, &estimate, &truth, &evaluation)?;
+    let options = NeesOptions {
+        lengths: arguments.nees_lengths.clone(),
+        truth_sigma: TruthSigma {
+            position_m: arguments.truth_sigma_m,
+            yaw_rad: arguments.truth_sigma_deg.to_radians(),
         },
-    )?;
-    let motions = judged_motions(arguments, &files.estimate, &estimate, &truth, &evaluation)?;
-    let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments))
-        .with_time_offset(offset);
+    };
+    let judgement = Judgement::new(evaluation, motions.as_ref(), &options, offset);
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&judgement)?)?,
         false => print::line(format_args!("{judgement:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
-        let folder = crate::absolute(&files.estimate).ok();
+        let folder = crate::absolute(&file).ok();
         let folder = folder.as_deref().and_then(Path::parent);
         let is_of_estimate =
-            folder.is_some_and(|it| crate::absolute(directory).is_ok_and(|at| at == it));
+            folder.is_some() && folder == crate::absolute(directory).ok().as_deref();
         let locked = (!is_of_estimate).then(|| Out::lock_for(directory, Content::PLOTS));
         let _locked = locked.transpose()?;
         for (name, plot) in judgement.plots()? {
@@ -82,34 +80,21 @@ fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> 
     Ok(ExitCode::SUCCESS)
 }
 
-/// The files that are compared.
-struct Files {
-    estimate: PathBuf,
-    truth: PathBuf,
-}
-
-impl Files {
-    /// Finds them: of a run, its trajectory and its ground truth.
-    fn of(arguments: &EvaluateArguments) -> Result<Self, Failure> {
-        let named = |of: &Option<PathBuf>, old: &Option<PathBuf>| of.clone().or(old.clone());
-        let estimate = named(&arguments.estimate, &arguments.named_estimate);
-        let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
-        let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
-        let run = estimate.is_dir().then(|| estimate.clone());
-        run.as_deref().map_or(Ok(()), require_results)?;
-        let truth = match (given, &run) {
-            (Some(truth), _) => truth,
-            (None, Some(run)) => truth_of_run(run)?,
-            (None, None) => {
-                let estimate = estimate.display();
-                return Err(
-                    format!("name the ground truth too: gyre evaluate {estimate} FILE").into(),
-                );
-            }
-        };
-        let estimate = run.map_or(estimate, |run| run.join("trajectory.tum"));
-        Ok(Self { estimate, truth })
+/// Returns the files that are compared: of a run, its trajectory and its ground truth.
+fn files(arguments: &EvaluateArguments) -> Result<[PathBuf; 2], Failure> {
+    let named = |of: &Option<PathBuf>, old: &Option<PathBuf>| of.clone().or(old.clone());
+    let estimate = named(&arguments.estimate, &arguments.named_estimate);
+    let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
+    let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
+    if !estimate.is_dir() {
+        let shown = estimate.display();
+        let lacks = || format!("name the ground truth too: gyre evaluate {shown} FILE");
+        let truth = given.ok_or_else(lacks)?;
+        return Ok([estimate, truth]);
     }
+    require_results(&estimate)?;
+    let truth = given.map_or_else(|| truth_of_run(&estimate), Ok)?;
+    Ok([estimate.join("trajectory.tum"), truth])
 }
 
 /// Returns the ground truth of a run: its own, or the truth of its recording.
@@ -120,17 +105,6 @@ pub fn truth_of_run(run: &Path) -> Result<PathBuf, Failure> {
         format!("the run in {run} has no ground truth: name one, gyre evaluate {run} FILE")
     };
     Ok(truth_of(&configuration, run).ok_or_else(none)?)
-}
-
-fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
-    let truth_sigma = TruthSigma {
-        position_m: arguments.truth_sigma_m,
-        yaw_rad: arguments.truth_sigma_deg.to_radians(),
-    };
-    NeesOptions {
-        lengths: arguments.nees_lengths.clone(),
-        truth_sigma,
-    }
 }
 
 /// Returns the motions of the odometry that was named, or of the one beside the estimate if it
@@ -156,10 +130,8 @@ fn judged_motions(
         false => Err("its stamps are not the estimate's".into()),
     });
     let note = |reason: &Failure| {
-        print::note(format_args!(
-            "{} is not evaluated: {reason}",
-            beside.display()
-        ))
+        let file = beside.display();
+        print::note(format_args!("{file} is not evaluated: {reason}"));
     };
     Ok(judged.inspect_err(note).ok())
 }
@@ -167,15 +139,12 @@ fn judged_motions(
 /// Trajectories may be written in microseconds.
 const ROUNDING_NS: i64 = 1_000;
 
-/// Returns whether every motion ends at a pose of the trajectory.
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     motions.iter().all(|motion| {
-        let next =
-            stamps.partition_point(|stamp| *stamp < motion.to_ns.saturating_sub(ROUNDING_NS));
-        stamps
-            .get(next)
-            .is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
+        let first = motion.to_ns.saturating_sub(ROUNDING_NS);
+        let next = stamps.get(stamps.partition_point(|stamp| *stamp < first));
+        next.is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
     })
 }
 
@@ -197,15 +166,14 @@ mod tests {
             to_ns,
             estimate: OdometryMotion::default(),
         };
-        assert!(has_stamps(
-            &trajectory,
-            &[ends_at(1_250_000_000), ends_at(1_500_000_999)]
-        ));
-        assert!(!has_stamps(
-            &trajectory,
-            &[ends_at(1_250_000_000), ends_at(1_400_000_000)]
-        ));
-        assert!(!has_stamps(&trajectory, &[ends_at(1_500_001_001)]));
+        for (end_ns, fits) in [
+            (1_500_000_999, true),
+            (1_400_000_000, false),
+            (1_500_001_001, false),
+        ] {
+            let motions = [ends_at(1_250_000_000), ends_at(end_ns)];
+            assert_eq!(has_stamps(&trajectory, &motions), fits, "{end_ns}");
+        }
         assert!(!has_stamps(&Trajectory::default(), &[ends_at(0)]));
     }
 }

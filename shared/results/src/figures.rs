@@ -7,7 +7,6 @@ use serde_json::Value;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Figure {
-    /// The name, with the unit.
     pub name: &'static str,
     /// The place in `summary.json`, as in `/motions/weak`.
     place: &'static str,
@@ -16,7 +15,6 @@ pub struct Figure {
     kind: Kind,
 }
 
-/// The kind of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Plain,
@@ -26,7 +24,6 @@ enum Kind {
     Unusual,
 }
 
-/// Figures under a title.
 pub type Group = (&'static str, &'static [Figure]);
 
 const fn count(name: &'static str, place: &'static str) -> Figure {
@@ -60,7 +57,6 @@ const fn error(name: &'static str, place: &'static str, decimals: usize) -> Figu
 /// The title of the errors against a ground truth.
 pub const ACCURACY: &str = "Accuracy";
 
-/// All figures, in order.
 #[rustfmt::skip]
 pub const GROUPS: [Group; 5] = [
     ("Drive", &[
@@ -148,7 +144,6 @@ pub const GROUPS: [Group; 5] = [
 ];
 
 impl Figure {
-    /// Returns the figure as text; `None` if the summary has none.
     pub fn text(&self, summary: &Value) -> Option<String> {
         self.text_of(summary.pointer(self.place)?)
     }

@@ -18,7 +18,6 @@ use crate::out::Out;
 
 const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
 
-/// The identity that a run was begun with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -44,7 +43,6 @@ pub enum Holds {
     Complete,
 }
 
-/// The programs of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programs {
@@ -68,14 +66,12 @@ impl Programs {
 
     fn difference(&self, now: &Self) -> Option<String> {
         if self.build != now.build {
-            let short = |digest: &str| digest.get(..12).unwrap_or_default().to_owned();
-            return Some(format!(
-                "gyre was build {} of version {} and is now build {} of version {}",
-                short(&self.build),
-                self.version,
-                short(&now.build),
-                now.version
-            ));
+            let named = |of: &Self| {
+                let build = of.build.get(..12).unwrap_or_default();
+                format!("build {build} of version {}", of.version)
+            };
+            let (was, is) = (named(self), named(now));
+            return Some(format!("gyre was {was} and is now {is}"));
         }
         let stages: BTreeSet<&String> = self.replaced.keys().chain(now.replaced.keys()).collect();
         let other = |stage: &&String| self.replaced.get(*stage) != now.replaced.get(*stage);
@@ -85,8 +81,6 @@ impl Programs {
 }
 
 impl Identity {
-    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
-    /// in `dataset`.
     pub fn of(
         configuration: &Configuration,
         programs: &Programs,
@@ -106,14 +100,10 @@ impl Identity {
     /// Writes it, once for a run. It survives a power failure when this returns.
     pub fn write(&self, out: &Out) -> Result<(), Failure> {
         let text = toml::to_string_pretty(self)?;
-        let checksum = checksum(&text);
-        Ok(storage::write(
-            &out.join(BEGUN_WITH),
-            format!("{HEAD}{checksum}\n{text}"),
-        )?)
+        let text = format!("{HEAD}{}\n{text}", checksum(&text));
+        Ok(storage::write(&out.join(BEGUN_WITH), text)?)
     }
 
-    /// Reads the identity of the run in the folder.
     pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -154,7 +144,6 @@ impl Identity {
         }
     }
 
-    /// Checks that this configuration and these programs continue the run.
     pub fn require(
         &self,
         configuration: &Configuration,
@@ -165,10 +154,8 @@ impl Identity {
         if let Some(difference) = configuration.difference(&self.configuration)? {
             return Err(other(out, holds, "configuration", &difference));
         }
-        match self.programs.difference(programs) {
-            None => Ok(()),
-            Some(difference) => Err(other(out, holds, "program", &difference)),
-        }
+        let difference = self.programs.difference(programs);
+        difference.map_or(Ok(()), |it| Err(other(out, holds, "program", &it)))
     }
 
     /// Checks that the recording is the one that the run was begun with, and is read in the same
@@ -183,9 +170,7 @@ impl Identity {
             (Some(begun), Some(now)) => begun.difference(now),
             _ => None,
         };
-        difference.map_or(Ok(()), |difference| {
-            Err(other(out, holds, "recording", &difference))
-        })
+        difference.map_or(Ok(()), |it| Err(other(out, holds, "recording", &it)))
     }
 
     /// Returns whether a run of this configuration that begins now would compute the same and judge

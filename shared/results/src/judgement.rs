@@ -5,11 +5,10 @@ use std::fmt;
 
 use gyre_evaluation::{
     Association, Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions,
-    Options, TimedMotion, bands, nees,
+    Options, TimedMotion, TimedPoses, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
-use gyre_radar::Trajectory;
-use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset};
+use gyre_radar::{ClockOffset, MAX_OFFSET_S, Trajectory, clock_offset};
 use gyre_terminal::{Failure, print};
 use serde::Serialize;
 
@@ -21,7 +20,7 @@ pub struct Judgement {
     #[serde(skip_serializing_if = "Option::is_none")]
     time_offset_s: Option<f64>,
     #[serde(flatten)]
-    evaluation: Evaluation,
+    pub evaluation: Evaluation,
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
@@ -34,43 +33,28 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// Adds the consistency of the motions' covariances.
     pub fn new(
         evaluation: Evaluation,
         motions: Option<&MatchedMotions>,
         options: &NeesOptions,
+        time_offset_s: Option<f64>,
     ) -> Self {
-        let nees = motions.map(|motions| nees(motions, options));
         let bands = motions.map(|motions| bands(motions, options.truth_sigma));
-        let within_3_sigma_percent = bands.as_ref().map(|bands| bands.inside_percent(3.0));
         Self {
-            time_offset_s: None,
+            time_offset_s,
             evaluation,
-            nees,
-            within_3_sigma_percent,
+            nees: motions.map(|motions| nees(motions, options)),
+            within_3_sigma_percent: bands.as_ref().map(|bands| bands.inside_percent(3.0)),
             bands,
         }
-    }
-
-    /// Adds the time offset of the ground truth that was taken out.
-    pub fn with_time_offset(mut self, offset: Option<ClockOffset>) -> Self {
-        self.time_offset_s = offset.map(|offset| offset.delay_s);
-        self
-    }
-
-    /// The errors.
-    pub fn evaluation(&self) -> &Evaluation {
-        &self.evaluation
     }
 
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let matched = &self.evaluation.matched;
-        let mut plots = vec![(
-            "trajectory.svg",
-            trajectory_svg(matched.estimate(), Some(matched))?,
-        )];
+        let trajectory = trajectory_svg(matched.estimate(), Some(matched))?;
+        let mut plots = vec![("trajectory.svg", trajectory)];
         if self.evaluation.rpe.is_some() {
             plots.push(("errors.svg", errors_svg(&self.evaluation)?));
         }
@@ -85,24 +69,19 @@ impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(delay_s) = self.time_offset_s {
             let word = if delay_s > 0.0 { "late" } else { "early" };
-            let by_s = delay_s.abs();
-            writeln!(
-                f,
-                "time offset   the ground truth was {by_s:.2} s {word}: taken out"
-            )?;
+            let by = format!("{:.2} s {word}", delay_s.abs());
+            writeln!(f, "time offset   the ground truth was {by}: taken out")?;
         }
         self.evaluation.fmt(f)?;
         if let Some([x, y, yaw]) = self.within_3_sigma_percent {
-            write!(
-                f,
-                "\nwithin        3 sigma of the pose: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %"
-            )?;
+            let shares = format!("x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %");
+            write!(f, "\nwithin        3 sigma of the pose: {shares}")?;
         }
-        let Some(nees) = &self.nees else {
-            return Ok(());
-        };
-        write!(f, "\n\n")?;
-        nees.fmt(f)
+        if let Some(nees) = &self.nees {
+            write!(f, "\n\n")?;
+            nees.fmt(f)?;
+        }
+        Ok(())
     }
 }
 
@@ -117,12 +96,9 @@ pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
     }
 }
 
-/// Returns the ground truth with the clock of the estimate, and the offset that was taken out.
-pub fn without_time_offset(
-    estimate: &Trajectory,
-    truth: Trajectory,
-) -> Result<(Trajectory, ClockOffset), Failure> {
-    let found = clock_offset(estimate, &truth).filter(ClockOffset::is_reliable);
+/// Sets the ground truth to the clock of the estimate; returns its delay, s.
+pub fn take_time_offset_out(estimate: &Trajectory, truth: &mut Trajectory) -> Result<f64, Failure> {
+    let found = clock_offset(estimate, truth).filter(ClockOffset::is_reliable);
     let found = found.ok_or_else(|| {
         format!(
             "cannot find the time offset: the motions of the estimate and of the ground truth do not agree at any offset within \
@@ -130,7 +106,8 @@ pub fn without_time_offset(
         )
     })?;
     let late_ns = (found.delay_s * 1e9).round() as i64;
-    Ok((truth.earlier_by(late_ns), found))
+    *truth = std::mem::take(truth).earlier_by(late_ns);
+    Ok(found.delay_s)
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
@@ -139,19 +116,17 @@ pub fn judge(
     truth: &Trajectory,
     options: Options,
 ) -> Result<Evaluation, EvaluationError> {
-    match (&estimate.stamp_ns, &truth.stamp_ns) {
-        (Some(_), Some(_)) => gyre_evaluation::evaluate(timed(estimate), timed(truth), &options),
-        _ => {
-            let options = Options {
-                association: Association::Index,
-                ..options
-            };
-            gyre_evaluation::evaluate(untimed(estimate), untimed(truth), &options)
-        }
-    }
+    let by_time = estimate.stamp_ns.is_some() && truth.stamp_ns.is_some();
+    let options = match by_time {
+        true => options,
+        false => Options {
+            association: Association::Index,
+            ..options
+        },
+    };
+    gyre_evaluation::evaluate(timed(estimate), timed(truth), &options)
 }
 
-/// Compares motions with the truth against which their trajectory was evaluated.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,
@@ -171,15 +146,9 @@ pub fn judge_motions(
     Ok(MatchedMotions::new(motions, timed(truth), max_gap_ns)?)
 }
 
-fn timed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
-    gyre_evaluation::TimedPoses::new(
-        trajectory.stamp_ns.as_deref().unwrap_or_default(),
-        &trajectory.poses,
-    )
-}
-
-fn untimed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
-    gyre_evaluation::TimedPoses::untimed(&trajectory.poses)
+fn timed(trajectory: &Trajectory) -> TimedPoses<'_> {
+    let stamps_ns = trajectory.stamp_ns.as_deref().unwrap_or_default();
+    TimedPoses::new(stamps_ns, &trajectory.poses)
 }
 
 #[cfg(test)]
@@ -216,27 +185,25 @@ mod tests {
     }
 
     fn ate_m(estimate: &Trajectory, truth: &Trajectory) -> f64 {
-        judge(estimate, truth, Options::default())
-            .unwrap()
-            .ate
-            .rmse_m
+        let judged = judge(estimate, truth, Options::default());
+        judged.unwrap().ate.rmse_m
     }
 
     #[test]
     fn clocks_that_differ_are_found_and_the_offset_is_taken_out() {
         let estimate = drive(4.0, 0.0);
         for delay_s in [18.0, 37.0, -18.0, 1.6] {
-            let truth = drive(10.0, delay_s);
+            let mut truth = drive(10.0, delay_s);
             assert!(ate_m(&estimate, &truth) > 0.5);
-            let (truth, offset) = without_time_offset(&estimate, truth).unwrap();
-            assert!((offset.delay_s - delay_s).abs() < 0.02, "{offset:?}");
+            let found_s = take_time_offset_out(&estimate, &mut truth).unwrap();
+            assert!((found_s - delay_s).abs() < 0.02, "{found_s}");
             assert!(ate_m(&estimate, &truth) < 0.1, "{delay_s}");
         }
-        let standing = Trajectory {
+        let mut standing = Trajectory {
             poses: vec![Pose::identity(); estimate.len()],
             ..estimate.clone()
         };
-        let refused = without_time_offset(&estimate, standing).unwrap_err();
+        let refused = take_time_offset_out(&estimate, &mut standing).unwrap_err();
         assert!(refused.to_string().contains("do not agree at any offset"));
     }
 

@@ -29,7 +29,4 @@ pub use out::{
     write_page,
 };
 pub use results::{Results, map_options, truth_of, write};
-pub use summary::{
-    Counter, Counts, Course, Form, GnssSummary, LostCounts, Measured, MotionCounts, Problem,
-    Session, SlamSummary, Summary,
-};
+pub use summary::{Form, Problem, Session, Summary};

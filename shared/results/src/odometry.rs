@@ -5,11 +5,10 @@ mod read;
 use std::fmt::Write;
 
 use gyre_evaluation::TimedMotion;
-use gyre_messages::{PoseHeader, RefinementRecord, flag, initial_guess, outcome};
+use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
 
 pub use read::read;
 
-/// The header line of `odometry.csv`.
 pub const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
@@ -22,66 +21,43 @@ pub fn write_row(pose: &PoseHeader, text: &mut String) {
         return;
     }
     let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
-    let _ = write!(
-        text,
-        "{},{},{},{},{}",
-        item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
-    );
-    for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
-        let _ = write!(text, ",{value:.9}");
-    }
-    for value in motion.covariance {
-        let _ = write!(text, ",{value:.12}");
-    }
-    let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
-    let _ = write!(
-        text,
-        ",{:.9},{:.9},{angle:.9}",
-        motion.score, motion.runner_up_score
-    );
-    let _ = write!(
-        text,
-        ",{:.12},{:.9}",
-        rotation.variance_rad2, rotation.score
-    );
-    let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
-    for value in motion.searched {
-        let _ = write!(text, ",{value:.9}");
-    }
+    let _ = write!(text, "{},{},{}", item.seq, item.scan, item.previous_scan);
+    let _ = write!(text, ",{},{}", item.stamp_ns, motion.interval_ns);
+    add(text, &[motion.x_m, motion.y_m, motion.yaw_rad], 9);
+    add(text, &motion.covariance, 12);
+    add(text, &[motion.score, motion.runner_up_score], 9);
+    add(text, &[rotation.angle_rad], 9);
+    add(text, &[rotation.variance_rad2], 12);
+    add(text, &[rotation.score, rotation.runner_up_rad], 9);
+    add(text, &[rotation.runner_up_score], 9);
+    add(text, &motion.searched, 9);
     let refinement = &motion.refinement;
-    let _ = write!(
-        text,
-        ",{},{}",
-        outcome_name(refinement),
-        initial_guess_name(refinement)
-    );
-    let stationary = u8::from(refinement.is_stationary());
-    let _ = write!(
-        text,
-        ",{:.9},{:.9},{stationary}",
-        refinement.overlap, refinement.support
-    );
-    let _ = writeln!(text, ",{:.9},{:.9}", motion.drift_share, motion.scale_sigma);
-}
-
-fn outcome_name(refinement: &RefinementRecord) -> &'static str {
-    match refinement.outcome {
+    let outcome = match refinement.outcome {
         outcome::SEARCHED => "searched",
         outcome::REFINED => "refined",
         outcome::WEAK => "weak",
         outcome::PREDICTED => "predicted",
         _ => "unknown",
-    }
-}
-
-fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
-    match refinement.initial_guess {
+    };
+    let guess = match refinement.initial_guess {
         initial_guess::NONE => "none",
         initial_guess::PREDICTION => "prediction",
         initial_guess::SEARCH => "search",
         initial_guess::YAW_OFFSET => "yaw-offset",
         initial_guess::ALONG_WALLS => "along-walls",
         _ => "unknown",
+    };
+    let _ = write!(text, ",{outcome},{guess}");
+    add(text, &[refinement.overlap, refinement.support], 9);
+    let _ = write!(text, ",{}", u8::from(refinement.is_stationary()));
+    add(text, &[motion.drift_share, motion.scale_sigma], 9);
+    text.push('\n');
+}
+
+/// Writes values with so many decimals, a comma before each.
+pub(crate) fn add(text: &mut String, values: &[f64], decimals: usize) {
+    for value in values {
+        let _ = write!(text, ",{value:.decimals$}");
     }
 }
 
@@ -98,7 +74,7 @@ pub fn motion(pose: &PoseHeader) -> Option<TimedMotion> {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Item, MotionEstimate};
+    use gyre_messages::{Item, MotionEstimate, RefinementRecord};
 
     use super::*;
 
@@ -125,9 +101,8 @@ mod tests {
             ..PoseHeader::default()
         };
         let mut text = HEADER.to_owned();
-        [pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]
-            .iter()
-            .for_each(|pose| write_row(pose, &mut text));
+        let poses = [pose(0, flag::BREAK), pose(1, 0), pose(2, 0)];
+        poses.iter().for_each(|pose| write_row(pose, &mut text));
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [31, 31, 31]);
         assert!(text.contains(",1.500000000,"));

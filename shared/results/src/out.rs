@@ -76,20 +76,17 @@ impl Content {
             ));
         }
         let is_run = folder.join("journal").is_dir();
-        match owner(folder).or(is_run.then(|| Self::RUN.0.to_owned())) {
-            Some(owner) if owner == *command => return Ok(()),
-            Some(owner) => {
-                return refused(format!(
+        if let Some(owner) = owner(folder).or(is_run.then(|| Self::RUN.0.to_owned())) {
+            return match owner == *command {
+                true => Ok(()),
+                false => refused(format!(
                     "{path} has the files of `{owner}`, which `{command}` would replace or mix with its own: name another folder"
-                ));
-            }
-            None => {}
+                )),
+            };
         }
         let results = FILES.into_iter().filter(|_| *command == Self::RUN.0);
-        let mut files = files
-            .split(' ')
-            .chain(results)
-            .map(|name| folder.join(name));
+        let names = files.split(' ').chain(results);
+        let mut files = names.map(|name| folder.join(name));
         match files.find(|file| file.exists() && !folder.join(mark).exists()) {
             None => Ok(()),
             Some(file) => refused(format!(
@@ -109,21 +106,14 @@ fn owner(folder: &Path) -> Option<String> {
 /// Writes a page to a path that a user has named: into a new file, in the place of a file that
 /// contains the mark of such pages, or to a FIFO or a device.
 pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
-    let unwritable = |source| OutError::Unwritable {
-        path: to.to_owned(),
-        source,
-    };
-    let kind = fs::metadata(to).map(|it| it.file_type());
-    if kind
-        .as_ref()
-        .is_ok_and(|it| it.is_fifo() || it.is_char_device())
-    {
+    let kind = fs::metadata(to).map(|it| it.file_type()).ok();
+    if kind.is_some_and(|it| it.is_fifo() || it.is_char_device()) {
         let opened = OpenOptions::new().write(true).open(to);
         let written = opened.and_then(|mut file| file.write_all(page.as_bytes()));
-        return written.map_err(unwritable);
+        return written.map_err(unwritable(to));
     }
     let is_page = |text: String| text.is_empty() || text.contains(mark);
-    if kind.is_ok() && !read_text(to, 256 << 20).is_ok_and(is_page) {
+    if kind.is_some() && !read_text(to, 256 << 20).is_ok_and(is_page) {
         return Err(OutError::Refused(format!(
             "{} exists and is not a page of Gyre's own: name another file, or remove it",
             to.display()
@@ -131,16 +121,22 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     }
     // The target of a link is replaced, and not the link.
     let file = to.canonicalize().unwrap_or(to.to_owned());
-    storage::write(&file, page).map_err(|error| unwritable(error.source))
+    storage::write(&file, page).map_err(|error| unwritable(to)(error.source))
+}
+
+fn unwritable(path: &Path) -> impl Fn(io::Error) -> OutError {
+    move |source| OutError::Unwritable {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 /// Checks that the results in the folder of a run belong to its configuration.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
-    let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {
         false => Ok(()),
         true => Err(OutError::Refused(format!(
-            "the run in {} {reason}",
+            "the run in {} has not ended, and the results in it are of the run before: start the same command again, and it continues",
             run.display()
         ))),
     }
@@ -151,16 +147,10 @@ pub fn require_results(run: &Path) -> Result<(), OutError> {
 pub enum OutError {
     /// It cannot be written.
     #[error("cannot write to {path}: {source}", path = path.display())]
-    Unwritable {
-        /// The folder.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
+    Unwritable { path: PathBuf, source: io::Error },
     /// Another run, map or localisation is writing to it.
     #[error("another command is writing to {path}{holder}: wait for it, or choose another --out", path = path.display())]
     Held {
-        /// The folder.
         path: PathBuf,
         /// The process, if the system reports it: `, process 123 (gyre)`.
         holder: String,
@@ -183,24 +173,20 @@ pub fn absolute(out: &Path) -> io::Result<PathBuf> {
 }
 
 impl Out {
-    /// Creates and locks the folder for a run.
     pub fn lock(path: &Path) -> Result<Self, OutError> {
         Self::lock_for(path, Content::RUN)
     }
 
     /// Creates and locks the folder for this content. Nothing else in it is changed.
     pub fn lock_for(path: &Path, content: Content) -> Result<Self, OutError> {
-        let unwritable = |source| OutError::Unwritable {
-            path: path.to_owned(),
-            source,
-        };
+        let unwritable = unwritable(path);
         content.require_place(path)?;
         create_folder(path).map_err(|error| unwritable(error.source))?;
-        let path = path.canonicalize().map_err(unwritable)?;
-        match try_lock(&path.join(LOCK)).map_err(unwritable)? {
+        let path = path.canonicalize().map_err(&unwritable)?;
+        match try_lock(&path.join(LOCK)).map_err(&unwritable)? {
             Attempt::Locked(mut lock) => {
                 if owner(&path).is_none() {
-                    lock.write_all(content.0.as_bytes()).map_err(unwritable)?;
+                    lock.write_all(content.0.as_bytes()).map_err(&unwritable)?;
                 }
                 Ok(Self { path, _lock: lock })
             }
@@ -211,12 +197,10 @@ impl Out {
         }
     }
 
-    /// Returns the absolute path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the path of a file in the folder.
     pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
         self.path.join(name)
     }

@@ -29,18 +29,14 @@ use crate::{
 };
 use estimate::Estimate;
 use files::Files;
-use pass::Pass;
-use sketch::Sketch;
+use pass::{Pass, Read};
 use slam::Slam;
 
 pub use map::map_options;
 
-/// The files that were written.
 #[derive(Debug)]
 pub struct Results {
-    /// Poses in the journal that have results.
     pub poses: usize,
-    /// True if the journal has its end.
     pub ended: bool,
     pub summary: Summary,
 }
@@ -56,30 +52,21 @@ pub fn write(
     make_way: &dyn Fn(usize) -> Result<bool, Failure>,
 ) -> Result<Results, Failure> {
     let truth = truth_of(configuration, out.path());
-    let mut slam = slam_of(configuration, out);
+    // Without the corrected trajectory the run has all other results.
+    let mut slam = Slam::read(configuration, out)
+        .inspect_err(|reason| print::note(format_args!("no corrected trajectory: {reason}")))
+        .ok()
+        .flatten();
     let mut files = Files::new(out);
     let mut pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
-    for record in journal::records(&journal::path(out.path()))?
-        .into_iter()
-        .flatten()
-    {
+    let records = journal::records(&journal::path(out.path()))?;
+    for record in records.into_iter().flatten() {
         pass.add(&record?)?;
     }
     let mut read = pass.finish();
-    let corrected = slam.as_mut();
-    let corrected = corrected
-        .map(|slam| {
-            let odometry = read.estimate.trajectory();
-            add_corrected(
-                &mut files,
-                slam,
-                truth.as_deref(),
-                odometry,
-                &read.corrected,
-            )
-        })
-        .transpose()?;
-    if let Some(slam) = &slam {
+    let mut corrected = None;
+    if let Some(slam) = &mut slam {
+        corrected = Some(add_corrected(&mut files, slam, truth.as_deref(), &read)?);
         let trajectory = read.corrected_sketch.path();
         let png = map::map_png(configuration, out, slam, &trajectory)?;
         png.map_or(Ok(()), |png| files.add("map.png", png))?;
@@ -92,16 +79,23 @@ pub fn write(
         print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
     }
     let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
-    for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
-        files.add(name, plot)?;
+    match &judgement {
+        Some(judgement) => {
+            for (name, plot) in judgement.plots()? {
+                files.add(name, plot)?;
+            }
+        }
+        None => {
+            let svg = read.sketch.svg()?;
+            svg.map_or(Ok(()), |svg| files.add("trajectory.svg", svg))?;
+        }
     }
     let latency = read.latency.latency();
     files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
     let refines = configuration.has(StageId::Refinement);
-    let course = read.counter.course(read.sketch.length_m());
-    let counts = read
-        .counter
-        .counts(read.end.as_ref(), configuration.source.first, refines);
+    let course = read.counter.course(read.sketch.length_m);
+    let (end, first) = (read.end.as_ref(), configuration.source.first);
+    let counts = read.counter.counts(end, first, refines);
     let measured = Measured {
         counts,
         course,
@@ -123,24 +117,12 @@ pub fn write(
     })
 }
 
-/// Returns the ground truth of the run of this configuration, where there is one.
 pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {
     let given = configuration.run.ground_truth.clone();
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
-    given
-        .or_else(simulated)
-        .or_else(|| match configuration.source.data.as_os_str().is_empty() {
-            true => None,
-            false => find_ground_truth(&configuration.source.data),
-        })
-}
-
-/// Corrects the trajectory by loops. Without that, the run has all other results.
-fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
-    Slam::read(configuration, out)
-        .inspect_err(|reason| print::note(format_args!("no corrected trajectory: {reason}")))
-        .ok()
-        .flatten()
+    let data = Some(&configuration.source.data).filter(|data| !data.as_os_str().is_empty());
+    let beside = || data.and_then(|data| find_ground_truth(data));
+    given.or_else(simulated).or_else(beside)
 }
 
 /// Adds the results of SLAM but for the trajectory itself and the map.
@@ -148,13 +130,16 @@ fn add_corrected(
     files: &mut Files<'_>,
     slam: &mut Slam,
     truth: Option<&Path>,
-    odometry: &Trajectory,
-    corrected: &Trajectory,
+    Read {
+        estimate,
+        corrected,
+        ..
+    }: &Read,
 ) -> Result<SlamSummary, Failure> {
     files.add("loops.csv", slam.loops_csv()?)?;
     files.add("graph.g2o", slam.graph_g2o())?;
     let mut summary = slam.summary();
-    summary.odometry = slam.errors_of(odometry);
+    summary.odometry = slam.errors_of(&estimate.trajectory);
     // The evaluation of odometry reports an unusable truth.
     let truth = truth.and_then(|path| read_trajectory(path).ok());
     let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
@@ -162,10 +147,8 @@ fn add_corrected(
     };
     if let Ok(evaluation) = judge(corrected, &truth, Options::default()) {
         summary.ate_m = Some(evaluation.ate.rmse_m);
-        summary.ground_truth = match evaluation.axes.are_as_given() {
-            true => slam.errors_of(&truth),
-            false => None,
-        };
+        let are_as_given = evaluation.axes.are_as_given();
+        summary.ground_truth = are_as_given.then(|| slam.errors_of(&truth)).flatten();
     }
     let bands = slam.bands(&truth).and_then(|bands| Ok(bands_svg(&bands)?));
     match bands {
@@ -177,44 +160,23 @@ fn add_corrected(
 
 /// Evaluates the trajectory and its covariances against the ground truth, if that fits.
 fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
-    if estimate.poses() < 2 {
+    if estimate.poses < 2 {
         return None;
     }
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
-        note_time_offset(estimate.trajectory(), &truth);
-        let evaluation = judge(estimate.trajectory(), &truth, Options::default())?;
-        let motions = judge_motions(estimate.motions(), &truth, &evaluation)
+        note_time_offset(&estimate.trajectory, &truth);
+        let evaluation = judge(&estimate.trajectory, &truth, Options::default())?;
+        let motions = judge_motions(&estimate.motions, &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
-        Ok(Judgement::new(
-            evaluation,
-            motions.ok().as_ref(),
-            &NeesOptions::default(),
-        ))
+        let options = NeesOptions::default();
+        let motions = motions.ok();
+        Ok(Judgement::new(evaluation, motions.as_ref(), &options, None))
     };
-    let judged = estimate
-        .require_all()
-        .and_then(|()| read_trajectory(path).map_err(Failure::from))
-        .and_then(by);
-    judged
-        .inspect_err(|reason| {
-            print::note(format_args!(
-                "not evaluated against {}: {reason}",
-                path.display()
-            ))
-        })
-        .ok()
-}
-
-fn plots(
-    sketch: &Sketch,
-    judgement: Option<&Judgement>,
-) -> Result<Vec<(&'static str, String)>, Failure> {
-    match judgement {
-        Some(judgement) => judgement.plots(),
-        None => Ok(sketch
-            .svg()?
-            .map(|svg| ("trajectory.svg", svg))
-            .into_iter()
-            .collect()),
-    }
+    let all = estimate.require_all();
+    let truth = all.and_then(|()| Ok(read_trajectory(path)?));
+    let note = |reason: &Failure| {
+        let truth = path.display();
+        print::note(format_args!("not evaluated against {truth}: {reason}"));
+    };
+    truth.and_then(by).inspect_err(note).ok()
 }

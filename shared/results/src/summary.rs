@@ -9,24 +9,23 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_masking::{Backend, MaskKind, MaskingConfig};
+use gyre_masking::{MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
 use gyre_run::latency::{Latency, Percentiles};
 use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
+use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::{figures, judgement::Judgement, machine::Machine};
 
-pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
+pub use counts::{Counter, Counts, Course};
 pub use gnss::GnssSummary;
 pub use slam::SlamSummary;
 
-/// This session of a run.
 pub struct Session<'a> {
     /// Scans to play; `None`: without end.
     pub scans: Option<usize>,
-    /// Poses that were in the journal before.
     pub resumed: usize,
     /// A sentence about damaged or missing parts of the recording.
     pub damage: Option<&'a str>,
@@ -42,34 +41,22 @@ pub struct Session<'a> {
     pub report: Option<&'a Report>,
 }
 
-/// The network that makes the masks.
-#[derive(Debug, Serialize)]
-struct Mask {
-    /// The model card.
-    model: String,
-    /// The SHA-256 of the network's file.
-    sha256: String,
-    /// The library that computes it.
-    backend: Backend,
-}
-
-impl Mask {
-    /// From a resolved configuration.
-    fn of(masking: &MaskingConfig) -> Option<Self> {
-        let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
-        let mask = Self {
-            model: model.display().to_string(),
-            sha256: sha256.clone(),
-            backend: masking.backend,
-        };
-        (masking.kind == MaskKind::Learned).then_some(mask)
-    }
+/// Returns the network of the masks: its model, the SHA-256 of its file, and the library that
+/// computes it.
+fn network(masking: &MaskingConfig) -> Option<Value> {
+    let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
+    (masking.kind == MaskKind::Learned).then(|| {
+        json!({
+            "model": model.display().to_string(),
+            "sha256": sha256,
+            "backend": masking.backend,
+        })
+    })
 }
 
 /// Why the results of a run that has played all scans are unreliable.
 #[derive(Clone, Debug, Error, Serialize)]
 #[error("{0}")]
-#[serde(transparent)]
 pub struct Problem(String);
 
 impl Problem {
@@ -80,53 +67,44 @@ impl Problem {
         let scans = session.scans.unwrap_or(counts.processed as usize);
         let log = out.join("log.jsonl");
         let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
-        if session.ending != Some(Ending::Complete) {
+        let sentence = if session.ending != Some(Ending::Complete) {
             return None;
-        }
-        if poses < 2 {
-            return Some(Self(format!(
+        } else if poses < 2 {
+            format!(
                 "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
-            )));
-        }
-        if let Some(damage) = session.damage {
+            )
+        } else if let Some(damage) = session.damage {
             let missing = counts.missing;
-            return Some(Self(format!(
+            format!(
                 "{damage}; {unreadable} scans cannot be read and {missing} are missing by their times, and the results are of the others: `gyre inspect {data}` names all that is damaged"
-            )));
-        }
-        if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
-            return Some(Self(format!(
+            )
+        } else if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
+            format!(
                 "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
-            )));
-        }
-        if let Some(it) = counts.too_many_are_unsure() {
+            )
+        } else {
+            let it = counts.too_many_are_unsure()?;
             let (all, hardly_measured) = (it.refined + it.doubtful, Self::OF_MOTIONS);
             let cause = match counts.dropped {
                 0 => "The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which".to_owned(),
                 dropped => format!("{dropped} scans were dropped, and motions over dropped scans are long: `gyre stress` finds the rate that this machine keeps up with"),
             };
             let (weak, predicted) = (it.weak, it.predicted);
-            return Some(Self(format!(
+            format!(
                 "{weak} weak and {predicted} predicted motions of {all}: {hardly_measured}. {cause}"
-            )));
-        }
-        None
+            )
+        };
+        Some(Self(sentence))
     }
 }
 
-/// The measurements of a run.
 #[derive(Debug)]
 pub struct Measured {
-    /// Scans and motions.
     pub counts: Counts,
-    /// The path.
     pub course: Course,
     pub latency: Latency,
-    /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
-    /// The loops, with SLAM.
     pub slam: Option<SlamSummary>,
-    /// The fixes of GNSS, where there are some.
     pub gnss: Option<GnssSummary>,
 }
 
@@ -146,7 +124,7 @@ pub struct Summary {
     window: usize,
     /// `None`: no network makes the masks.
     #[serde(skip_serializing_if = "Option::is_none")]
-    mask: Option<Mask>,
+    mask: Option<Value>,
     /// `None`: a radar's, without end.
     #[serde(skip_serializing_if = "Option::is_none")]
     scans_in_recording: Option<usize>,
@@ -177,19 +155,16 @@ pub struct Summary {
     gnss: Option<GnssSummary>,
 }
 
-/// The forms of a summary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Five lines.
     Brief,
     /// All figures.
     Table,
-    /// All figures as JSON.
     Json,
 }
 
 impl Summary {
-    /// Returns it in a form.
     pub fn text(&self, form: Form) -> serde_json::Result<String> {
         match form {
             Form::Brief => Ok(self.in_brief()),
@@ -198,17 +173,11 @@ impl Summary {
         }
     }
 
-    /// Returns the figures as `summary.json` has them.
-    fn figures(&self) -> serde_json::Value {
+    fn figures(&self) -> Value {
         // A figure that JSON cannot hold is null there.
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    pub fn counts(&self) -> &Counts {
-        &self.counts
-    }
-
-    /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }
@@ -220,20 +189,14 @@ impl Summary {
         session: &Session<'_>,
         measured: Measured,
     ) -> Self {
-        let Measured {
-            counts,
-            course,
-            latency,
-            evaluation,
-            slam,
-            gnss,
-        } = measured;
         let has_ended = session.ending == Some(Ending::Complete)
             || session.ending.is_some() && configuration.is_radar();
-        let of_sensors = || sensors::problem(configuration, &counts, gnss.as_ref());
-        let problem = Problem::of(&configuration.data(), out, session, &counts)
+        let (counts, gnss) = (&measured.counts, measured.gnss.as_ref());
+        let of_sensors = || sensors::problem(configuration, counts, gnss);
+        let problem = Problem::of(&configuration.data(), out, session, counts)
             .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
+        let recovery = report.into_iter().flat_map(|report| &report.recovery);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
@@ -244,32 +207,22 @@ impl Summary {
             mode: configuration.run.mode,
             rate: configuration.run.rate,
             window: configuration.run.window,
-            mask: Mask::of(&configuration.odometry.masking),
+            mask: network(&configuration.odometry.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
-            course,
-            counts,
+            course: measured.course,
+            counts: measured.counts,
             wall_s,
-            scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
+            scans_per_s: measured.latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
             shared_memory: session.footprint.cloned(),
-            restarts: report
-                .map(|report| report.restarts.clone())
-                .unwrap_or_default(),
-            recovery_ms: report
-                .into_iter()
-                .flat_map(|r| &r.recovery)
-                .map(|time| time.as_secs_f64() * 1e3)
-                .collect(),
-            swaps: report
-                .map(|report| report.swaps.clone())
-                .unwrap_or_default(),
-            stages: report
-                .map(|report| report.counters.clone())
-                .unwrap_or_default(),
-            latency,
-            evaluation,
-            slam,
-            gnss,
+            restarts: report.map_or_else(Default::default, |it| it.restarts.clone()),
+            recovery_ms: recovery.map(|time| time.as_secs_f64() * 1e3).collect(),
+            swaps: report.map_or_else(Default::default, |it| it.swaps.clone()),
+            stages: report.map_or_else(Default::default, |it| it.counters.clone()),
+            latency: measured.latency,
+            evaluation: measured.evaluation,
+            slam: measured.slam,
+            gnss: measured.gnss,
         }
     }
 }
@@ -285,16 +238,14 @@ impl fmt::Display for Summary {
         };
         let of = self.scans_in_recording;
         let of = of.map_or(String::new(), |scans| format!(" of {scans}"));
+        let (poses, wall_s, per_s) = (c.processed, self.wall_s, self.scans_per_s);
         writeln!(
             f,
-            "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
-            c.processed, self.wall_s, self.scans_per_s
+            "\n{ending}: {poses}{of} scans in {wall_s:.1} s, {per_s:.1} scans/s"
         )?;
         let figures = self.figures();
-        for (title, rows) in figures::GROUPS
-            .iter()
-            .filter(|it| it.0 != figures::ACCURACY)
-        {
+        let groups = figures::GROUPS.iter();
+        for (title, rows) in groups.filter(|it| it.0 != figures::ACCURACY) {
             writeln!(f, "\n{title}")?;
             for row in *rows {
                 if let Some(text) = row.text(&figures) {
@@ -320,11 +271,9 @@ impl fmt::Display for Summary {
 
 impl Summary {
     fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "\n{:20}{:>9}{:>9}{:>9}{:>9}   busy   allocations",
-            "latency, us", "p50", "p90", "p99", "max"
-        )?;
+        let name = "latency, us";
+        write!(f, "\n{name:20}      p50      p90      p99      max   ")?;
+        writeln!(f, "busy   allocations")?;
         row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
         writeln!(f)?;
         for stage in StageId::ALL {
@@ -338,10 +287,10 @@ impl Summary {
             row(f, stage.name(), &hop.work)?;
             write!(f, "{:6.0} %", hop.busy * 100.0)?;
             let counters = self.stages.get(stage.name());
-            match counters.and_then(|counters| counters.allocations_after_five) {
-                Some(allocations) => writeln!(f, "{allocations:14}")?,
-                None => writeln!(f)?,
+            if let Some(allocations) = counters.and_then(|it| it.allocations_after_five) {
+                write!(f, "{allocations:14}")?;
             }
+            writeln!(f)?;
         }
         let bound_by = self.latency.bound_by.unwrap_or("nothing");
         writeln!(
@@ -354,9 +303,7 @@ impl Summary {
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
-    write!(
-        f,
-        "{name:20}{:9.0}{:9.0}{:9.0}{:9.0}",
-        p.p50_us, p.p90_us, p.p99_us, p.max_us
-    )
+    write!(f, "{name:20}")?;
+    let mut times_us = [p.p50_us, p.p90_us, p.p99_us, p.max_us].into_iter();
+    times_us.try_for_each(|time_us| write!(f, "{time_us:9.0}"))
 }

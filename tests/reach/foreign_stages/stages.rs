@@ -90,28 +90,67 @@ impl Fault {
     }
 }
 
-struct ForeignRotation(Fault);
+/// A stage whose messages `$write` writes, and which edits their headers.
+macro_rules! foreign {
+    ($name:ident $hop:ident $inputs:ty, $view:ident<$($of:ident),+> => $output:ident, $write:ident) => {
+        struct $name(Fault);
 
-impl Stage for ForeignRotation {
-    type Inputs = Pairs<Masked>;
-    type Output = Rotation;
-    const HOP: StageId = StageId::RotationSearch;
+        impl Stage for $name {
+            type Inputs = $inputs;
+            type Output = $output;
+            const HOP: StageId = StageId::$hop;
 
-    fn process(
-        &mut self,
-        input: PairView<'_, Masked>,
-        output: &mut Draft<Rotation>,
-    ) -> Result<(), StageError> {
-        let rotation = &mut output.header().rotation;
-        if let Some(value) = self.0.of("angle", input.current.item().seq) {
-            rotation.angle_rad = value;
+            fn process(
+                &mut self,
+                input: $view<'_, $($of),+>,
+                output: &mut Draft<$output>,
+            ) -> Result<(), StageError> {
+                let seq = $write(&self.0, &input, output);
+                self.0.edit(output.header(), seq);
+                Ok(())
+            }
         }
-        self.0.edit(output.header(), input.current.item().seq);
-        Ok(())
-    }
+    };
 }
 
-/// A motion of a meter forward.
+foreign!(ForeignMasking Masking Pairs<Scan>, PairView<Scan> => Masked, mask);
+foreign!(ForeignRotation RotationSearch Pairs<Masked>, PairView<Masked> => Rotation, rotate);
+foreign!(ForeignTranslation TranslationSearch Joined<Masked, Rotation>, JoinedView<Masked, Rotation> => Motion, translate);
+foreign!(ForeignRefinement Refinement Joined<Masked, Motion>, JoinedView<Masked, Motion> => Refined, refine);
+
+fn rotate(fault: &Fault, input: &PairView<'_, Masked>, output: &mut Draft<Rotation>) -> u64 {
+    let seq = input.current.item().seq;
+    if let Some(value) = fault.of("angle", seq) {
+        output.header().rotation.angle_rad = value;
+    }
+    seq
+}
+
+fn translate(
+    fault: &Fault,
+    input: &JoinedView<'_, Masked, Rotation>,
+    output: &mut Draft<Motion>,
+) -> u64 {
+    let item = input.pair.current.item();
+    if !item.is(flag::BREAK) {
+        output.header().motion = motion(fault, item.seq, input.pair.interval_ns());
+    }
+    item.seq
+}
+
+fn refine(
+    fault: &Fault,
+    input: &JoinedView<'_, Masked, Motion>,
+    output: &mut Draft<Refined>,
+) -> u64 {
+    let (item, searched) = (input.pair.current.item(), input.other.header().motion);
+    if !item.is(flag::BREAK) {
+        output.header().motion = motion(fault, item.seq, searched.interval_ns);
+    }
+    item.seq
+}
+
+/// Returns a motion of a meter forward.
 fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
     let x_m = fault.of("x", seq).unwrap_or(1.0);
     let variance = fault.of("covariance", seq).unwrap_or(0.01);
@@ -124,76 +163,20 @@ fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
     }
 }
 
-struct ForeignTranslation(Fault);
-
-impl Stage for ForeignTranslation {
-    type Inputs = Joined<Masked, Rotation>;
-    type Output = Motion;
-    const HOP: StageId = StageId::TranslationSearch;
-
-    fn process(
-        &mut self,
-        input: JoinedView<'_, Masked, Rotation>,
-        output: &mut Draft<Motion>,
-    ) -> Result<(), StageError> {
-        let item = input.pair.current.item();
-        if !item.is(flag::BREAK) {
-            output.header().motion = motion(&self.0, item.seq, input.pair.interval_ns());
-        }
-        self.0.edit(output.header(), item.seq);
-        Ok(())
-    }
-}
-
-struct ForeignRefinement(Fault);
-
-impl Stage for ForeignRefinement {
-    type Inputs = Joined<Masked, Motion>;
-    type Output = Refined;
-    const HOP: StageId = StageId::Refinement;
-
-    fn process(
-        &mut self,
-        input: JoinedView<'_, Masked, Motion>,
-        output: &mut Draft<Refined>,
-    ) -> Result<(), StageError> {
-        let (item, searched) = (input.pair.current.item(), input.other.header().motion);
-        if !item.is(flag::BREAK) {
-            output.header().motion = motion(&self.0, item.seq, searched.interval_ns);
-        }
-        self.0.edit(output.header(), item.seq);
-        Ok(())
-    }
-}
-
-struct ForeignMasking(Fault);
-
-impl Stage for ForeignMasking {
-    type Inputs = Pairs<Scan>;
-    type Output = Masked;
-    const HOP: StageId = StageId::Masking;
-
-    fn process(
-        &mut self,
-        input: PairView<'_, Scan>,
-        output: &mut Draft<Masked>,
-    ) -> Result<(), StageError> {
-        let seq = input.current.item().seq;
-        let (header, values) = output.parts::<f32>();
-        values.fill(0.0);
-        let fault = |field: &str| self.0.of(field, seq);
-        let raster = MaskedHeader::split(values, 127, 1).unwrap();
-        raster.points[0].x_m = fault("point").unwrap_or(1.0) as f32;
-        *header = MaskedHeader {
-            n: fault("n").unwrap_or(127.0) as u32,
-            rasters: 1,
-            cell_m: 0.8,
-            points: fault("points").unwrap_or(1.0) as u32,
-            ..MaskedHeader::default()
-        };
-        self.0.edit(header, seq);
-        Ok(())
-    }
+fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) -> u64 {
+    let seq = input.current.item().seq;
+    let (header, values) = output.parts::<f32>();
+    values.fill(0.0);
+    let raster = MaskedHeader::split(values, 127, 1).unwrap();
+    raster.points[0].x_m = fault.of("point", seq).unwrap_or(1.0) as f32;
+    *header = MaskedHeader {
+        n: fault.of("n", seq).unwrap_or(127.0) as u32,
+        rasters: 1,
+        cell_m: 0.8,
+        points: 1,
+        ..MaskedHeader::default()
+    };
+    seq
 }
 
 /// Plays the recording, with a fault in one header.
@@ -242,9 +225,6 @@ impl Source for ForeignSource {
         let fault = |field: &str| self.fault.of(field, index as u64);
         if let Some(bins) = fault("bins") {
             header.bins = bins as u32;
-        }
-        if let Some(azimuths) = fault("azimuths") {
-            header.azimuths = azimuths as u32;
         }
         if let Some(stamp_ns) = fault("stamp") {
             header.azimuth_stamp_ns[3] = stamp_ns as i64;

@@ -28,14 +28,13 @@ use crate::{
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
-    replay_buffer::{MemoryBuffer, PoseBuffer, PoseLog, ReplayBuffer},
+    replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
     serve::{LAST_ANSWERS, Offer, Server},
     waker::Waker,
 };
 
 /// Time after which a message reports that the base is waiting for the robot at the end.
 const QUIET: Duration = Duration::from_secs(1);
-/// Time between two checks whether the robot has confirmed the end.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
@@ -73,9 +72,7 @@ struct Base<'a> {
     /// The topics that cross the link, the cut last.
     topics: Vec<&'static str>,
     stages: FirstStages<'a>,
-    /// The newest item that was published here.
     published: Option<u64>,
-    /// The newest pose when this process started.
     resumed: Item,
     /// The drive of the robot that was admitted last.
     drive: Option<String>,
@@ -85,7 +82,7 @@ struct Base<'a> {
 
 /// The topics that are offered to the robot, and its requests to start.
 struct ToRobot {
-    poses: Arc<PoseBuffer>,
+    poses: Arc<LogBuffer>,
     pose_offer: Arc<Offer>,
     motions: Arc<MemoryBuffer>,
     starts: Receiver<Query>,
@@ -93,7 +90,6 @@ struct ToRobot {
     _server: Server,
 }
 
-/// A topic that comes from the robot.
 struct FromRobot {
     fetcher: Fetcher,
     header_bytes: usize,
@@ -158,7 +154,6 @@ impl Base<'_> {
         thread::sleep(LAST_ANSWERS);
     }
 
-    /// Confirms to the robot that this side has the end in its journal.
     fn confirm(&self, end: Option<&Item>, topics: &[FromRobot]) {
         if let Some(end) = end.filter(|_| self.stages.has_ended()) {
             let next = end.seq.saturating_add(1);
@@ -196,7 +191,7 @@ impl Base<'_> {
         let manifest = &self.launch.manifest;
         let prefix = handshake::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
-        let poses = Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out)));
+        let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
         let motions = Arc::new(MemoryBuffer::of(Motion::sizes(&manifest.window).buffer));
         let (sender, starts) = channel();
         let waker = self.waker.clone();
@@ -243,18 +238,19 @@ impl Base<'_> {
 
     /// Returns the number of the item that is published next.
     fn next(&self) -> u64 {
-        let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
-        let newest = self.published.or(resumed);
+        let newest = self.published.or(self.resumed_at());
         newest.map_or(0, |newest| newest.saturating_add(1))
     }
 
-    /// Offers the new poses and motions.
+    /// Returns the number of the newest pose when this process started.
+    fn resumed_at(&self) -> Option<u64> {
+        (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
+    }
+
     fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
-        let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
-        let newest = self.stages.newest_pose().max(resumed);
-        to_robot
-            .poses
-            .set_published(newest.map_or(0, |newest| newest.saturating_add(1)));
+        let newest = self.stages.newest_pose().max(self.resumed_at());
+        let published = newest.map_or(0, |newest| newest.saturating_add(1));
+        to_robot.poses.set_published(published);
         while let Some(motion) = self.stages.next_motion()? {
             to_robot.motions.add(&motion);
         }
@@ -264,9 +260,7 @@ impl Base<'_> {
     /// Answers a robot that starts; true if it is admitted.
     fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
-        let bytes = query
-            .payload()
-            .map(|payload| payload.to_bytes().into_owned());
+        let bytes = query.payload().map(|payload| payload.to_bytes());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
         let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
         let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
@@ -340,7 +334,7 @@ impl Base<'_> {
                 self.next()
             )));
         }
-        let is_resumed = item.seq == self.resumed.seq && !self.resumed.is(flag::BASE);
+        let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
             true => Err(LinkError::Refused(format!(
                 "the robot's scan {} is not the one that this run has a pose of: it plays another drive; begin both anew with --fresh",
@@ -352,12 +346,10 @@ impl Base<'_> {
 }
 
 impl FromRobot {
-    /// Takes the message about an item, if it has arrived.
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
         let first = self.messages.front()?.item();
-        first
-            .is_some_and(|it| it.seq == seq)
-            .then(|| self.messages.pop_front())?
+        let is_next = first.is_some_and(|it| it.seq == seq);
+        is_next.then(|| self.messages.pop_front())?
     }
 
     fn receive(&mut self) -> Result<(), LinkError> {

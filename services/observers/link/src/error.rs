@@ -1,6 +1,6 @@
 //! Why a link fails.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use gyre_journal::JournalError;
 use gyre_stage::StageError;
@@ -24,22 +24,19 @@ pub enum LinkError {
     Supervise(#[from] SuperviseError),
     #[error(transparent)]
     Journal(#[from] JournalError),
-    #[error("{path}: {source}")]
-    File {
-        path: PathBuf,
-        source: std::io::Error,
-    },
 }
 
 impl LinkError {
-    /// Creates the error for a side of another version.
     pub(crate) fn other_version(other: &str) -> Self {
         Self::Refused(format!(
             "{other} is another version of gyre: install the same on both"
         ))
     }
 
-    /// Creates an error of the network layer.
+    pub(crate) fn file(path: &Path, source: &std::io::Error) -> Self {
+        Self::Refused(format!("{}: {source}", path.display()))
+    }
+
     pub(crate) fn zenoh(action: &str, error: &dyn std::fmt::Display) -> Self {
         // zenoh appends the place in its sources.
         let text = error.to_string();

@@ -28,18 +28,16 @@ use crate::{
 /// Time for the answer to the message that nothing more is wanted, and the number of attempts.
 const DONE_TIMEOUT: Duration = Duration::from_secs(1);
 const DONE_ATTEMPTS: usize = 3;
-/// Time between two checks whether to continue.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// Pauses between unanswered requests, from the first to the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
-/// A topic that a thread receives.
 pub(crate) struct Fetcher {
     messages: Receiver<Vec<u8>>,
     state: Arc<State>,
     thread: Option<JoinHandle<()>>,
 }
 
+#[derive(Default)]
 struct State {
     stop: AtomicBool,
     /// True if the thread informs the sender, at the stop, that it needs no more messages.
@@ -48,7 +46,6 @@ struct State {
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
-    /// The first message of the newest request.
     requested: AtomicU64,
     /// The first message of the newest request that was answered.
     answered: AtomicU64,
@@ -56,9 +53,7 @@ struct State {
     confirmed: AtomicU64,
 }
 
-/// A request for the messages of a topic.
 pub(crate) struct Request {
-    /// The key of the topic.
     pub key: String,
     pub from: u64,
     /// The generation of the messages before, 0 without any; `None` if no number is given twice.
@@ -71,12 +66,7 @@ pub(crate) struct Request {
 
 impl Request {
     fn selector(&self) -> String {
-        let Self {
-            key,
-            from,
-            receiver,
-            ..
-        } = self;
+        let (key, from, receiver) = (&self.key, self.from, &self.receiver);
         let selector = format!("{key}?{FROM}={from};{RECEIVER}={receiver}");
         match self.generation {
             Some(generation) => format!("{selector};{GENERATION}={generation}"),
@@ -86,18 +76,12 @@ impl Request {
 }
 
 impl Fetcher {
-    /// Receives the messages of a topic, and wakes `waker` for each.
     pub fn start(session: &Session, request: Request, waker: Waker) -> Self {
         let (sender, messages) = channel();
         let state = Arc::new(State {
-            stop: AtomicBool::new(false),
-            leaves: AtomicBool::new(false),
-            again: AtomicBool::new(false),
-            is_connected: AtomicBool::new(false),
-            has_ended: AtomicBool::new(false),
             requested: AtomicU64::new(request.from),
-            answered: AtomicU64::new(0),
             confirmed: AtomicU64::new(request.from),
+            ..State::default()
         });
         let requests = RequestLoop {
             session: session.clone(),
@@ -115,29 +99,23 @@ impl Fetcher {
         }
     }
 
-    /// Returns the next message that has arrived.
     pub fn next(&self) -> Option<Vec<u8>> {
         self.messages.try_recv().ok()
     }
 
-    /// Returns the next message that has arrived, as its header of so many bytes and its payload.
     pub fn next_with_payload(
         &self,
         header_bytes: usize,
     ) -> Result<Option<RecordedMessage>, LinkError> {
-        let Some(bytes) = self.next() else {
+        let Some(mut header) = self.next() else {
             return Ok(None);
         };
-        match bytes.split_at_checked(header_bytes) {
-            Some((header, payload)) => Ok(Some(RecordedMessage {
-                header: header.to_vec(),
-                payload: payload.to_vec(),
-            })),
-            None => {
-                let reason = format!("a message of {} bytes is too short", bytes.len());
-                Err(LinkError::Refused(reason))
-            }
+        if header.len() < header_bytes {
+            let reason = format!("a message of {} bytes is too short", header.len());
+            return Err(LinkError::Refused(reason));
         }
+        let payload = header.split_off(header_bytes);
+        Ok(Some(RecordedMessage { header, payload }))
     }
 
     /// Confirms to the other side that all before message `next` has arrived, by a request from
@@ -169,12 +147,10 @@ impl Fetcher {
         }
     }
 
-    /// Returns whether no message follows those that have arrived.
     pub fn has_ended(&self) -> bool {
         self.state.has_ended.load(Ordering::Acquire)
     }
 
-    /// Returns whether the other side answers.
     pub fn is_connected(&self) -> bool {
         self.state.is_connected.load(Ordering::Relaxed)
     }
@@ -186,7 +162,6 @@ impl Drop for Fetcher {
     }
 }
 
-/// The requests of a thread, one after the other.
 struct RequestLoop {
     session: Session,
     request: Request,
@@ -312,14 +287,13 @@ impl RequestLoop {
 
     /// Goes back to the first item that a later generation numbers again.
     fn go_back_to(&mut self, item: &Item) {
-        let Request {
-            from, generation, ..
-        } = &mut self.request;
-        if let Some(known) = generation
-            .as_mut()
-            .filter(|known| item.generation > **known)
+        let request = &mut self.request;
+        if request
+            .generation
+            .is_some_and(|known| item.generation > known)
         {
-            (*known, *from) = (item.generation, item.numbered_from.min(*from));
+            request.generation = Some(item.generation);
+            request.from = item.numbered_from.min(request.from);
             self.has_end = false;
         }
     }
@@ -330,12 +304,8 @@ impl RequestLoop {
     }
 
     fn set_connected(&self, is_connected: bool) {
-        if self
-            .state
-            .is_connected
-            .swap(is_connected, Ordering::Relaxed)
-            != is_connected
-        {
+        let state = &self.state.is_connected;
+        if state.swap(is_connected, Ordering::Relaxed) != is_connected {
             self.waker.wake();
         }
     }

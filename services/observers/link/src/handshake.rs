@@ -14,16 +14,9 @@ use crate::{LinkError, Network, request::Question};
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
 
-const ASK_FOR_SCANS: Question = Question {
-    action: "ask the robot for its scans",
-    other: "the robot",
-};
-const ASK_FOR_START: Question = Question {
-    action: "ask the base where to go on",
-    other: "the base",
-};
+const ASK_FOR_SCANS: Question = Question("ask the robot for its scans", "the robot");
+const ASK_FOR_START: Question = Question("ask the base where to go on", "the base");
 
-/// Returns the prefix of the keys of what one side sends.
 pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     let side = match sender {
         Side::Robot => "robot",
@@ -37,31 +30,24 @@ pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
 
-/// Returns the key where a robot reports the size of its scans.
 pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
     format!("{}/scans", prefix(config, Side::Robot))
 }
 
-/// The size of a robot's scans.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ScanSize {
-    /// The bytes of the largest scan.
-    pub bytes: usize,
-}
-
-/// Waits for the robot and asks for the size of its scans, which a base needs that receives them.
-pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
+/// Waits for the robot and asks for the bytes of its largest scan, which a base needs that receives
+/// scans.
+pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
     let pause = || {
         thread::sleep(PAUSE);
         Ok(false)
     };
     let session = Network::from(config).open(pause)?;
-    let failed = || LinkError::zenoh(ASK_FOR_SCANS.action, &"it was interrupted");
+    let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
-        if let Some(size) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
+        if let Some(bytes) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
             let _ = session.close().wait();
-            return Ok(size);
+            return Ok(bytes);
         }
         thread::sleep(PAUSE);
     }
@@ -82,7 +68,6 @@ pub(crate) struct Agreement {
     pub drive: Option<String>,
 }
 
-/// The answer to a robot that starts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StartAnswer {
@@ -95,12 +80,12 @@ pub(crate) enum StartAnswer {
 }
 
 impl Agreement {
-    /// Returns the description of this side.
     pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
         let versioned = |name: &&'static str| {
             let version = topic(name).map_or("", |topic| topic.header.name);
             ((*name).to_owned(), version.to_owned())
         };
+        let topics = topics.iter().chain(&["motion", "pose"]);
         Self {
             cut: config.cut.name().to_owned(),
             live: manifest.live,
@@ -108,11 +93,7 @@ impl Agreement {
             window: manifest.window.scans,
             look_back: manifest.window.look_back,
             limits: manifest.limits,
-            topics: topics
-                .iter()
-                .chain(&["motion", "pose"])
-                .map(versioned)
-                .collect(),
+            topics: topics.map(versioned).collect(),
             drive: drive(&manifest.out),
         }
     }
@@ -121,6 +102,7 @@ impl Agreement {
     fn properties(&self) -> [(&'static str, String); 9] {
         let limits = &self.limits;
         let mode = if self.live { "live" } else { "lossless" };
+        let look_back = self.look_back.to_string();
         [
             ("link.cut", self.cut.clone()),
             ("run.mode", mode.to_owned()),
@@ -130,10 +112,7 @@ impl Agreement {
             ("points.capacity", limits.points.to_string()),
             ("the number of scans of a mask", limits.rasters.to_string()),
             ("refinement", self.refines.to_string()),
-            (
-                "the scans that stages look back",
-                self.look_back.to_string(),
-            ),
+            ("the scans that stages look back", look_back),
         ]
     }
 
@@ -174,6 +153,6 @@ pub(crate) fn ask_base(
     agreement: &Agreement,
 ) -> Result<Option<StartAnswer>, LinkError> {
     let payload = serde_json::to_vec(agreement);
-    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.action, &e))?;
+    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.0, &e))?;
     ASK_FOR_START.ask(session, start_key(config), payload)
 }

@@ -50,14 +50,11 @@ mod waker;
 pub use network::{Network, NetworkError, ONE_THREAD};
 
 #[cfg(feature = "zenoh")]
-pub use base::run as run_base;
-#[cfg(feature = "zenoh")]
-pub use error::LinkError;
-#[cfg(feature = "zenoh")]
-pub use handshake::{ScanSize, ask_robot};
-#[cfg(feature = "zenoh")]
-pub use receive::{ReceiveOptions, Received, ask, receive};
-#[cfg(feature = "zenoh")]
-pub use robot::run as run_robot;
-#[cfg(feature = "zenoh")]
-pub use send::{SendOptions, Sent, send};
+pub use {
+    base::run as run_base,
+    error::LinkError,
+    handshake::ask_robot,
+    receive::{ReceiveOptions, Received, ask, receive},
+    robot::run as run_robot,
+    send::{SendOptions, Sent, send},
+};

@@ -15,20 +15,15 @@ pub const ONE_THREAD: (&str, &str) = (
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
 );
 
-/// The endpoints and certificates of one side.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Network {
     /// The name of the link, the same on both sides.
     pub name: String,
     /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,
-    /// Endpoints that it connects to.
     pub connect: Vec<String>,
-    /// Certificate of the authority, PEM.
     pub ca: PathBuf,
-    /// Certificate of this side, PEM.
     pub certificate: PathBuf,
-    /// Private key of the certificate, PEM.
     pub key: PathBuf,
 }
 
@@ -45,87 +40,42 @@ impl From<&LinkConfig> for Network {
     }
 }
 
-/// A network that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum NetworkError {
-    #[error(
-        "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447"
-    )]
-    NoEndpoint,
-    #[error("`{0}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT")]
-    Malformed(String),
-    #[error(
-        "{0} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
-    )]
-    Plain(String),
-    #[error(
-        "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
-    )]
-    NoCertificate {
-        endpoint: String,
-        what: &'static str,
-    },
-    #[error("{what} {path} cannot be read: {reason}")]
-    File {
-        /// The kind of the file.
-        what: &'static str,
-        path: PathBuf,
-        /// The system's reason.
-        reason: String,
-    },
-    /// A public authority might certify the host for somebody else.
-    #[error(
-        "{0} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
-    )]
-    Public(String),
-    #[error("`{0}` is no name of a link: it has letters, digits, `-` and `_`")]
-    Name(String),
-}
+#[error("{0}")]
+pub struct NetworkError(String);
 
 /// The suffixes of names that no public authority certifies: private zones, and names reserved for
 /// documents.
-const PRIVATE_ZONES: [&str; 7] = [
-    ".internal",
-    ".lan",
-    ".local",
-    ".home.arpa",
-    ".test",
-    ".example",
-    ".localhost",
-];
-
-/// The protocol of an endpoint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Protocol {
-    Tcp,
-    Tls,
-}
+const PRIVATE_ZONES: &str = ".internal .lan .local .home.arpa .test .example .localhost";
 
 impl Network {
     /// Checks the endpoints, and that the files of TLS can be read.
     pub fn check(&self) -> Result<(), NetworkError> {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if self.name.is_empty() || !self.name.chars().all(is_word) {
-            return Err(NetworkError::Name(self.name.clone()));
+            return Err(NetworkError(format!(
+                "`{}` is no name of a link: it has letters, digits, `-` and `_`",
+                self.name
+            )));
         }
-        let mut endpoints = self.endpoints().peekable();
-        if endpoints.peek().is_none() {
-            return Err(NetworkError::NoEndpoint);
+        if self.listen.is_empty() && self.connect.is_empty() {
+            return Err(NetworkError(
+                "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447".to_owned(),
+            ));
         }
-        endpoints.try_for_each(|endpoint| match protocol(endpoint)? {
-            Protocol::Tcp => Ok(()),
-            Protocol::Tls => self.check_certificates(endpoint),
-        })?;
+        for endpoint in self.listen.iter().chain(&self.connect) {
+            if is_tls(endpoint)? {
+                self.check_certificates(endpoint)?;
+            }
+        }
         // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
         // certificates others can have.
         match self.connect.iter().find(|endpoint| is_public(endpoint)) {
-            Some(endpoint) => Err(NetworkError::Public(endpoint.clone())),
+            Some(endpoint) => Err(NetworkError(format!(
+                "{endpoint} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
+            ))),
             None => Ok(()),
         }
-    }
-
-    fn endpoints(&self) -> impl Iterator<Item = &str> {
-        self.listen.iter().chain(&self.connect).map(String::as_str)
     }
 
     fn check_certificates(&self, endpoint: &str) -> Result<(), NetworkError> {
@@ -135,24 +85,25 @@ impl Network {
             ("a private key (key)", &self.key),
         ] {
             if path.as_os_str().is_empty() {
-                let endpoint = endpoint.to_owned();
-                return Err(NetworkError::NoCertificate { endpoint, what });
+                return Err(NetworkError(format!(
+                    "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
+                )));
             }
-            if let Err(error) = std::fs::read(path) {
-                return Err(NetworkError::File {
-                    what,
-                    path: path.clone(),
-                    reason: error.to_string(),
-                });
-            }
+            std::fs::read(path).map_err(|reason| {
+                let path = path.display();
+                NetworkError(format!("{what} {path} cannot be read: {reason}"))
+            })?;
         }
         Ok(())
     }
 }
 
-/// Returns the protocol of an endpoint that may be used.
-fn protocol(endpoint: &str) -> Result<Protocol, NetworkError> {
-    let malformed = || NetworkError::Malformed(endpoint.to_owned());
+fn is_tls(endpoint: &str) -> Result<bool, NetworkError> {
+    let malformed = || {
+        NetworkError(format!(
+            "`{endpoint}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT"
+        ))
+    };
     let (protocol, address) = endpoint.split_once('/').ok_or_else(malformed)?;
     // After these characters zenoh reads settings of its own, certificates among them.
     if address.contains(['#', '?', ';', '/']) {
@@ -163,9 +114,11 @@ fn protocol(endpoint: &str) -> Result<Protocol, NetworkError> {
         return Err(malformed());
     }
     match protocol {
-        "tls" => Ok(Protocol::Tls),
-        "tcp" if is_loopback(host) => Ok(Protocol::Tcp),
-        "tcp" => Err(NetworkError::Plain(endpoint.to_owned())),
+        "tls" => Ok(true),
+        "tcp" if is_loopback(host) => Ok(false),
+        "tcp" => Err(NetworkError(format!(
+            "{endpoint} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
+        ))),
         _ => Err(malformed()),
     }
 }
@@ -185,18 +138,15 @@ fn is_public(endpoint: &str) -> bool {
         }
         Err(_) => {
             let name = host.trim_end_matches('.').to_ascii_lowercase();
-            name.contains('.') && !PRIVATE_ZONES.iter().any(|zone| name.ends_with(zone))
+            name.contains('.') && !PRIVATE_ZONES.split(' ').any(|zone| name.ends_with(zone))
         }
     }
 }
 
 fn is_loopback(host: &str) -> bool {
-    let address = host.trim_start_matches('[').trim_end_matches(']');
-    let loopback = address
-        .parse::<IpAddr>()
-        .map(|address| address.is_loopback());
+    let address = host.trim_matches(['[', ']']).parse();
     // A name could be resolved to any address.
-    loopback.unwrap_or(false)
+    address.is_ok_and(|address: IpAddr| address.is_loopback())
 }
 
 #[cfg(test)]
@@ -213,36 +163,19 @@ mod tests {
     }
 
     #[test]
-    fn plain_connections_are_for_loopback_addresses_alone() {
+    fn endpoints_are_tls_or_on_this_machine_and_smuggle_no_settings_of_zenoh_in() {
+        let (plain, malformed) = ("would leave this machine unencrypted", "is no endpoint");
         for endpoint in ["tcp/127.0.0.1:7447", "tcp/127.1.2.3:1", "tcp/[::1]:7447"] {
             assert_eq!(listening(endpoint).check(), Ok(()), "{endpoint}");
         }
-        for endpoint in [
-            "tcp/0.0.0.0:7447",
-            "tcp/[::]:7447",
-            "tcp/192.168.0.1:7447",
-            "tcp/localhost:7447",
-            "tcp/robot:7447",
-        ] {
-            let refused = listening(endpoint).check();
-            assert_eq!(refused, Err(NetworkError::Plain(endpoint.to_owned())));
-        }
-    }
-
-    #[test]
-    fn settings_of_zenoh_cannot_be_smuggled_in_with_an_endpoint() {
-        for endpoint in [
-            "",
-            "7447",
-            "udp/127.0.0.1:7447",
-            "tls/:7447",
-            "tls/base",
-            "tls/base:port",
-            "tls/base:7447#enable_mtls=false",
-            "tcp/127.0.0.1:7447?rel=0",
-        ] {
-            let refused = listening(endpoint).check();
-            assert_eq!(refused, Err(NetworkError::Malformed(endpoint.to_owned())));
+        let off = "tcp/0.0.0.0:1 tcp/[::]:1 tcp/192.168.0.1:1 tcp/localhost:1";
+        let others = " 7447 udp/127.0.0.1:7447 tls/:7447 tls/base tls/base:port";
+        let smuggling = "tls/base:7447#enable_mtls=false tcp/127.0.0.1:7447?rel=0";
+        for (endpoints, words) in [(off, plain), (others, malformed), (smuggling, malformed)] {
+            for endpoint in endpoints.split(' ') {
+                let refused = listening(endpoint).check().unwrap_err().0;
+                assert!(refused.contains(words), "{endpoint}: {refused}");
+            }
         }
     }
 
@@ -255,7 +188,7 @@ mod tests {
             path
         };
         let mut network = listening("tls/0.0.0.0:7447");
-        let lacks = |network: &Network| network.check().unwrap_err().to_string();
+        let lacks = |network: &Network| network.check().unwrap_err().0;
         assert!(lacks(&network).contains("(ca)"));
         network.ca = file("ca.pem");
         assert!(lacks(&network).contains("(certificate)"));
@@ -269,28 +202,12 @@ mod tests {
 
     #[test]
     fn a_side_that_connects_trusts_no_public_authority() {
-        for host in [
-            "10.1.2.3",
-            "192.168.0.7",
-            "100.101.2.3",
-            "[fd00::1]",
-            "[fe80::1]",
-            "base",
-            "base.internal",
-            "base.example",
-            "Robot.Local.",
-        ] {
-            assert!(!is_public(&format!("tls/{host}:7447")), "{host}");
-        }
-        for host in [
-            "192.0.2.1",
-            "100.63.0.1",
-            "[2001:db8::1]",
-            "base.example.com",
-            "x.internal.org",
-        ] {
-            let endpoint = format!("tls/{host}:7447");
-            assert!(is_public(&endpoint), "{host}");
+        let private = "10.1.2.3 192.168.0.7 100.101.2.3 [fd00::1] [fe80::1] base base.internal base.example Robot.Local.";
+        let public = "192.0.2.1 100.63.0.1 [2001:db8::1] base.example.com x.internal.org";
+        for (hosts, expected) in [(private, false), (public, true)] {
+            for host in hosts.split(' ') {
+                assert_eq!(is_public(&format!("tls/{host}:7447")), expected, "{host}");
+            }
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         let path = || file.path().to_owned();
@@ -302,25 +219,18 @@ mod tests {
             key: path(),
             ..Network::default()
         };
-        assert!(matches!(network.check(), Err(NetworkError::Public(_))));
+        assert!(network.check().unwrap_err().0.contains("public name"));
     }
 
     #[test]
     fn a_link_has_a_name_and_an_endpoint() {
-        let named = |name: &str| Network {
-            name: name.to_owned(),
-            ..listening("tcp/127.0.0.1:7447")
-        };
         for name in ["", "a/b", "*", "rob ot"] {
-            assert_eq!(
-                named(name).check(),
-                Err(NetworkError::Name(name.to_owned()))
-            );
+            let mut network = listening("tcp/127.0.0.1:7447");
+            network.name = name.to_owned();
+            assert!(network.check().unwrap_err().0.contains("is no name"));
         }
-        let nowhere = Network {
-            listen: Vec::new(),
-            ..named("robot")
-        };
-        assert_eq!(nowhere.check(), Err(NetworkError::NoEndpoint));
+        let mut nowhere = listening("");
+        nowhere.listen.clear();
+        assert!(nowhere.check().unwrap_err().0.contains("no endpoint"));
     }
 }

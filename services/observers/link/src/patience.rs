@@ -9,7 +9,6 @@ const SHORTEST: Duration = Duration::from_secs(12);
 const LONGEST: Duration = Duration::from_secs(15 * 60);
 /// The first answer is empty, and takes less time; it may come behind a message that was given up.
 const FIRST_ANSWER_SHARE: u32 = 4;
-/// The longest time for it.
 const LONGEST_FIRST: Duration = Duration::from_secs(30);
 /// The time that a message may take, as a multiple of the time of the previous message.
 const MARGIN: u32 = 2;
@@ -33,7 +32,6 @@ impl Patience {
         }
     }
 
-    /// Notes that a message took so long.
     pub fn received(&mut self, after: Duration) {
         self.0 = (after * MARGIN).clamp(SHORTEST, LONGEST);
     }

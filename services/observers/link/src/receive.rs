@@ -29,28 +29,20 @@ use mirror::Mirror;
 
 /// The name of this process in the log.
 const NAME: &str = "link";
-/// Time between two questions for the sender.
 const PAUSE: Duration = Duration::from_millis(200);
 
-const ASK_FOR_RUN: Question = Question {
-    action: "ask for a run",
-    other: "the sender",
-};
+const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 
-/// The options of a receiver.
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
-    /// The folder of the received run.
     pub out: PathBuf,
     /// The endpoints and certificates for the sender.
     pub network: Network,
-    /// The program of the guardian.
     pub gyre: String,
     /// Topics to receive of those that are sent; empty: all.
     pub topics: Vec<String>,
 }
 
-/// A run of another machine that can be received.
 pub struct RemoteRun {
     session: Session,
     offer: RunOffer,
@@ -74,35 +66,26 @@ pub fn ask(network: &Network, signals: &Signals) -> Result<Option<RemoteRun>, Li
     }
 }
 
-/// Checks that a topic has the same version here.
 fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
     let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
         true => Ok(()),
-        false => Err(LinkError::other_version(ASK_FOR_RUN.other)),
+        false => Err(LinkError::other_version(ASK_FOR_RUN.1)),
     }
 }
 
 impl RemoteRun {
-    /// Returns the manifest of the copy of this run that writes to `out`.
     pub fn manifest(&self, out: &Path) -> Manifest {
-        let RunOffer {
-            window,
-            limits,
-            live,
-            refines,
-            rate,
-            ..
-        } = self.offer;
+        let offer = &self.offer;
         Manifest {
             prefix: String::new(),
             root: PathBuf::new(),
             out: out.to_owned(),
-            window,
-            limits,
-            live,
-            refines,
-            rate,
+            window: offer.window,
+            limits: offer.limits,
+            live: offer.live,
+            refines: offer.refines,
+            rate: offer.rate,
             build: String::new(),
         }
     }
@@ -140,12 +123,9 @@ pub fn receive(
     }
     let received = mirror.run();
     // All at the same time: each may wait for a sender that does not answer.
-    let topics = mirror.topics.iter();
-    topics.for_each(|topic| topic.fetcher.begin_to_leave());
-    mirror
-        .topics
-        .into_iter()
-        .for_each(|topic| topic.fetcher.leave());
+    let topics = mirror.topics;
+    topics.iter().for_each(|it| it.fetcher.begin_to_leave());
+    topics.into_iter().for_each(|it| it.fetcher.leave());
     let _ = session.close().wait();
     received
 }
@@ -154,22 +134,17 @@ pub fn receive(
 /// that has written to the folder.
 fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
     let path = out.join("journal/receiver");
-    let failed = |source| LinkError::File {
-        path: path.clone(),
-        source,
-    };
     match fs::read_to_string(&path) {
         Ok(name) if !name.is_empty() && name.chars().all(|c| c.is_ascii_hexdigit()) => Ok(name),
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(failed(error)),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(LinkError::file(&path, &error)),
         _ => {
             let name = session.zid().to_string();
-            fs::write(&path, &name).map_err(failed)?;
+            fs::write(&path, &name).map_err(|error| LinkError::file(&path, &error))?;
             Ok(name)
         }
     }
 }
 
-/// Returns the number of the next pose of a journal, which is of this drive or empty.
 fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, LinkError> {
     let (last, ended) = journal.last(1)?;
     let Some(last) = last.first() else {
@@ -185,7 +160,7 @@ fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, Lin
 }
 
 /// Returns the time of the first pose in a folder, ns since 1970.
-fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
     let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
     Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }

@@ -2,14 +2,13 @@
 
 use std::{
     collections::VecDeque,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
-use bytemuck::Pod;
 use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_messages::{Hop, LoopHeader, MotionHeader, PoseHeader, StageId, flag};
+use gyre_messages::{Hop, MotionHeader, PoseHeader, StageId, flag};
 use gyre_stage::{StageError, source::RecordedMessage};
 
 use crate::LinkError;
@@ -17,7 +16,6 @@ use crate::LinkError;
 /// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
-    /// The number of the message in its topic.
     pub seq: u64,
     /// See [`Item::generation`](gyre_messages::Item::generation).
     pub generation: u32,
@@ -26,7 +24,6 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// Creates the message to send.
     pub fn of(message: &RecordedMessage) -> Self {
         let item = message.item().unwrap_or_default();
         Self {
@@ -40,7 +37,6 @@ impl Message {
 /// The place behind the messages that a receiver has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
-    /// The number of the next message.
     pub seq: u64,
     /// The generation of the newest one: messages of a later generation are wanted whatever their
     /// numbers. `None`: no number is given twice.
@@ -59,7 +55,6 @@ impl Place {
     }
 }
 
-/// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Message(Message),
@@ -69,19 +64,16 @@ pub(crate) enum Next {
     Ended,
 }
 
-/// The messages of a topic.
 pub(crate) trait ReplayBuffer: Send + Sync {
     /// Returns the first message from a place on, and waits for it at most `limit`.
     fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError>;
 
-    /// Adds a message that the run has published.
     fn add(&self, message: &RecordedMessage);
 
     /// Ends the stream: no message follows.
     fn end(&self) -> Result<(), LinkError>;
 }
 
-/// The newest messages of a topic, in memory.
 pub(crate) struct MemoryBuffer {
     held: Mutex<Held>,
     changed: Condvar,
@@ -154,11 +146,14 @@ impl ReplayBuffer for MemoryBuffer {
 }
 
 /// The messages in a log of a run: all of them, however long the receiver was away.
-pub(crate) struct LogBuffer<L> {
-    log: Mutex<L>,
+pub(crate) struct LogBuffer {
+    read: Mutex<ReadLog>,
     published: Mutex<Published>,
     changed: Condvar,
 }
+
+/// Returns the header of a message in a log by its number, if it is there.
+type ReadLog = Box<dyn FnMut(u64) -> Result<Option<Vec<u8>>, LinkError> + Send>;
 
 #[derive(Clone, Copy, Default)]
 struct Published {
@@ -166,79 +161,48 @@ struct Published {
     has_ended: bool,
 }
 
-/// A log on the disk.
-pub(crate) trait Log: Send {
-    /// The header of its messages.
-    type Header: Pod;
-
-    /// Returns a message by its number, if it is there.
-    fn read(&mut self, seq: u64) -> Result<Option<Self::Header>, LinkError>;
-}
-
-/// The poses in the journal of a run.
-pub(crate) type PoseBuffer = LogBuffer<PoseLog>;
-/// The loops in the log of a run.
-pub(crate) type LoopBuffer = LogBuffer<LoggedLoops>;
-
-/// The journal of a run.
-pub(crate) struct PoseLog(PathBuf);
-
-impl PoseLog {
-    /// Returns the journal of the run that writes to `out`.
-    pub fn of(out: &Path) -> Self {
-        Self(journal::path(out))
-    }
-}
-
-impl Log for PoseLog {
-    type Header = PoseHeader;
-
-    fn read(&mut self, seq: u64) -> Result<Option<PoseHeader>, LinkError> {
-        let Some(mut records) = journal::records_from(&self.0, seq)? else {
-            return Ok(None);
-        };
-        let pose = records.next().transpose()?;
-        Ok(pose.filter(|pose| !pose.item.is(flag::END)))
-    }
-}
-
-impl Log for LoggedLoops {
-    type Header = LoopHeader;
-
-    fn read(&mut self, seq: u64) -> Result<Option<LoopHeader>, LinkError> {
-        let loops = self.refresh().map_err(StageError::from)?;
-        Ok(loops.get(seq as usize).copied())
-    }
-}
-
-impl<L: Log> LogBuffer<L> {
-    /// Creates a buffer of those messages of a log that have been published.
-    pub fn of(log: L) -> Self {
+impl LogBuffer {
+    fn of(read: ReadLog) -> Self {
         Self {
-            log: Mutex::new(log),
+            read: Mutex::new(read),
             published: Mutex::default(),
             changed: Condvar::new(),
         }
     }
 
-    /// Sets the number of messages that have been published.
+    pub fn of_poses(out: &Path) -> Self {
+        let path = journal::path(out);
+        Self::of(Box::new(move |seq| {
+            let Some(mut records) = journal::records_from(&path, seq)? else {
+                return Ok(None);
+            };
+            let pose = records.next().transpose()?;
+            let pose = pose.filter(|pose| !pose.item.is(flag::END));
+            Ok(pose.map(|pose| bytemuck::bytes_of(&pose).to_vec()))
+        }))
+    }
+
+    pub fn of_loops(mut log: LoggedLoops) -> Self {
+        Self::of(Box::new(move |seq| {
+            let loops = log.refresh().map_err(StageError::from)?;
+            let found = loops.get(seq as usize);
+            Ok(found.map(|found| bytemuck::bytes_of(found).to_vec()))
+        }))
+    }
+
     pub fn set_published(&self, messages: u64) {
         lock(&self.published).messages = messages;
         self.changed.notify_all();
     }
 
-    /// Returns a message of the log.
-    pub fn read(&self, seq: u64) -> Result<Option<L::Header>, LinkError> {
-        lock(&self.log).read(seq)
+    fn read(&self, seq: u64) -> Result<Option<Vec<u8>>, LinkError> {
+        (lock(&self.read))(seq)
     }
+}
 
-    /// Returns message `seq` with the header that `header` makes of the log's.
-    fn next_as<H: Pod>(
-        &self,
-        seq: u64,
-        limit: Duration,
-        header: impl Fn(L::Header) -> H,
-    ) -> Result<Next, LinkError> {
+impl ReplayBuffer for LogBuffer {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
+        let seq = place.seq;
         let is_decided =
             |it: &Published| (seq < it.messages || it.has_ended).then_some(it.messages);
         let Some(published) = wait(&self.published, &self.changed, limit, is_decided) else {
@@ -247,28 +211,21 @@ impl<L: Log> LogBuffer<L> {
         if seq >= published {
             return Ok(Next::Ended);
         }
-        let message = |logged| {
+        let message = |bytes: Vec<u8>| {
             Next::Message(Message {
                 seq,
                 // A message in a log is never void.
                 generation: 0,
-                bytes: bytemuck::bytes_of(&header(logged)).into(),
+                bytes: bytes.into(),
             })
         };
         Ok(self.read(seq)?.map_or(Next::Nothing, message))
-    }
-}
-
-impl<L: Log> ReplayBuffer for LogBuffer<L> {
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
-        self.next_as(place.seq, limit, |header| header)
     }
 
     fn add(&self, message: &RecordedMessage) {
         self.set_published(message.item().map_or(0, |item| item.seq.saturating_add(1)));
     }
 
-    /// Ends the stream with the last message of the log.
     fn end(&self) -> Result<(), LinkError> {
         let mut messages = lock(&self.published).messages;
         while self.read(messages)?.is_some() {
@@ -285,18 +242,18 @@ impl<L: Log> ReplayBuffer for LogBuffer<L> {
 
 /// The motions of the poses in a journal, as in the topic that poses are composed from. They come
 /// and end with the poses.
-pub(crate) struct MotionBuffer(pub Arc<PoseBuffer>);
+pub(crate) struct MotionBuffer(pub Arc<LogBuffer>);
 
 impl ReplayBuffer for MotionBuffer {
     fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
-        self.0.next_as(place.seq, limit, |pose| {
-            let mut motion = MotionHeader {
-                item: pose.item,
-                motion: pose.motion,
-            };
+        let mut next = self.0.next(place, limit)?;
+        if let Next::Message(message) = &mut next {
+            let PoseHeader { item, motion, .. } = bytemuck::pod_read_unaligned(&message.bytes);
+            let mut motion = MotionHeader { item, motion };
             *motion.item.hop_mut(StageId::PoseIntegration) = Hop::default();
-            motion
-        })
+            message.bytes = bytemuck::bytes_of(&motion).into();
+        }
+        Ok(next)
     }
 
     fn add(&self, _: &RecordedMessage) {}

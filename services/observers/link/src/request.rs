@@ -12,14 +12,10 @@ use crate::LinkError;
 /// Time for an answer. Without one the question is asked again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A question that is asked again until it is answered.
+/// A question that is asked again until it is answered: the action, as in "ask for a run", and the
+/// side that answers.
 #[derive(Clone, Copy)]
-pub(crate) struct Question {
-    /// The action, as in "ask for a run".
-    pub action: &'static str,
-    /// The side that answers, as in "the base".
-    pub other: &'static str,
-}
+pub(crate) struct Question(pub &'static str, pub &'static str);
 
 /// The answers to a question, as far as they have arrived.
 pub(crate) type Answers = FifoChannelHandler<Reply>;
@@ -32,7 +28,7 @@ impl Question {
         payload: impl Into<ZBytes>,
     ) -> Result<Answers, LinkError> {
         let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
-        asked.wait().map_err(|e| LinkError::zenoh(self.action, &e))
+        asked.wait().map_err(|e| LinkError::zenoh(self.0, &e))
     }
 
     /// Sends the question and waits for the answer; returns `None` without an answer.
@@ -56,7 +52,7 @@ impl Question {
         let answer = serde_json::from_slice(&sample.payload().to_bytes());
         answer
             .map(Some)
-            .map_err(|_| LinkError::other_version(self.other))
+            .map_err(|_| LinkError::other_version(self.1))
     }
 }
 

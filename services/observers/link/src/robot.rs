@@ -19,7 +19,7 @@ use crate::{
     LinkError, Network,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
-    handshake::{self, Agreement, ScanSize, StartAnswer},
+    handshake::{self, Agreement, StartAnswer},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     request,
     serve::{LAST_ANSWERS, Offer, Server},
@@ -66,7 +66,6 @@ struct Robot<'a> {
     waker: Waker,
 }
 
-/// A topic that the base requests.
 struct SentTopic {
     buffer: Arc<MemoryBuffer>,
     offer: Arc<Offer>,
@@ -74,12 +73,12 @@ struct SentTopic {
 
 impl Robot<'_> {
     fn work(&mut self) -> Result<(), LinkError> {
-        let size = ScanSize {
-            bytes: self.launch.manifest.limits.scan_bytes,
-        };
+        let bytes = self.launch.manifest.limits.scan_bytes;
         let key = handshake::scan_size_key(&self.config);
-        let _scan_size = request::answer(&self.session, key, "tell of the scans", move || size)?;
-        if self.restore()? {
+        let _scan_size = request::answer(&self.session, key, "tell of the scans", move || bytes)?;
+        let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
+        self.poses = poses.into();
+        if ended {
             return self.repeat_end();
         }
         let Some(received) = self.begin()? else {
@@ -94,27 +93,19 @@ impl Robot<'_> {
         self.relay(&poses)
     }
 
-    /// Reads the last poses of the journal; returns whether the stream has ended.
-    fn restore(&mut self) -> Result<bool, LinkError> {
-        let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
-        self.poses = poses.into();
-        Ok(ended)
-    }
-
     /// Publishes the end again: the run has ended before, and only its results are missing.
     fn repeat_end(&mut self) -> Result<(), LinkError> {
         self.stages.republish(self.poses.make_contiguous())?;
-        self.stages
-            .end(self.poses.back().map(|pose| pose.item).unwrap_or_default())?;
+        let newest = self.poses.back().map(|pose| pose.item);
+        self.stages.end(newest.unwrap_or_default())?;
         while !self.sleep()? {}
         Ok(())
     }
 
     /// Returns the number of the first pose that is not in the journal.
     fn next_pose(&self) -> u64 {
-        self.poses
-            .back()
-            .map_or(0, |pose| pose.item.seq.saturating_add(1))
+        let newest = self.poses.back();
+        newest.map_or(0, |pose| pose.item.seq.saturating_add(1))
     }
 
     /// Asks the base where to continue until it answers; returns the number of items that have
@@ -143,7 +134,6 @@ impl Robot<'_> {
         }
     }
 
-    /// Checks that this side can continue after so many items.
     fn check_start(&self, received: u64) -> Result<(), LinkError> {
         let (poses, base) = (self.next_pose(), received);
         let window = self.launch.manifest.window.scans as u64;
@@ -188,10 +178,8 @@ impl Robot<'_> {
             Ok(SentTopic { buffer, offer })
         });
         let sent = sent.collect::<Result<Vec<_>, LinkError>>()?;
-        let motions = self
-            .config
-            .returns_motions()
-            .then(|| self.fetch(Motion::TOPIC));
+        let returns_motions = self.config.returns_motions();
+        let motions = returns_motions.then(|| self.fetch(Motion::TOPIC));
         let (mut end, mut has_ended) = (None, false);
         let mut connection = ConnectionLog::of("base");
         loop {
@@ -200,10 +188,14 @@ impl Robot<'_> {
                 end = self.send(place, sent, topics.len(), depth)?.or(end);
             }
             while let Some(bytes) = motions.as_ref().and_then(Fetcher::next) {
-                self.stages
-                    .publish_motion(self.checked::<Motion, MotionHeader>(&bytes)?)?;
+                let motion = self.checked::<Motion, MotionHeader>(&bytes)?;
+                self.stages.publish_motion(motion)?;
             }
-            self.take_poses(poses)?;
+            while let Some(bytes) = poses.next() {
+                if let Some(pose) = self.journal(&bytes)? {
+                    self.stages.publish_pose(pose)?;
+                }
+            }
             connection.update(poses.is_connected(), self.next_pose());
             if let Some(end) = end.filter(|end| !has_ended && self.next_pose() == end.seq) {
                 has_ended = self.end(&end, &sent, poses)?;
@@ -241,15 +233,6 @@ impl Robot<'_> {
         Ok(end)
     }
 
-    fn take_poses(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
-        while let Some(bytes) = poses.next() {
-            if let Some(pose) = self.journal(&bytes)? {
-                self.stages.publish_pose(pose)?;
-            }
-        }
-        Ok(())
-    }
-
     /// Journals a pose; `None` if it was there already.
     fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, LinkError> {
         let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
@@ -258,8 +241,9 @@ impl Robot<'_> {
             return Ok(None);
         }
         if got > expected {
+            let topic = Pose::TOPIC;
             return Err(StageError::SequenceGap {
-                topic: Pose::TOPIC,
+                topic,
                 expected,
                 got,
             }
@@ -278,14 +262,12 @@ impl Robot<'_> {
     fn timed(&self, item: Item) -> Item {
         let now_ns = clock::now_ns();
         let sent = self.sent.iter().find(|sent| sent.seq == item.seq);
-        let mut timed = sent.map_or(
-            Item {
-                hops: Default::default(),
-                due_ns: now_ns,
-                ..item
-            },
-            |sent| *sent,
-        );
+        let unknown = Item {
+            hops: Default::default(),
+            due_ns: now_ns,
+            ..item
+        };
+        let mut timed = sent.copied().unwrap_or(unknown);
         let handed_over_ns = timed.hops.iter().map(|hop| hop.published_ns).max();
         let received_ns = handed_over_ns.filter(|ns| *ns > 0).unwrap_or(now_ns);
         *timed.hop_mut(StageId::PoseIntegration) = Hop {
@@ -305,11 +287,9 @@ impl Robot<'_> {
         if !sent.iter().all(has_end) {
             return Ok(false);
         }
+        let flags = flag::END;
         self.journal.append(&PoseHeader {
-            item: Item {
-                flags: flag::END,
-                ..*end
-            },
+            item: Item { flags, ..*end },
             ..PoseHeader::default()
         })?;
         self.stages.end(*end)?;

@@ -28,7 +28,8 @@ use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
     LinkError, Network,
-    replay_buffer::{LoopBuffer, MemoryBuffer, MotionBuffer, PoseBuffer, PoseLog, ReplayBuffer},
+    receive::began_ns,
+    replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
     serve::{Offer, Server},
 };
@@ -44,10 +45,8 @@ const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
 
-/// The options of a sender.
 #[derive(Clone, Debug)]
 pub struct SendOptions {
-    /// The folder of the run's results.
     pub out: PathBuf,
     /// The endpoints and certificates for receivers.
     pub network: Network,
@@ -67,15 +66,11 @@ pub struct Sent {
 
 impl fmt::Display for Sent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sent = self
-            .topics
-            .iter()
-            .filter(|(_, (messages, _))| *messages > 0);
-        let sent: Vec<String> = sent
-            .map(|(topic, (messages, bytes))| {
-                format!("{messages} {topic} ({:.1} MB)", *bytes as f64 / 1e6)
-            })
-            .collect();
+        let topics = self.topics.iter().filter(|it| it.1.0 > 0);
+        let sent = topics.map(|(topic, (messages, bytes))| {
+            format!("{messages} {topic} ({:.1} MB)", *bytes as f64 / 1e6)
+        });
+        let sent: Vec<String> = sent.collect();
         match sent.is_empty() {
             true => write!(f, "sent nothing"),
             false => write!(f, "sent {}", sent.join(", ")),
@@ -83,7 +78,6 @@ impl fmt::Display for Sent {
     }
 }
 
-/// The description of a run that a receiver needs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct RunOffer {
     pub window: Window,
@@ -99,22 +93,17 @@ pub(crate) struct RunOffer {
     pub topics: Vec<OfferedTopic>,
 }
 
-/// A topic that is sent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct OfferedTopic {
     pub name: String,
-    /// The type of its header, with the version.
     pub version: String,
-    /// True if no message of it may be missed.
     pub is_lossless: bool,
 }
 
-/// Returns the prefix of the keys of the topics that one sender offers.
 pub(crate) fn prefix(name: &str, sender: &str) -> String {
     format!("gyre/view/{name}/from/{sender}")
 }
 
-/// Returns the key where any sender of a link describes its run.
 pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
@@ -156,11 +145,8 @@ impl<'run> Sending<'run> {
         session: &Session,
     ) -> Result<Self, LinkError> {
         let manifest = run.manifest();
-        let mut server = Server::new(
-            session,
-            &prefix(&options.network.name, &session.zid().to_string()),
-            None,
-        );
+        let prefix = prefix(&options.network.name, &session.zid().to_string());
+        let mut server = Server::new(session, &prefix, None);
         let logs = Logs::of(manifest)?;
         let names = topics(&options.topics, manifest)?;
         let topics = names.iter().copied().map(|name| {
@@ -177,7 +163,7 @@ impl<'run> Sending<'run> {
         Ok(Self {
             run,
             topics,
-            _offer: offer(session, options, manifest, &names, logs.poses)?,
+            _offer: offer(session, options, manifest, &names)?,
             _server: server,
         })
     }
@@ -191,56 +177,46 @@ impl<'run> Sending<'run> {
             let has_ended = has_ended || self.topics.iter().all(|it| it.observer.has_ended());
             if has_ended && ended.is_none() {
                 ended = Some(Instant::now());
-                self.topics
-                    .iter()
-                    .try_for_each(|topic| topic.buffer.end())?;
+                let mut topics = self.topics.iter();
+                topics.try_for_each(|topic| topic.buffer.end())?;
             }
             if let Some(ended) = ended {
-                let is_expected = ended.elapsed() < RECONNECT_TIME && !self.has_receivers();
+                let has_receivers = self.topics.iter().any(|it| it.offer.has_receivers());
+                let is_expected = ended.elapsed() < RECONNECT_TIME && !has_receivers;
                 let is_complete = self.is_complete() && !is_expected;
                 if is_complete || ended.elapsed() > linger {
                     // Time to send the last answer.
                     signals.sleep(MAX_WAIT)?;
-                    return Ok(self.sent(self.is_complete()));
+                    return Ok(self.sent());
                 }
             }
-            let listeners: Vec<_> = self
-                .topics
-                .iter()
-                .map(|it| it.observer.listener())
-                .collect();
+            let listeners = self.topics.iter().map(|it| it.observer.listener());
+            let listeners: Vec<_> = listeners.collect();
             let stops = match ended {
                 Some(_) => signals.sleep(MAX_WAIT)?,
                 None => wait_for_any(signals, &listeners, MAX_WAIT)?,
             };
             if stops {
-                return Ok(self.sent(self.is_complete()));
+                return Ok(self.sent());
             }
         }
     }
 
-    fn has_receivers(&self) -> bool {
-        self.topics.iter().any(|topic| topic.offer.has_receivers())
-    }
-
-    /// Returns whether all receivers have everything, or want no more.
     fn is_complete(&self) -> bool {
         self.topics.iter().all(|topic| topic.offer.is_done())
     }
 
-    fn sent(&self, is_complete: bool) -> Sent {
+    fn sent(&self) -> Sent {
         let topics = self.topics.iter();
+        let topics = topics.map(|topic| (topic.name.to_owned(), topic.offer.sent()));
         Sent {
-            topics: topics
-                .map(|topic| (topic.name.to_owned(), topic.offer.sent()))
-                .collect(),
-            is_incomplete: !is_complete,
+            topics: topics.collect(),
+            is_incomplete: !self.is_complete(),
         }
     }
 }
 
 impl SentTopic<'_> {
-    /// Buffers the messages that the run has published.
     fn take(&mut self) -> Result<(), StageError> {
         loop {
             match self.observer.take() {
@@ -254,28 +230,22 @@ impl SentTopic<'_> {
     }
 }
 
-/// The logs of a run.
 struct Logs {
-    poses: Arc<PoseBuffer>,
+    poses: Arc<LogBuffer>,
     /// `None` in a run without SLAM.
-    loops: Option<Arc<LoopBuffer>>,
+    loops: Option<Arc<LogBuffer>>,
 }
 
 impl Logs {
     fn of(manifest: &Manifest) -> Result<Self, LinkError> {
-        let loops = manifest
-            .window
-            .slam
-            .then(|| LoggedLoops::open(&manifest.out).map_err(StageError::from));
+        let open = || LoggedLoops::open(&manifest.out).map_err(StageError::from);
+        let loops = manifest.window.slam.then(open).transpose()?;
         Ok(Self {
-            poses: Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out))),
-            loops: loops
-                .transpose()?
-                .map(|loops| Arc::new(LoopBuffer::of(loops))),
+            poses: Arc::new(LogBuffer::of_poses(&manifest.out)),
+            loops: loops.map(|loops| Arc::new(LogBuffer::of_loops(loops))),
         })
     }
 
-    /// Returns the messages of a topic.
     fn buffer(&self, name: &str, manifest: &Manifest) -> Arc<dyn ReplayBuffer> {
         let composed = match manifest.refines {
             true => Refined::TOPIC,
@@ -328,7 +298,6 @@ fn offer(
     options: &SendOptions,
     manifest: &Manifest,
     names: &[&'static str],
-    poses: Arc<PoseBuffer>,
 ) -> Result<Queryable<()>, LinkError> {
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
@@ -342,18 +311,15 @@ fn offer(
         live: manifest.live,
         refines: manifest.refines,
         rate: manifest.rate,
-        configuration: fs::read_to_string(&path)
-            .map_err(|source| LinkError::File { path, source })?,
+        configuration: fs::read_to_string(&path).map_err(|e| LinkError::file(&path, &e))?,
         sender: session.zid().to_string(),
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
     let key = offer_key(&options.network.name);
-    request::answer(session, key, "offer a run", move || {
-        let first = poses.read(0).ok().flatten();
-        RunOffer {
-            began_ns: first.map(|pose| pose.item.stamp_ns),
-            ..run.clone()
-        }
+    let out = manifest.out.clone();
+    request::answer(session, key, "offer a run", move || RunOffer {
+        began_ns: began_ns(&out).ok().flatten(),
+        ..run.clone()
     })
 }

@@ -26,9 +26,7 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 /// Time without a message after which an empty message shows the receiver that this end is still
 /// there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
-/// Time to send the last answers.
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
-/// Time between two checks whether a request is still wanted.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The most requests of a topic that are answered at once. A receiver has one of each topic.
 const MAX_REQUESTS: usize = 64;
@@ -45,7 +43,6 @@ pub(crate) const RECEIVER: &str = "receiver";
 /// The parameter of a receiver that has everything, or wants no more.
 pub(crate) const DONE: &str = "done";
 
-/// The topics that are offered to the other side.
 pub(crate) struct Server {
     session: Session,
     prefix: String,
@@ -54,7 +51,6 @@ pub(crate) struct Server {
     queryables: Vec<Queryable<()>>,
 }
 
-/// A topic that is offered.
 pub(crate) struct Offer {
     buffer: Arc<dyn ReplayBuffer>,
     key: String,
@@ -65,23 +61,19 @@ pub(crate) struct Offer {
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
     running: AtomicU64,
-    /// The messages and bytes that were sent.
     messages: AtomicU64,
     bytes: AtomicU64,
     waker: Option<Waker>,
     stop: Arc<AtomicBool>,
 }
 
-/// The state of a receiver of a topic.
 struct ReceiverState {
-    /// The number of its newest request.
     request: u64,
     /// True once the receiver has declined more messages.
     is_done: bool,
 }
 
 impl Server {
-    /// Creates a server of topics with this prefix of keys. Each request wakes `waker`.
     pub fn new(session: &Session, prefix: &str, waker: Option<Waker>) -> Self {
         Self {
             session: session.clone(),
@@ -138,13 +130,11 @@ impl Offer {
         self.answered.load(Ordering::Relaxed)
     }
 
-    /// Returns the messages and the bytes that were sent.
     pub fn sent(&self) -> (u64, u64) {
         let read = |number: &AtomicU64| number.load(Ordering::Relaxed);
         (read(&self.messages), read(&self.bytes))
     }
 
-    /// Returns whether there was a request.
     pub fn has_receivers(&self) -> bool {
         !self.receivers().is_empty()
     }
@@ -155,9 +145,8 @@ impl Offer {
     }
 
     fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, ReceiverState>> {
-        self.receivers
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        let receivers = self.receivers.lock();
+        receivers.unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Answers a request in a thread of its own, since sending waits while the network is slow.
@@ -243,9 +232,8 @@ impl Offer {
     /// Notes a request of a receiver, which replaces those before; returns its number.
     fn replace(&self, receiver: &str, is_done: bool) -> u64 {
         let mut receivers = self.receivers();
-        let before = receivers
-            .get(receiver)
-            .map_or(0, |receiver| receiver.request);
+        let before = receivers.get(receiver);
+        let before = before.map_or(0, |receiver| receiver.request);
         let state = ReceiverState {
             request: before + 1,
             is_done,

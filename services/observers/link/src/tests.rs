@@ -44,10 +44,6 @@ fn add_item(buffer: &MemoryBuffer, item: &Item) {
     });
 }
 
-fn seq(bytes: &[u8]) -> u64 {
-    bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]).seq
-}
-
 /// Returns an address that stays free: those who connect take their ports on 127.0.0.1.
 fn endpoint() -> String {
     let listener = TcpListener::bind("127.0.0.2:0").unwrap();
@@ -62,45 +58,59 @@ fn open(network: Network) -> Session {
     network.open(pause).unwrap().unwrap()
 }
 
-fn listening(endpoint: &str) -> Network {
+fn network(listen: &[&str], connect: &[&str]) -> Network {
+    let [listen, connect] = [listen, connect].map(|all| all.iter().map(|&it| it.into()).collect());
     Network {
         name: "test".to_owned(),
-        listen: vec![endpoint.to_owned()],
+        listen,
+        connect,
         ..Network::default()
     }
+}
+
+fn listening(endpoint: &str) -> Network {
+    network(&[endpoint], &[])
 }
 
 fn connecting(endpoint: &str) -> Network {
-    Network {
-        name: "test".to_owned(),
-        connect: vec![endpoint.to_owned()],
-        ..Network::default()
-    }
+    network(&[], &[endpoint])
 }
 
 fn fetcher(session: &Session, from: u64) -> Fetcher {
+    fetching(session, from, 0, session.zid().to_string())
+}
+
+fn fetching(session: &Session, from: u64, generation: u32, receiver: String) -> Fetcher {
     let request = Request {
         key: "gyre/test/topic".to_owned(),
         from,
-        generation: Some(0),
-        receiver: session.zid().to_string(),
+        generation: Some(generation),
+        receiver,
         priority: Priority::Data,
     };
     Fetcher::start(session, request, Waker::new().unwrap())
 }
 
 /// Waits until so many messages have come.
-fn take(fetcher: &Fetcher, count: usize) -> Vec<u64> {
-    let since = Instant::now();
+fn items(fetcher: &Fetcher, count: usize) -> Vec<Item> {
     let mut taken = Vec::new();
-    while taken.len() < count {
-        assert!(since.elapsed() < MAX_WAIT, "only {taken:?} came");
-        match fetcher.next() {
-            Some(bytes) => taken.push(seq(&bytes)),
-            None => thread::sleep(Duration::from_millis(5)),
-        }
-    }
-    taken
+    until("all messages have come", || {
+        taken.extend(fetcher.next());
+        taken.len() == count
+    });
+    let item = |bytes: Vec<u8>| bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]);
+    taken.into_iter().map(item).collect()
+}
+
+fn take(fetcher: &Fetcher, count: usize) -> Vec<u64> {
+    let items = items(fetcher, count).into_iter();
+    items.map(|item| item.seq).collect()
+}
+
+/// Waits for so many messages, and returns their generations and numbers.
+fn take_of_generations(fetcher: &Fetcher, count: usize) -> Vec<(u32, u64)> {
+    let items = items(fetcher, count).into_iter();
+    items.map(|item| (item.generation, item.seq)).collect()
 }
 
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
@@ -200,19 +210,6 @@ impl Ends {
     }
 }
 
-/// Waits for so many messages, and returns their generations and numbers.
-fn take_of_generations(fetcher: &Fetcher, count: usize) -> Vec<(u32, u64)> {
-    let mut taken = Vec::new();
-    until("all messages have come", || {
-        taken.extend(fetcher.next());
-        taken.len() == count
-    });
-    let items = taken
-        .iter()
-        .map(|bytes| bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]));
-    items.map(|item| (item.generation, item.seq)).collect()
-}
-
 #[test]
 fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
     let ends = Ends::new();
@@ -240,23 +237,9 @@ fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
     add(3, 6, 10, flag::END);
     assert_eq!(take_of_generations(&ends.fetcher, 1), [(3, 10)]);
     // Another session of the same receiver continues after the messages that it has.
-    let request = |from, generation| Request {
-        key: "gyre/test/topic".to_owned(),
-        from,
-        generation: Some(generation),
-        receiver: "another".to_owned(),
-        priority: Priority::Data,
-    };
-    let again = |from, generation| {
-        let request = request(from, generation);
-        Fetcher::start(&ends.there, request, Waker::new().unwrap())
-    };
+    let again = |from, generation| fetching(&ends.there, from, generation, "another".to_owned());
     let fetcher = again(8, 3);
-    assert_eq!(
-        take_of_generations(&fetcher, 3),
-        [(3, 8), (3, 9), (3, 10)],
-        "of its own generation"
-    );
+    assert_eq!(take_of_generations(&fetcher, 3), [(3, 8), (3, 9), (3, 10)]);
     fetcher.leave();
     let fetcher = again(8, 2);
     let received = take_of_generations(&fetcher, 5);

@@ -27,7 +27,6 @@ impl Waker {
         Ok(Self(Arc::new(sockets)))
     }
 
-    /// Returns the descriptor to sleep on.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.0[0].as_fd()
     }

@@ -13,7 +13,6 @@ use crate::{
 
 /// A recording that is begun, or continued in its next part.
 pub(crate) struct Begun {
-    /// The head of the part to write.
     pub head: Head,
     /// The ledger of the run that has started the recorder.
     pub ledger: Option<Ledger>,
@@ -34,25 +33,20 @@ pub(crate) fn begin(
         require_new(&options.to)?;
     }
     let part = next_part(&options.to, earlier.as_ref().map_or(0, |it| it.part));
-    let id = earlier.as_ref().map_or_else(
-        || {
-            let prefix = manifest.prefix.trim_matches('_');
-            format!("{prefix}-{}", clock::since_1970_ns())
-        },
-        |earlier| earlier.id.clone(),
-    );
+    let id = earlier.as_ref().map(|it| it.id.clone());
+    let new_id = || {
+        let prefix = manifest.prefix.trim_matches('_');
+        format!("{prefix}-{}", clock::since_1970_ns())
+    };
+    let is_topic = |topic: &&String| *topic != LOG && *topic != HEALTH;
     let file = manifest.root.join("config.toml");
     let configuration =
         fs::read_to_string(&file).map_err(|source| StageError::File { path: file, source })?;
     let head = Head {
-        id,
+        id: id.unwrap_or_else(new_id),
         part,
         configuration,
-        topics: topics
-            .iter()
-            .filter(|topic| *topic != LOG && *topic != HEALTH)
-            .cloned()
-            .collect(),
+        topics: topics.iter().filter(is_topic).cloned().collect(),
         scan_bytes: manifest.limits.scan_bytes,
         mode: if manifest.live { "live" } else { "lossless" }.to_owned(),
     };
@@ -63,7 +57,6 @@ pub(crate) fn begin(
     })
 }
 
-/// Checks that a resumed run can continue its recording.
 pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
     match Ledger::of(out).read(file)? {
         Some(_) => Ok(()),

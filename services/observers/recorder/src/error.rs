@@ -6,7 +6,6 @@ use gyre_recording::RecordingError;
 use gyre_stage::StageError;
 use thiserror::Error;
 
-/// An error that leaves no recording, or an incomplete recording.
 #[derive(Debug, Error)]
 pub enum RecorderError {
     #[error(transparent)]

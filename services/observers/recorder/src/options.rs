@@ -9,10 +9,8 @@ pub(crate) const LOG: &str = "log";
 /// The topic of the run's health.
 pub(crate) const HEALTH: &str = "health";
 
-/// The options of a recording.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The folder of the run's results.
     pub out: PathBuf,
     pub to: PathBuf,
     /// The topics, `log` and `health` among them; empty: the default ones that the run has.

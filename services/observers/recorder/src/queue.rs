@@ -15,7 +15,6 @@ use gyre_recording::{Incoming, LogLine};
 /// second, should the disk stand still.
 pub(crate) const LIMIT_BYTES: usize = 128 << 20;
 
-/// An entry of the recording.
 #[derive(Debug)]
 pub(crate) enum Entry {
     Message(Incoming),
@@ -37,20 +36,17 @@ impl Entry {
     }
 }
 
-/// The end that entries are put into.
 pub(crate) struct Sender {
     entries: mpsc::Sender<Entry>,
     waiting: Arc<AtomicUsize>,
     limit: usize,
 }
 
-/// The end that entries are taken from.
 pub(crate) struct Receiver {
     entries: mpsc::Receiver<Entry>,
     waiting: Arc<AtomicUsize>,
 }
 
-/// The result of waiting for an entry.
 pub(crate) enum Taken {
     Entry(Entry),
     Idle,

@@ -19,7 +19,7 @@ use gyre_stage::{
 
 use crate::{
     RecorderError,
-    begin::{Begun, begin},
+    begin::begin,
     health::health,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
@@ -40,19 +40,15 @@ const DEFAULT: [&str; 8] = [
     "fix",
     "objects",
 ];
-/// Time between two sentences about missed messages in the log.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 
-/// A recording that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     pub path: PathBuf,
-    /// The messages of each topic.
     pub counts: Vec<Counts>,
 }
 
 impl Recorded {
-    /// Returns whether nothing was missed.
     pub fn is_complete(&self) -> bool {
         self.counts.iter().all(|it| it.missed == 0)
     }
@@ -62,27 +58,18 @@ impl fmt::Display for Recorded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |number: fn(&Counts) -> u64| {
             let counts = self.counts.iter().filter(|counts| number(counts) > 0);
-            let counts: Vec<String> = counts
-                .map(|it| format!("{} {}", number(it), it.topic))
-                .collect();
+            let counts = counts.map(|it| format!("{} {}", number(it), it.topic));
+            let counts: Vec<String> = counts.collect();
             match counts.is_empty() {
                 true => "nothing".to_owned(),
                 false => counts.join(", "),
             }
         };
-        write!(
-            f,
-            "recorded {} in {}",
-            list(|it| it.recorded),
-            self.path.display()
-        )?;
+        let (recorded, missed) = (list(|it| it.recorded), list(|it| it.missed));
+        write!(f, "recorded {recorded} in {}", self.path.display())?;
         match self.is_complete() {
             true => write!(f, "; missed nothing"),
-            false => write!(
-                f,
-                "; missed {}: the recording is not complete",
-                list(|it| it.missed)
-            ),
+            false => write!(f, "; missed {missed}: the recording is not complete"),
         }
     }
 }
@@ -98,23 +85,17 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let _log = launch::start_log(manifest, NAME)?;
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
-    let Begun {
-        head,
-        ledger,
-        earlier,
-    } = begin(options, manifest, &topics)?;
+    let begun = begin(options, manifest, &topics)?;
     let mut taps = Vec::new();
     for topic in &topics {
         // Recording begins with the first scan, which waits for the recorder.
-        let expected = earlier.as_ref().map(|it| it.get(topic).copied());
-        taps.extend(Tap::on(
-            &run,
-            topic,
-            expected.map(Option::unwrap_or_default),
-        )?);
+        let expected = begun.earlier.as_ref();
+        let expected = expected.map(|it| it.get(topic).copied().unwrap_or_default());
+        taps.extend(Tap::on(&run, topic, expected)?);
     }
     let (to, split) = (options.to.clone(), options.split);
-    let writer = SplitWriter::create(to, head, split, ledger, earlier.unwrap_or_default())?;
+    let earlier = begun.earlier.unwrap_or_default();
+    let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier)?;
     let path = writer.path().to_owned();
     if options.continues {
         run.is_ready(NAME, &signals)?;
@@ -148,7 +129,6 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     Ok(recorded)
 }
 
-/// Returns the topics to record.
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RecorderError> {
     if named.is_empty() {
         let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
@@ -158,10 +138,8 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, Recorder
         let topics = DEFAULT.into_iter().filter(has).chain([LOG, HEALTH]);
         return Ok(topics.map(str::to_owned).collect());
     }
-    match named
-        .iter()
-        .find(|name| *name != LOG && *name != HEALTH && topic(name).is_none())
-    {
+    let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();
+    match named.iter().find(is_other) {
         Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
         None => Ok(named.to_vec()),
     }
@@ -174,9 +152,7 @@ struct Recorder<'run> {
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,
-    /// True if the supervisor has started it.
     is_of_run: bool,
-    /// Missed messages that the log has reported.
     reported: u64,
     /// The time of the next message about missed messages.
     due: Instant,
@@ -208,12 +184,10 @@ impl Recorder<'_> {
             tap.drain(&self.queue)?;
         }
         self.report_missed()?;
-        for line in self
-            .log
-            .iter_mut()
-            .flat_map(|log| log.lines(clock::since_1970_ns()))
-        {
-            self.queue.put(Entry::Log(line));
+        if let Some(log) = &mut self.log {
+            for line in log.lines(clock::since_1970_ns()) {
+                self.queue.put(Entry::Log(line));
+            }
         }
         for json in self.health.iter().flat_map(Receiver::try_iter) {
             self.queue.put(Entry::Health(json, clock::since_1970_ns()));
@@ -224,14 +198,10 @@ impl Recorder<'_> {
     fn report_missed(&mut self) -> Result<(), StageError> {
         let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
         if missed > self.reported && Instant::now() >= self.due {
-            let counts = self
-                .taps
-                .iter()
-                .map(|tap| tap.counts())
-                .filter(|it| it.missed > 0);
-            let counts: Vec<String> = counts
-                .map(|it| format!("{} of {}", it.missed, it.topic))
-                .collect();
+            let counts = self.taps.iter().map(Tap::counts);
+            let counts = counts.filter(|it| it.missed > 0);
+            let counts = counts.map(|it| format!("{} of {}", it.missed, it.topic));
+            let counts: Vec<String> = counts.collect();
             tracing::warn!(
                 "missed {} so far: the recorder was too slow, or was not there",
                 counts.join(", ")

@@ -10,11 +10,9 @@ use gyre_stage::{
 
 use crate::queue::{Entry, Sender};
 
-/// The numbers of messages of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts {
     pub topic: &'static str,
-    /// Messages that were put into the queue.
     pub recorded: u64,
     /// Messages that were overwritten before they were taken, did not fit into the queue, or were
     /// malformed; and those between the parts before and this recorder.
@@ -25,9 +23,7 @@ pub struct Counts {
 pub(crate) struct Tap<'run> {
     observer: Box<dyn TopicObserver + 'run>,
     recorded: u64,
-    /// Messages that did not fit into the queue.
     dropped: u64,
-    /// Missed messages that the writer knows of.
     reported: u64,
     /// The generation of the newest message that was recorded.
     generation: u32,
@@ -112,12 +108,10 @@ impl<'run> Tap<'run> {
         Ok(())
     }
 
-    /// Returns the listener that the publisher notifies.
     pub(crate) fn listener(&self) -> &Listener {
         self.observer.listener()
     }
 
-    /// Returns the messages received and missed so far.
     pub(crate) fn counts(&self) -> Counts {
         Counts {
             topic: self.observer.topic(),
@@ -126,7 +120,6 @@ impl<'run> Tap<'run> {
         }
     }
 
-    /// Returns whether the stream has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.observer.has_ended()
     }

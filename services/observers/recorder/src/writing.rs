@@ -6,7 +6,6 @@ use gyre_recording::{RecordingError, SplitWriter};
 
 use crate::queue::{Entry, Receiver, Taken};
 
-/// Time between two checks for a due chunk while nothing is received.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 
 /// Writes messages until the queue ends; returns the number of messages missed by topic.

@@ -19,7 +19,6 @@ use crate::{
     run_state::Shared,
 };
 
-/// The name of the node.
 const NODE: &str = "gyre";
 /// Messages that are kept for slow readers: 25 s at four turns a second.
 const DEPTH: usize = 100;
@@ -39,7 +38,6 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Joins the domain and opens all topics.
     pub fn open(settings: Settings) -> Result<Self, NodeError> {
         let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
         Ok(Self {
@@ -65,8 +63,14 @@ impl Bridge {
 
     /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
     pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
-        self.mounting.send(mounted(&self.shared));
         let shared = &self.shared;
+        let (frames, radar) = (&shared.frames, shared.mounting.radar());
+        let now_ns = clock::since_1970_ns();
+        // The place of the radar on the vehicle.
+        let place = frames::transform(now_ns, &frames.base, &frames.radar, radar);
+        self.mounting.send(TFMessage {
+            transforms: vec![place],
+        });
         thread::scope(|threads| {
             threads.spawn(|| follow_poses(shared, self.poses, say));
             threads.spawn(|| follow_corrections(shared));
@@ -75,28 +79,12 @@ impl Bridge {
             if let Some(settings) = self.map_settings {
                 threads.spawn(move || follow_maps(shared, settings, self.maps));
             }
-            let stopped = loop {
-                match signals.sleep(POLL_INTERVAL) {
-                    Ok(false) => {}
-                    Ok(true) => break Ok(()),
-                    Err(error) => break Err(error),
-                }
-            };
+            let mut stopped = Ok(false);
+            while let Ok(false) = stopped {
+                stopped = signals.sleep(POLL_INTERVAL);
+            }
             shared.stop();
-            stopped
+            stopped.map(drop)
         })
-    }
-}
-
-/// Returns the transform of the radar on the vehicle.
-fn mounted(shared: &Shared) -> TFMessage {
-    let (frames, radar) = (&shared.frames, shared.mounting.radar());
-    TFMessage {
-        transforms: vec![frames::transform(
-            clock::since_1970_ns(),
-            &frames.base,
-            &frames.radar,
-            radar,
-        )],
     }
 }

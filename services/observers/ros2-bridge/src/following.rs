@@ -2,7 +2,7 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Correction, Objects, ObjectsHeader, Pose, PoseHeader, outcome};
+use gyre_messages::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader, outcome};
 use gyre_ros2_messages::{
     frames::{self, Interval},
     nav_msgs::Odometry,
@@ -21,20 +21,16 @@ use crate::{
     run_state::{RunPhase, RunState, Shared, SharedRunState},
 };
 
-/// Time between two polls for a run, and for a request to stop.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
-/// The topics that each pose is published on.
 pub struct PoseTopics {
     pub odometry: Outlet<Odometry>,
     /// `None` where another program provides the transforms.
     pub transforms: Option<Outlet<TFMessage>>,
 }
 
-/// The topics that the objects of each scan are published on.
 pub struct ObjectTopics {
     pub detections: Outlet<Detection3DArray>,
-    /// The same to look at.
     pub markers: Outlet<MarkerArray>,
 }
 
@@ -50,7 +46,8 @@ pub fn each_run(
             thread::sleep(POLL_INTERVAL);
             continue;
         };
-        let state = shared.begin(run.manifest());
+        let manifest = run.manifest();
+        let state = shared.begin(&manifest.prefix, manifest.window.slam);
         match follow(&run, &state) {
             Ok(()) => await_end(shared, &run),
             Err(StageError::NotRunning { .. }) => {}
@@ -69,11 +66,13 @@ fn await_end(shared: &Shared, run: &ObservedRun) {
     }
 }
 
-/// Publishes the poses of each run.
 pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
     each_run(shared, |run, state| {
         shared.show(state);
-        let followed = follow_run(shared, run, state, &mut topics, say);
+        state.lock().notice = None;
+        let followed = each_message::<Pose>(shared, run, |pose| {
+            publish(shared, state, pose, &mut topics, say);
+        });
         if followed.is_ok() {
             state.lock().phase = RunPhase::Finishing;
             await_end(shared, run);
@@ -87,39 +86,29 @@ pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
     });
 }
 
-/// Returns the counts of a run in a sentence.
 fn sentence(state: &RunState) -> String {
-    let (poses, objects) = (&state.poses, &state.objects);
+    let (poses, first) = (state.poses.published, state.poses.first.unwrap_or_default());
+    let (objects, maps, unsent) = (state.objects.published, state.maps, state.unsent);
+    let (missed, missed_objects) = (state.poses.missed, state.objects.missed);
     format!(
-        "the run has ended: {} poses from number {} on, {} maps and the objects of {} scans published, the objects of {} scans and {} poses missed; {} messages not sent because readers were behind",
-        poses.published,
-        poses.first.unwrap_or_default(),
-        state.maps,
-        objects.published,
-        objects.missed,
-        poses.missed,
-        state.unsent
+        "the run has ended: {poses} poses from number {first} on, {maps} maps and the objects of {objects} scans published, the objects of {missed_objects} scans and {missed} poses missed; {unsent} messages not sent because readers were behind"
     )
 }
 
-fn follow_run(
+/// Calls `take` with the header of each message of a topic, until the stream ends or the bridge
+/// stops.
+fn each_message<M: Message>(
     shared: &Shared,
     run: &ObservedRun,
-    state: &SharedRunState,
-    topics: &mut PoseTopics,
-    say: fn(&str),
+    mut take: impl FnMut(&M::Header),
 ) -> Result<(), StageError> {
-    let mut poses = run.observe::<Pose>()?;
-    state.lock().notice = None;
-    let mut unsent = topics.unsent();
+    let mut observer = run.observe::<M>()?;
     while !shared.is_stopping() {
-        match poses.next(POLL_INTERVAL)? {
-            Next::Message(message, _) => publish(shared, state, message.header(), topics, say),
+        match observer.next(POLL_INTERVAL)? {
+            Next::Message(message, _) => take(message.header()),
             Next::Idle => {}
             Next::Ended => break,
         }
-        state.lock().unsent += topics.unsent() - unsent;
-        unsent = topics.unsent();
     }
     Ok(())
 }
@@ -149,18 +138,21 @@ fn publish(
         duration_ns: pose.motion.interval_ns,
         is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
     };
+    let mut unsent = 0;
     if let Some(transforms) = &mut topics.transforms {
         let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
         let corrected = map_from_odometry.map(|correction| {
             let corrected = mounting.of_vehicle(&correction);
             frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
         });
-        transforms.send(TFMessage {
+        let is_sent = transforms.send(TFMessage {
             transforms: corrected.into_iter().chain([base]).collect(),
         });
+        unsent += u64::from(!is_sent);
     }
     let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
-    topics.odometry.send(odometry);
+    unsent += u64::from(!topics.odometry.send(odometry));
+    state.lock().unsent += unsent;
 }
 
 /// Returns a time of the run as a time of ROS, and reports the first difference between the two.
@@ -174,51 +166,25 @@ fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
     stamp_ns
 }
 
-impl PoseTopics {
-    fn unsent(&self) -> u64 {
-        let transforms = self.transforms.as_ref().map_or(0, Outlet::unsent);
-        self.odometry.unsent() + transforms
-    }
-}
-
-/// Takes the corrections of each run with SLAM.
 pub fn follow_corrections(shared: &Shared) {
     each_run(shared, |run, state| {
         if !run.manifest().window.slam {
             return Ok(());
         }
-        let mut corrections = run.observe::<Correction>()?;
-        while !shared.is_stopping() {
-            match corrections.next(POLL_INTERVAL)? {
-                Next::Message(message, _) => {
-                    let correction = message.header().map_from_odometry();
-                    state.lock().map_from_odometry = Some(correction);
-                }
-                Next::Idle => {}
-                Next::Ended => break,
-            }
-        }
-        Ok(())
+        each_message::<Correction>(shared, run, |correction| {
+            state.lock().map_from_odometry = Some(correction.map_from_odometry());
+        })
     });
 }
 
-/// Publishes the objects of each run that tracks them.
 pub fn follow_objects(shared: &Shared, mut topics: ObjectTopics, say: fn(&str)) {
     each_run(shared, |run, state| {
         if !run.manifest().window.objects {
             return Ok(());
         }
-        let mut tracked = run.observe::<Objects>()?;
-        while !shared.is_stopping() {
-            let unsent = topics.unsent();
-            match tracked.next(POLL_INTERVAL)? {
-                Next::Message(message, _) => topics.publish(shared, state, message.header(), say),
-                Next::Idle => {}
-                Next::Ended => break,
-            }
-            state.lock().unsent += topics.unsent() - unsent;
-        }
-        Ok(())
+        each_message::<Objects>(shared, run, |objects| {
+            topics.publish(shared, state, objects, say);
+        })
     });
 }
 
@@ -241,12 +207,8 @@ impl ObjectTopics {
         };
         let (frames, mounting, listed) = (&shared.frames, &shared.mounting, header.list());
         let detections = objects::detections(stamp_ns, frames, mounting, listed);
-        self.detections.send(detections);
         let markers = objects::markers(stamp_ns, frames, mounting, listed);
-        self.markers.send(markers);
-    }
-
-    fn unsent(&self) -> u64 {
-        self.detections.unsent() + self.markers.unsent()
+        let sent = [self.detections.send(detections), self.markers.send(markers)];
+        state.lock().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
     }
 }

@@ -19,7 +19,6 @@ use crate::{
 
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// The counts of the last report.
 #[derive(Default)]
 struct LastCounts {
     poses: u64,
@@ -36,12 +35,8 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
             let state = shared.shown().lock().clone();
-            diagnostics.send(array(
-                &shared.out.display().to_string(),
-                &state,
-                answer.ok(),
-                &mut before,
-            ));
+            let out = shared.out.display().to_string();
+            diagnostics.send(array(&out, &state, answer.ok(), &mut before));
         }
         std::thread::sleep(POLL_INTERVAL.min(due.saturating_duration_since(Instant::now())));
     }
@@ -54,39 +49,31 @@ fn array(
     status: Option<Status>,
     before: &mut LastCounts,
 ) -> DiagnosticArray {
-    let mut parts = vec![run(state, status.as_ref(), before)];
+    let mut array = DiagnosticArray::default();
+    array.header.stamp = Time::from_ns(clock::since_1970_ns());
+    array.status.push(run(state, status.as_ref(), before));
     let processes = status.iter().flat_map(|status| &status.processes);
-    parts.extend(processes.map(process));
-    for part in &mut parts {
+    array.status.extend(processes.map(process));
+    for part in &mut array.status {
         out.clone_into(&mut part.hardware_id);
     }
-    let mut array = DiagnosticArray {
-        status: parts,
-        ..DiagnosticArray::default()
-    };
-    array.header.stamp = Time::from_ns(clock::since_1970_ns());
     array
 }
 
-/// Returns the diagnostics of the run as a whole.
 fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> DiagnosticStatus {
     let dropped = status.map(|status| status.dropped);
     let lost = state.lost();
     let drops = before.dropped.zip(dropped);
-    let fell = [
-        (
-            drops.is_some_and(|(before, now)| now > before),
-            "scans are dropped",
-        ),
-        (lost > before.lost, "the bridge loses messages"),
-    ];
+    let trouble = match drops.is_some_and(|(before, now)| now > before) {
+        true => Some("scans are dropped"),
+        false => (lost > before.lost).then_some("the bridge loses messages"),
+    };
     let poses = state.poses.published.saturating_sub(before.poses);
     *before = LastCounts {
         poses: state.poses.published,
         dropped: dropped.or(before.dropped),
         lost,
     };
-    let trouble = fell.iter().find(|(is_so, _)| *is_so).map(|(_, what)| *what);
     let (level, message) = match (state.phase, trouble, &state.notice) {
         (RunPhase::Waiting, ..) => (STALE, "there is no run yet".to_owned()),
         (RunPhase::Ended, ..) => (STALE, "the run has ended".to_owned()),
@@ -110,7 +97,6 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
     part
 }
 
-/// Returns the values of the supervisor.
 fn figures(status: &Status) -> Vec<KeyValue> {
     let mut figures = vec![
         value("phase", status.phase.name()),
@@ -204,12 +190,8 @@ mod tests {
     fn levels_follow_the_run_and_its_processes() {
         let (mut before, mut state) = (LastCounts::default(), RunState::default());
         let mut levels = |state: &RunState, status| {
-            let array = array("out", state, status, &mut before);
-            array
-                .status
-                .iter()
-                .map(|part| part.level)
-                .collect::<Vec<_>>()
+            let parts = array("out", state, status, &mut before).status;
+            parts.iter().map(|part| part.level).collect::<Vec<_>>()
         };
         assert_eq!(levels(&state, None), [STALE]);
         // Drops from before the bridge began, or while the supervisor did not answer, do not count

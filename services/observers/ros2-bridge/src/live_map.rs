@@ -1,17 +1,16 @@
 //! The map of a run with SLAM while it works.
 
 use std::{
+    error::Error,
     path::Path,
     time::{Duration, Instant},
 };
 
 use gyre_geometry::Pose;
-use gyre_mapping::{Evidence, MapError, grid};
+use gyre_mapping::{Evidence, grid};
 use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
 use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_stage::{clock, observer::ObservedRun};
-use gyre_storage::LogError;
-use thiserror::Error;
 
 use crate::{
     MapSettings, MapSettingsOf,
@@ -20,23 +19,11 @@ use crate::{
     run_state::{Shared, SharedRunState},
 };
 
-/// The shortest time between two maps.
 const INTERVAL: Duration = Duration::from_secs(5);
 /// The pause before the next map, as a multiple of the time for drawing the last map.
 const PAUSE_FACTOR: u32 = 9;
 
-/// A map that cannot be drawn.
-#[derive(Debug, Error)]
-enum LiveMapError {
-    #[error("{0}")]
-    Settings(String),
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error(transparent)]
-    Map(#[from] MapError),
-    #[error(transparent)]
-    Estimation(#[from] gyre_estimation::EstimationError),
-}
+type LiveMapError = Box<dyn Error>;
 
 /// The keyframes of a run, drawn at their corrected poses.
 struct LiveMap {
@@ -59,7 +46,7 @@ pub fn follow_maps(shared: &Shared, settings: MapSettingsOf, mut maps: Outlet<Oc
         if !run.manifest().window.slam {
             return Ok(());
         }
-        let settings = settings(&shared.out).map_err(LiveMapError::Settings);
+        let settings = settings(&shared.out).map_err(LiveMapError::from);
         let followed =
             settings.and_then(|settings| follow(shared, run, state, &settings, &mut maps));
         // Not tried again: that would read all keyframes each time.
@@ -89,9 +76,8 @@ fn follow(
         }
         let begun = Instant::now();
         if map.update(&shared.out)? {
-            let before = maps.sent();
             let grid = grid(&mut map.evidence)?;
-            maps.send(occupancy_grid(
+            let is_sent = maps.send(occupancy_grid(
                 clock::since_1970_ns(),
                 &shared.frames.map,
                 grid.cell_m,
@@ -99,7 +85,7 @@ fn follow(
                 grid.corner_m,
                 grid.values,
             ));
-            state.lock().maps += maps.sent() - before;
+            state.lock().maps += u64::from(is_sent);
         }
         due = Instant::now() + INTERVAL.max(begun.elapsed() * PAUSE_FACTOR);
     }
@@ -114,14 +100,12 @@ impl LiveMap {
             queries: RecordReader::open(out)?,
             estimator: TrajectoryEstimator::new(settings.estimator),
             radar,
-            evidence: Evidence::new(&settings.options, &std::env::temp_dir())
-                .map_err(MapError::from)?,
+            evidence: Evidence::new(&settings.options, &std::env::temp_dir())?,
             seqs: Vec::new(),
             closed: 0,
         })
     }
 
-    /// Returns whether all was read, and nothing more comes.
     fn has_ended(&self) -> bool {
         self.queries.has_ended() && self.keyframes.has_ended()
     }
@@ -166,9 +150,7 @@ impl LiveMap {
             let pose = self.radar * pose;
             if self.evidence.has_moved(self.seqs[index], &pose) {
                 let keyframe = self.keyframes.read(index)?;
-                self.evidence
-                    .draw(&keyframe, &pose)
-                    .map_err(MapError::from)?;
+                self.evidence.draw(&keyframe, &pose)?;
                 has_changed = true;
             }
         }

@@ -1,31 +1,27 @@
 //! A node of ROS 2, and its topics.
 
-use std::{net::IpAddr, time::Duration};
+use std::{error::Error, fmt::Display, io, net::IpAddr, time::Duration};
 
 use gyre_ros2_messages::{Domain, Ros2Message};
 use ros2_client::{
     Context, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Subscription,
-    dds::rustdds::{DomainParticipant, DomainParticipantBuilder},
+    dds::rustdds::DomainParticipantBuilder,
     qos::{Durability, History, Reliability, WhenFull},
 };
-use thiserror::Error;
 
 use crate::outlet::Outlet;
 
 /// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 
-/// A node that cannot be made, or a topic.
-#[derive(Debug, Error)]
-pub enum NodeError {
-    #[error("cannot join domain {domain} of ROS 2: {reason}")]
-    Domain { domain: u16, reason: String },
-    #[error(
-        "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
-    )]
-    Name { name: String, reason: String },
-    #[error("cannot open the topic {topic} of ROS 2: {reason}")]
-    Topic { topic: String, reason: String },
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct NodeError(pub(crate) String);
+
+impl From<io::Error> for NodeError {
+    fn from(error: io::Error) -> Self {
+        Self(format!("cannot wait for topics of ROS 2: {error}"))
+    }
 }
 
 pub struct Node {
@@ -58,40 +54,17 @@ impl Keep {
     }
 }
 
-/// Joins a domain, or returns why not.
-fn join(domain: &Domain) -> Result<DomainParticipant, String> {
-    let builder = DomainParticipantBuilder::new(domain.id());
-    let builder = match domain.interface() {
-        Some(address) => builder.with_only_networks([IpAddr::V4(address)]),
-        None => builder,
-    };
-    builder.build().map_err(|error| error.to_string())
-}
-
 impl Node {
-    /// Joins a domain as a node of this name in this namespace, such as `/` or `/robot`.
     pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, NodeError> {
-        let failed = |reason: String| NodeError::Domain {
-            domain: domain.id(),
-            reason,
-        };
-        let node_name = NodeName::new(namespace, name).map_err(|error| NodeError::Name {
-            name: format!("{namespace} {name}"),
-            reason: error.to_string(),
-        })?;
-        let participant = join(domain).map_err(failed)?;
-        let context = Context::from_domain_participant(participant)
-            .map_err(|error| failed(error.to_string()))?;
-        let options = NodeOptions::new()
-            .enable_rosout(false)
-            .start_parameter_services(false);
-        let node = context
-            .new_node(node_name, options)
-            .map_err(|error| failed(error.to_string()))?;
-        Ok(Self { node, context })
+        let node_name = NodeName::new(namespace, name)
+            .map_err(|reason| name_error(&format!("{namespace} {name}"), &reason))?;
+        let joined = join(domain, node_name);
+        joined.map_err(|reason| {
+            let domain = domain.id();
+            NodeError(format!("cannot join domain {domain} of ROS 2: {reason}"))
+        })
     }
 
-    /// Returns the name on DDS of a topic, absolute or relative to the namespace.
     pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
@@ -117,28 +90,21 @@ impl Node {
         let publisher = self.node.create_publisher(&opened, None);
         publisher
             .map(Outlet::new)
-            .map_err(|error| topic_error(topic, &error))
+            .map_err(|e| topic_error(topic, &e))
     }
 
-    /// Subscribes to a topic reliably, with room for so many messages that are not yet taken.
+    /// Subscribes to a topic with room for so many messages that are not yet taken: reliably, or
+    /// lossy, as drivers publish sensor data.
     pub fn subscribe<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,
         depth: usize,
+        is_lossy: bool,
     ) -> Result<Subscription<M>, NodeError> {
-        let opened = self.open::<M>(topic, &Keep::Last(depth).qos())?;
-        let subscription = self.node.create_subscription(&opened, None);
-        subscription.map_err(|error| topic_error(topic, &error))
-    }
-
-    /// Subscribes to a lossy topic, as drivers use for sensor data, with room for `depth` messages
-    /// that are not yet taken.
-    pub fn subscribe_to_sensor<M: Ros2Message + 'static>(
-        &mut self,
-        topic: &str,
-        depth: usize,
-    ) -> Result<Subscription<M>, NodeError> {
-        let qos = Keep::Last(depth).qos().reliability(Reliability::BestEffort);
+        let qos = match is_lossy {
+            true => Keep::Last(depth).qos().reliability(Reliability::BestEffort),
+            false => Keep::Last(depth).qos(),
+        };
         let opened = self.open::<M>(topic, &qos)?;
         let subscription = self.node.create_subscription(&opened, None);
         subscription.map_err(|error| topic_error(topic, &error))
@@ -165,16 +131,29 @@ impl Node {
     }
 }
 
-fn name(topic: &str) -> Result<Name, NodeError> {
-    Name::parse(topic).map_err(|error| NodeError::Name {
-        name: topic.to_owned(),
-        reason: error.to_string(),
-    })
+fn join(domain: &Domain, name: NodeName) -> Result<Node, Box<dyn Error>> {
+    let mut builder = DomainParticipantBuilder::new(domain.id());
+    if let Some(address) = domain.interface() {
+        builder = builder.with_only_networks([IpAddr::V4(address)]);
+    }
+    let context = Context::from_domain_participant(builder.build()?)?;
+    let options = NodeOptions::new()
+        .enable_rosout(false)
+        .start_parameter_services(false);
+    let node = context.new_node(name, options)?;
+    Ok(Node { node, context })
 }
 
-fn topic_error(topic: &str, error: &ros2_client::CreateError) -> NodeError {
-    NodeError::Topic {
-        topic: topic.to_owned(),
-        reason: error.to_string(),
-    }
+fn name(topic: &str) -> Result<Name, NodeError> {
+    Name::parse(topic).map_err(|reason| name_error(topic, &reason))
+}
+
+fn name_error(name: &str, reason: &dyn Display) -> NodeError {
+    NodeError(format!(
+        "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
+    ))
+}
+
+fn topic_error(topic: &str, reason: &dyn Display) -> NodeError {
+    NodeError(format!("cannot open the topic {topic} of ROS 2: {reason}"))
 }

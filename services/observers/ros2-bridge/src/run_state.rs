@@ -11,16 +11,12 @@ use std::{
 
 use gyre_geometry::Pose;
 use gyre_ros2_messages::frames::Frames;
-use gyre_stage::Manifest;
 
 use crate::{Mounting, clock::Clock};
 
-/// The state that the threads share.
 pub struct Shared {
-    /// The folder of the results of the run.
     pub out: PathBuf,
     pub frames: Frames,
-    /// The radar on the vehicle.
     pub mounting: Mounting,
     stopping: AtomicBool,
     /// The last runs by their names, which are others at each start.
@@ -37,7 +33,6 @@ const MAX_RUNS: usize = 4;
 pub struct SharedRunState(Arc<Mutex<RunState>>);
 
 impl SharedRunState {
-    /// Locks it for reading and writing.
     pub fn lock(&self) -> MutexGuard<'_, RunState> {
         locked(&self.0)
     }
@@ -52,7 +47,6 @@ pub struct RunState {
     pub phase: RunPhase,
     /// The clock of its stamps, from its first pose on.
     pub clock: Option<Clock>,
-    /// The odometry frame in the map frame, both of the radar, in a run with SLAM.
     pub map_from_odometry: Option<Pose>,
     pub poses: Counts,
     /// The scans whose objects are published, in a run that tracks them.
@@ -60,7 +54,6 @@ pub struct RunState {
     /// Messages for which readers left no room.
     pub unsent: u64,
     pub maps: u64,
-    /// The reason why something is not published.
     pub notice: Option<String>,
 }
 
@@ -69,10 +62,8 @@ pub struct RunState {
 pub struct Counts {
     /// The number of the first one that was published: those before it came before the bridge.
     pub first: Option<u64>,
-    /// The number of the newest one.
     pub newest: Option<u64>,
     pub published: u64,
-    /// Those that came too fast for the bridge.
     pub missed: u64,
 }
 
@@ -119,7 +110,6 @@ pub enum RunPhase {
 }
 
 impl Shared {
-    /// Creates the state before the first run.
     pub fn new(out: PathBuf, frames: Frames, mounting: Mounting) -> Self {
         Self {
             out,
@@ -132,11 +122,7 @@ impl Shared {
     }
 
     /// Begins with a run, or returns its state if another thread has begun.
-    pub fn begin(&self, manifest: &Manifest) -> SharedRunState {
-        self.begin_named(&manifest.prefix, manifest.window.slam)
-    }
-
-    fn begin_named(&self, name: &str, slam: bool) -> SharedRunState {
+    pub fn begin(&self, name: &str, slam: bool) -> SharedRunState {
         let mut runs = locked(&self.runs);
         if let Some((_, state)) = runs.iter().find(|(run, _)| run == name) {
             return state.clone();
@@ -155,7 +141,6 @@ impl Shared {
         state
     }
 
-    /// Makes a run the one that is shown.
     pub fn show(&self, state: &SharedRunState) {
         *locked(&self.shown) = state.clone();
     }
@@ -164,12 +149,10 @@ impl Shared {
         locked(&self.shown).clone()
     }
 
-    /// Asks all threads to end.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
     }
 
-    /// Returns whether the threads are to end.
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
     }
@@ -195,14 +178,14 @@ mod tests {
     #[test]
     fn a_thread_at_an_earlier_run_does_not_touch_the_next_one() {
         let shared = shared();
-        let earlier = shared.begin_named("a", false);
+        let earlier = shared.begin("a", false);
         shared.show(&earlier);
         assert!(earlier.lock().poses.count(7));
-        let next = shared.begin_named("b", true);
+        let next = shared.begin("b", true);
         assert!(earlier.lock().poses.count(8));
         earlier.lock().phase = RunPhase::Ended;
         // A thread that begins with the earlier run late gets its state.
-        assert_eq!(shared.begin_named("a", false).lock().poses.published, 2);
+        assert_eq!(shared.begin("a", false).lock().poses.published, 2);
         assert_eq!(next.lock().phase, RunPhase::Working);
         let is_new = next.lock().poses.count(0);
         assert!(is_new, "a pose of another run is none before");
@@ -216,11 +199,11 @@ mod tests {
     #[test]
     fn threads_that_follow_one_run_share_its_state() {
         let shared = shared();
-        let of_maps = shared.begin_named("a", true);
-        shared.begin_named("a", true).lock().maps += 1;
+        let of_maps = shared.begin("a", true);
+        shared.begin("a", true).lock().maps += 1;
         assert_eq!(of_maps.lock().maps, 1);
         for later in 0..MAX_RUNS {
-            shared.begin_named(&later.to_string(), true);
+            shared.begin(&later.to_string(), true);
         }
         assert_eq!(locked(&shared.runs).len(), MAX_RUNS);
     }

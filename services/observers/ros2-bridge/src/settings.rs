@@ -8,17 +8,14 @@ use gyre_slam::EstimatorKind;
 
 use crate::Mounting;
 
-/// The options of the bridge.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The folder of the results of the run, and of the next one.
     pub out: PathBuf,
-    /// The domain and the network.
     pub domain: Domain,
     /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
     pub namespace: String,
     pub frames: Frames,
-    /// The radar on the vehicle.
     pub mounting: Mounting,
     /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
     pub transforms: bool,
@@ -26,12 +23,10 @@ pub struct Settings {
     pub map: Option<MapSettingsOf>,
 }
 
-/// Returns the settings of the map of the run in a folder, or why it has none.
 pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
-    /// Cells and ranges.
     pub options: MapOptions,
     /// The estimator that corrects the poses of keyframes by loops.
     pub estimator: EstimatorKind,

@@ -32,7 +32,6 @@ const FIX: &str = "/fix";
 /// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The domain and the network.
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
@@ -40,7 +39,6 @@ pub struct Settings {
     pub gyro_topic: Option<String>,
     /// The topic of the odometry of the wheels, if it is used.
     pub wheels_topic: Option<String>,
-    /// A GNSS receiver, if it is used.
     pub fixes: Option<FixSettings>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
@@ -48,7 +46,6 @@ pub struct Settings {
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
-    /// Constants of its ranges and angles.
     pub constants: Constants,
 }
 
@@ -70,7 +67,6 @@ impl Settings {
         })
     }
 
-    /// The topic of the configuration, beside the topic of the azimuths.
     fn configuration_topic(&self) -> String {
         match self.topic.rsplit_once('/') {
             Some((place, _)) => format!("{place}/configuration_data"),

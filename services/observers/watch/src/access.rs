@@ -11,7 +11,6 @@ use std::{
 use axum::http::{HeaderMap, Uri, header};
 use subtle::ConstantTimeEq;
 
-/// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
 /// The minimum length of a token in a file.
 const MIN_TOKEN: usize = 16;
@@ -20,28 +19,25 @@ const MIN_TOKEN: usize = 16;
 /// can name as its origin.
 const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 
-/// The secret of readers.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// The conditions for an answer to a request.
 pub struct Access {
     /// The token; `None`: only this machine has access.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
-    /// True if the pages of viewers, which are served elsewhere, may read.
-    of_viewers: bool,
+    /// True if the pages of viewers, which are served elsewhere, may read: with the token of any
+    /// site; without it of Foxglove's own site, an application and this machine.
+    pub of_viewers: bool,
 }
 
-/// The answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// It may read.
     Granted,
     /// It may read, and gave the token in its address: a cookie replaces it from here on.
     GrantedByAddress,
-    /// It lacks the token.
     NoToken,
     /// It names a host that is not this machine: another site's name may have been pointed here
     /// (DNS rebinding).
@@ -51,13 +47,11 @@ pub enum Verdict {
 }
 
 impl Token {
-    /// Creates a random one.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; TOKEN_BYTES];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
-        Ok(Self(
-            bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
-        ))
+        let digits = bytes.iter().map(|byte| format!("{byte:02x}"));
+        Ok(Self(digits.collect()))
     }
 
     /// Reads the token of a file, or writes a random one there if there is no such file.
@@ -67,11 +61,8 @@ impl Token {
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 let token = Self::random()?;
                 let mut options = OpenOptions::new();
-                let mut file = options
-                    .write(true)
-                    .create_new(true)
-                    .mode(0o600)
-                    .open(path)?;
+                let options = options.write(true).create_new(true).mode(0o600);
+                let mut file = options.open(path)?;
                 writeln!(file, "{}", token.0)?;
                 Ok(token)
             }
@@ -83,14 +74,12 @@ impl Token {
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
         match text.len() >= MIN_TOKEN && text.bytes().all(plain) {
             true => Ok(Self(text.to_owned())),
-            false => Err(io::Error::new(
-                ErrorKind::InvalidData,
-                format!("a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"),
-            )),
+            false => Err(io::Error::other(format!(
+                "a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"
+            ))),
         }
     }
 
-    /// Returns the token's text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -103,24 +92,14 @@ impl Token {
 
 impl Access {
     /// Creates the access to a server: without a token it is for this machine alone.
-    pub fn new(address: SocketAddr, token: Option<Token>) -> Self {
+    pub fn new(address: SocketAddr, token: Option<Token>, of_viewers: bool) -> Self {
         Self {
             token,
             cookie: format!("gyre_watch_{}", address.port()),
-            of_viewers: false,
+            of_viewers,
         }
     }
 
-    /// Returns the same for viewers, whose page is another site's. With the token any may read;
-    /// without it Foxglove's own site, an application and a page of this machine.
-    pub fn of_viewers(self) -> Self {
-        Self {
-            of_viewers: true,
-            ..self
-        }
-    }
-
-    /// Judges a request.
     pub fn judge(&self, uri: &Uri, headers: &HeaderMap) -> Verdict {
         let host = text(headers, header::HOST).unwrap_or_default();
         let origin = text(headers, header::ORIGIN);
@@ -137,10 +116,8 @@ impl Access {
             return Verdict::GrantedByAddress;
         }
         let bearer = text(headers, header::AUTHORIZATION).and_then(|h| h.strip_prefix("Bearer "));
-        match bearer
-            .or_else(|| self.in_cookie(headers))
-            .is_some_and(|given| token.is(given))
-        {
+        let given = bearer.or_else(|| self.in_cookie(headers));
+        match given.is_some_and(|given| token.is(given)) {
             true => Verdict::Granted,
             false => Verdict::NoToken,
         }
@@ -163,9 +140,8 @@ impl Access {
 
     fn in_cookie<'a>(&self, headers: &'a HeaderMap) -> Option<&'a str> {
         let all = headers.get_all(header::COOKIE).into_iter();
-        let mut cookies = all
-            .filter_map(|cookies| cookies.to_str().ok())
-            .flat_map(|cookies| cookies.split("; "));
+        let all = all.filter_map(|cookies| cookies.to_str().ok());
+        let mut cookies = all.flat_map(|cookies| cookies.split("; "));
         cookies.find_map(|cookie| cookie.strip_prefix(self.cookie.as_str())?.strip_prefix('='))
     }
 }
@@ -179,7 +155,6 @@ fn in_address(uri: &Uri) -> Option<&str> {
     pairs.find_map(|pair| pair.strip_prefix("token="))
 }
 
-/// Returns whether a page of this origin was served under this host.
 fn is_of(origin: &str, host: &str) -> bool {
     let authority = origin.split_once("://").map(|(_, authority)| authority);
     !host.is_empty() && authority == Some(host)
@@ -202,124 +177,81 @@ mod tests {
 
     const SECRET: &str = "0123456789abcdef";
 
-    fn access(token: Option<&str>) -> Access {
+    fn access(token: Option<&str>, of_viewers: bool) -> Access {
         let token = token.map(|text| Token::parse(text).unwrap());
-        Access::new("127.0.0.1:8080".parse().unwrap(), token)
+        Access::new("127.0.0.1:8080".parse().unwrap(), token, of_viewers)
     }
 
     fn judged(access: &Access, uri: &str, headers: &[(header::HeaderName, &str)]) -> Verdict {
-        let headers = headers
-            .iter()
-            .map(|(name, value)| (name.clone(), value.parse().unwrap()));
+        let headers = headers.iter();
+        let headers = headers.map(|(name, value)| (name.clone(), value.parse().unwrap()));
         access.judge(&uri.parse().unwrap(), &headers.collect())
     }
 
     #[test]
     fn without_a_token_only_names_of_this_machine_are_answered() {
-        let access = access(None);
-        let host = |host| judged(&access, "/", &[(header::HOST, host)]);
-        for own in [
-            "127.0.0.1:8080",
-            "127.0.0.1",
-            "localhost:9000",
-            "LocalHost",
-            "[::1]:8080",
-            "[::1]",
-            "127.1.2.3:1",
-        ] {
-            assert_eq!(host(own), Verdict::Granted, "{own}");
+        let access = access(None, false);
+        let own = "127.0.0.1:8080 127.0.0.1 LocalHost localhost:9000 [::1]:8080 [::1] 127.1.2.3:1";
+        let foreign = "evil.example:8080 localhost.evil.example 127.0.0.1.evil.example:8080 192.168.0.1:8080 [2001:db8::1]:8080";
+        for (hosts, verdict) in [(own, Verdict::Granted), (foreign, Verdict::ForeignHost)] {
+            for host in hosts.split(' ') {
+                let found = judged(&access, "/", &[(header::HOST, host)]);
+                assert_eq!(found, verdict, "{host}");
+            }
         }
-        for foreign in [
-            "",
-            "evil.example",
-            "evil.example:8080",
-            "localhost.evil.example",
-            "127.0.0.1.evil.example:8080",
-            "192.168.0.1:8080",
-            "[2001:db8::1]:8080",
-        ] {
-            assert_eq!(host(foreign), Verdict::ForeignHost, "{foreign}");
-        }
+        let nameless = judged(&access, "/", &[(header::HOST, "")]);
+        assert_eq!(nameless, Verdict::ForeignHost);
     }
 
     #[test]
-    fn pages_of_other_sites_are_refused() {
-        let access = access(None);
-        let origin = |origin| {
-            let headers = [(header::HOST, "localhost:8080"), (header::ORIGIN, origin)];
-            judged(&access, "/stream", &headers)
-        };
-        assert_eq!(origin("http://localhost:8080"), Verdict::Granted);
-        for foreign in ["http://evil.example", "http://localhost:3000", "null"] {
-            assert_eq!(origin(foreign), Verdict::ForeignOrigin, "{foreign}");
-        }
-    }
-
-    #[test]
-    fn pages_of_viewers_are_answered_and_with_the_token_those_of_any_site() {
+    fn pages_of_other_sites_are_refused_but_for_those_of_viewers() {
         let origin = |access: &Access, uri: &str, origin: &str| {
-            let headers = [(header::HOST, "localhost:8765"), (header::ORIGIN, origin)];
+            let headers = [(header::HOST, "localhost:8080"), (header::ORIGIN, origin)];
             judged(access, uri, &headers)
         };
-        let open = access(None).of_viewers();
-        for known in [
-            "https://app.foxglove.dev",
-            "file://",
-            "http://localhost:8080",
-            "http://127.0.0.1",
-        ] {
+        let (page, open) = (access(None, false), access(None, true));
+        let foreign = "null http://evil.example https://app.foxglove.dev.evil.example http://localhost.evil.example";
+        for foreign in foreign.split(' ') {
+            for access in [&page, &open] {
+                let found = origin(access, "/", foreign);
+                assert_eq!(found, Verdict::ForeignOrigin, "{foreign}");
+            }
+        }
+        let own = origin(&page, "/", "http://localhost:8080");
+        assert_eq!(own, Verdict::Granted);
+        for known in "https://app.foxglove.dev file:// http://localhost:3000".split(' ') {
+            assert_eq!(origin(&page, "/", known), Verdict::ForeignOrigin, "{known}");
             assert_eq!(origin(&open, "/", known), Verdict::Granted, "{known}");
         }
-        for foreign in [
-            "null",
-            "http://evil.example",
-            "https://app.foxglove.dev.evil.example",
-            "http://localhost.evil.example",
-        ] {
-            let verdict = origin(&open, "/", foreign);
-            assert_eq!(verdict, Verdict::ForeignOrigin, "{foreign}");
-        }
-        let closed = access(Some(SECRET)).of_viewers();
-        let lichtblick = "http://lichtblick.lan";
+        let (closed, lichtblick) = (access(Some(SECRET), true), "http://lichtblick.lan");
         assert_eq!(origin(&closed, "/", lichtblick), Verdict::NoToken);
-        let with_token = format!("/?token={SECRET}");
-        let verdict = origin(&closed, &with_token, lichtblick);
+        let verdict = origin(&closed, &format!("/?token={SECRET}"), lichtblick);
         assert_eq!(verdict, Verdict::GrantedByAddress);
     }
 
     #[test]
     fn the_token_is_taken_from_the_address_a_header_or_the_cookie_and_nothing_else() {
-        let access = access(Some(SECRET));
-        let host = (header::HOST, "robot.local:8080");
-        let by_address = format!("/?token={SECRET}");
-        assert_eq!(
-            judged(&access, &by_address, std::slice::from_ref(&host)),
-            Verdict::GrantedByAddress
-        );
+        let access = access(Some(SECRET), false);
         let bearer = format!("Bearer {SECRET}");
         let cookie = format!("other=1; gyre_watch_8080={SECRET}");
-        for header in [
-            (header::AUTHORIZATION, bearer.as_str()),
-            (header::COOKIE, cookie.as_str()),
+        let of_another = format!("gyre_watch_8081={SECRET}");
+        let by_address = format!("/?token={SECRET}");
+        let longer = format!("/?token={SECRET}0");
+        let other = (header::ACCEPT, "any");
+        for (uri, header, verdict) in [
+            (&*by_address, other.clone(), Verdict::GrantedByAddress),
+            ("/", (header::AUTHORIZATION, &*bearer), Verdict::Granted),
+            ("/", (header::COOKIE, &*cookie), Verdict::Granted),
+            ("/?token=", other.clone(), Verdict::NoToken),
+            ("/?token=0123456789abcdeX", other.clone(), Verdict::NoToken),
+            (&*longer, other.clone(), Verdict::NoToken),
+            ("/", (header::AUTHORIZATION, SECRET), Verdict::NoToken),
+            ("/", (header::COOKIE, &*of_another), Verdict::NoToken),
+            ("/", (header::COOKIE, "gyre_watch_8080="), Verdict::NoToken),
+            ("/", other, Verdict::NoToken),
         ] {
-            let verdict = judged(&access, "/metrics", &[host.clone(), header.clone()]);
-            assert_eq!(verdict, Verdict::Granted, "{header:?}");
-        }
-        let refused = [
-            ("/?token=", None),
-            ("/?token=0123456789abcdeX", None),
-            ("/?token=0123456789abcdef0", None),
-            ("/", Some((header::AUTHORIZATION, SECRET))),
-            (
-                "/",
-                Some((header::COOKIE, "gyre_watch_8081=0123456789abcdef")),
-            ),
-            ("/", Some((header::COOKIE, "gyre_watch_8080="))),
-            ("/", None),
-        ];
-        for (uri, header) in refused {
-            let headers: Vec<_> = [host.clone()].into_iter().chain(header).collect();
-            assert_eq!(judged(&access, uri, &headers), Verdict::NoToken, "{uri}");
+            let headers = [(header::HOST, "robot.local:8080"), header];
+            assert_eq!(judged(&access, uri, &headers), verdict, "{uri} {headers:?}");
         }
     }
 

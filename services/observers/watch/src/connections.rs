@@ -21,14 +21,12 @@ use tokio::{
 
 use stream::Timed;
 
-/// The limits of connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// The most connections with requests at once. Streams have permits of their own.
     pub connections: u32,
     /// Time for the head of a request, from the connection or from the answer before.
     pub request: Duration,
-    /// Time for the client to take an answer.
     pub answer: Duration,
 }
 

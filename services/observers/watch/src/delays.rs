@@ -2,10 +2,9 @@
 
 use std::collections::VecDeque;
 
-use gyre_messages::{HopTimes, Item, StageId};
+use gyre_messages::{Item, StageId};
 use serde::Serialize;
 
-/// Length of the window.
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
@@ -14,7 +13,6 @@ const MAX_SAMPLES: usize = 8192;
 /// Delays of a pose: sensor to pose, then hand-over and work of each stage.
 const KINDS: usize = 1 + 2 * StageId::ALL.len();
 
-/// The delays of the poses of the last minute.
 #[derive(Debug, Default)]
 pub struct Delays {
     samples: VecDeque<DelaySample>,
@@ -42,7 +40,6 @@ pub struct SecondDelays {
     max_ms: f64,
 }
 
-/// The delays of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageDelays {
     stage: &'static str,
@@ -51,12 +48,9 @@ pub struct StageDelays {
     work: Percentiles,
 }
 
-/// The delays as the page shows them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DelayReport {
-    /// The number of poses.
     samples: usize,
-    /// From the complete sweep to its pose.
     sensor_to_pose: Percentiles,
     stages: Vec<StageDelays>,
     /// Sensor to pose in each second of the last minute, oldest first; `None` without a pose.
@@ -64,14 +58,13 @@ pub struct DelayReport {
 }
 
 impl Delays {
-    /// Adds a pose.
     pub fn add(&mut self, item: &Item) {
         let mut delays_us = [None; KINDS];
         delays_us[0] = Some(in_us(item.sensor_to_pose_ns()));
         for times in item.hop_times() {
-            let HopTimes { wait_ns, .. } = times;
             let [hand_over, work] = kinds(times.stage);
-            delays_us[hand_over] = Some(in_us(times.transport_ns.unwrap_or(0) + wait_ns));
+            let waited_ns = times.transport_ns.unwrap_or(0) + times.wait_ns;
+            delays_us[hand_over] = Some(in_us(waited_ns));
             delays_us[work] = Some(in_us(times.work_ns));
         }
         let at_ns = item.hops[StageId::PoseIntegration as usize].finished_ns;
@@ -88,11 +81,9 @@ impl Delays {
             self.samples.pop_front();
         }
         let of_kind = |kind: usize| {
-            let delays = self
-                .samples
-                .iter()
-                .filter_map(|sample| sample.delays_us[kind]);
-            percentiles(delays.collect())
+            let delays = self.samples.iter().filter_map(|it| it.delays_us[kind]);
+            let [p50_ms, p99_ms] = at(delays.collect(), [0.5, 0.99])?;
+            Some(Percentiles { p50_ms, p99_ms })
         };
         let stages = StageId::ALL.into_iter().filter_map(|stage| {
             let [hand_over, work] = kinds(stage).map(of_kind);
@@ -117,13 +108,14 @@ impl Delays {
         let end = now_ns / STEP_NS;
         for sample in &self.samples {
             let step = sample.at_ns / STEP_NS - (end - steps);
-            let place = usize::try_from(step)
-                .ok()
-                .and_then(|step| of_step.get_mut(step));
-            if let Some(delays) = place {
-                delays.extend(sample.delays_us[0]);
+            if (0..steps).contains(&step) {
+                of_step[step as usize].extend(sample.delays_us[0]);
             }
         }
+        let second = |delays_us| {
+            let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
+            Some(SecondDelays { p50_ms, max_ms })
+        };
         of_step.into_iter().map(second).collect()
     }
 }
@@ -137,18 +129,7 @@ fn in_us(duration_ns: i64) -> u32 {
     (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
 }
 
-/// Returns the percentiles; `None` of no values.
-fn percentiles(delays_us: Vec<u32>) -> Option<Percentiles> {
-    let [p50_ms, p99_ms] = at(delays_us, [0.5, 0.99])?;
-    Some(Percentiles { p50_ms, p99_ms })
-}
-
-fn second(delays_us: Vec<u32>) -> Option<SecondDelays> {
-    let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
-    Some(SecondDelays { p50_ms, max_ms })
-}
-
-/// Returns the values at these shares of their order, ms.
+/// Returns the values at these shares of their order, ms; `None` of no values.
 fn at(mut delays_us: Vec<u32>, shares: [f64; 2]) -> Option<[f64; 2]> {
     let last = delays_us.len().checked_sub(1)? as f64;
     delays_us.sort_unstable();
@@ -192,18 +173,11 @@ mod tests {
         assert_eq!(report.series.len(), 60);
         assert_eq!(report.series.iter().flatten().count(), 50);
         let newest = report.series.last().copied().flatten();
-        let only = SecondDelays {
-            p50_ms: 1.0,
-            max_ms: 1.0,
-        };
-        assert_eq!(newest, Some(only));
-        assert_eq!(
-            delays.report(now_ns + 2 * WINDOW_NS),
-            DelayReport {
-                series: vec![None; 60],
-                ..DelayReport::default()
-            }
-        );
+        assert_eq!(newest.map(|it| (it.p50_ms, it.max_ms)), Some((1.0, 1.0)));
+        let later = delays.report(now_ns + 2 * WINDOW_NS);
+        assert_eq!((later.samples, later.series), (0, vec![None; 60]));
+        (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
+        assert_eq!(delays.report(10_000_000_000).samples, MAX_SAMPLES);
     }
 
     #[test]
@@ -216,12 +190,5 @@ mod tests {
         // Published 0.7 ms after its receipt at -2 ms, received at -0.6 ms, begun 0.1 ms later.
         assert_eq!(report.stages[1].hand_over.p50_ms, 0.8);
         assert_eq!(report.stages[1].work.p50_ms, 0.5);
-    }
-
-    #[test]
-    fn the_number_of_samples_is_bounded() {
-        let mut delays = Delays::default();
-        (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
-        assert_eq!(delays.report(10_000_000_000).samples, MAX_SAMPLES);
     }
 }

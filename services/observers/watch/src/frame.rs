@@ -17,7 +17,6 @@ pub fn encode(header: &impl Serialize, payload: &[u8]) -> std::io::Result<Bytes>
     Ok(encoder.finish()?.into())
 }
 
-/// Returns the header and the payload of a message.
 #[cfg(test)]
 pub fn decode(message: &[u8]) -> Option<(serde_json::Value, Vec<u8>)> {
     use std::io::Read;

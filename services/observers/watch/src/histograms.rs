@@ -6,24 +6,20 @@ use prometheus_client::{
     metrics::{family::Family, histogram::Histogram},
 };
 
-/// Upper limits of the buckets of one hop, s.
 const HOP_BUCKETS_S: [f64; 15] = [
     0.000_05, 0.000_1, 0.000_25, 0.000_5, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5,
     1.0, 2.5,
 ];
-/// Upper limits of the buckets from sensor to pose, s.
 const POSE_BUCKETS_S: [f64; 14] = [
     0.001, 0.0025, 0.005, 0.0075, 0.01, 0.025, 0.05, 0.075, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0,
 ];
 
-/// The delays of all observed poses.
 #[derive(Clone, Debug)]
 pub struct Histograms {
     pub sensor_to_pose: Histogram,
     pub hops: HopHistograms,
 }
 
-/// The histograms of each hop.
 pub type HopHistograms = Family<HopLabels, Histogram, fn() -> Histogram>;
 
 /// A part of a stage's time for a scan: `transport`, `wait` or `work`.
@@ -43,7 +39,6 @@ impl Default for Histograms {
 }
 
 impl Histograms {
-    /// Adds a pose.
     pub fn add(&self, item: &Item) {
         let seconds = |duration_ns: i64| duration_ns as f64 * 1e-9;
         self.sensor_to_pose

@@ -9,19 +9,15 @@ use gyre_messages::{PoseHeader, flag};
 /// Poses that are read between two looks at the newest ones: about a megabyte.
 const SLICE: usize = 2000;
 
-/// The place in the track.
 pub(crate) struct JournalTrack {
     journal: PathBuf,
-    /// The number of the next pose of the track.
     next: u64,
-    /// The newest pose that was seen.
     newest: u64,
     /// The journal from the next pose on, as long as the track is behind the newest one.
     records: Option<Records>,
 }
 
 impl JournalTrack {
-    /// Begins the track of the run that writes to `out`.
     pub fn of(out: &Path) -> Self {
         Self {
             journal: journal::path(out),

@@ -4,43 +4,33 @@ use gyre_messages::{
     ListedObject, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome,
 };
 use serde::Serialize;
+use serde_json::{Value, json};
 
-use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
+use crate::{delays::DelayReport, processes::Process, track::Vertex};
 
-/// A layer that a browser may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Powers as measured.
     Scan,
-    /// Masked rasters.
     Raster,
-    /// Sparse points.
     Points,
-    /// Moving objects.
     Objects,
 }
 
-/// The missed messages of the observed topics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Missed {
-    /// Poses that were missed.
     pub pose: u64,
-    /// Scans that were missed.
     pub scan: u64,
-    /// Masked scans that were missed.
     pub masked: u64,
-    /// Scans whose objects were missed.
     pub objects: u64,
 }
 
-/// The state of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
     /// The run has not started yet.
     #[default]
     Waiting,
-    /// It works.
     Working,
     /// The last scan has its pose; results are being written.
     Finishing,
@@ -51,34 +41,25 @@ pub enum RunState {
 }
 
 impl RunState {
-    /// Returns whether there is a run.
     pub fn is_up(self) -> bool {
         matches!(self, Self::Working | Self::Finishing)
     }
 }
 
-/// The run as the page describes it.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(tag = "kind", rename = "run")]
 pub struct RunInfo {
-    /// Each start of a run has a new id.
     pub id: String,
-    /// The folder of its results.
     pub out: String,
     pub state: RunState,
-    /// True if it drops scans rather than wait.
     pub live: bool,
     /// Pace relative to the sensor's clock; none: as fast as it goes.
     pub rate: Option<f64>,
-    /// The most scans in flight.
     pub window: usize,
-    /// True if it tracks objects.
     pub objects: bool,
-    /// The version of the program.
     pub version: &'static str,
 }
 
-/// Counts and delays, once a second.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename = "health")]
 pub struct HealthReport {
@@ -91,22 +72,18 @@ pub struct HealthReport {
     /// The part of gyro, wheels and Doppler in the last motions, and the rates of their samples, in
     /// words; none without them.
     pub others: Option<String>,
-    /// The reason why something is not shown.
     pub notice: Option<String>,
     pub processes: Vec<Process>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RunCounts {
-    /// Scans that the source has published.
     pub published: u64,
-    /// Poses of the trajectory.
     pub poses: u64,
     /// Scans that live mode has dropped.
     pub dropped: u64,
     /// Scans that were published and have no pose yet.
     pub in_flight: u64,
-    /// The messages that this observer has missed.
     pub missed: Missed,
     /// The basis of the motions, from the first of the run on.
     pub witnesses: WitnessCounts,
@@ -114,61 +91,27 @@ pub struct RunCounts {
     pub samples: SampleHealth,
 }
 
-/// The trajectory's new vertices and the newest pose.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "poses")]
-pub struct NewPoses<'a> {
-    /// The vertices replace all earlier ones.
-    pub replace: bool,
-    pub vertices: &'a [Vertex],
-    pub pose: Option<CurrentPose>,
-    pub drift: Option<Drift>,
+/// Returns the objects at the time of a scan, in the frame of the first one: x, y (m), yaw (rad) of
+/// each centre, the velocity along x and y (m/s), length and width (m).
+pub fn objects(header: &ObjectsHeader) -> Value {
+    let object = |object: &ListedObject| {
+        json!({
+            "id": object.id,
+            "pose": [object.x_m, object.y_m, object.yaw_rad],
+            "velocity": [object.vx_mps, object.vy_mps],
+            "size": [object.length_m, object.width_m],
+            "moving": object.is_moving(),
+        })
+    };
+    json!({
+        "kind": "objects",
+        "seq": header.item.seq,
+        "pose": [header.x_m, header.y_m, header.yaw_rad],
+        "count": header.objects,
+        "objects": header.list().iter().map(object).collect::<Vec<_>>(),
+    })
 }
 
-/// The objects at the time of a scan, in the frame of the first one.
-#[derive(Debug, Serialize)]
-#[serde(tag = "kind", rename = "objects")]
-pub struct ObjectsReport {
-    pub seq: u64,
-    /// x, y (m), yaw (rad) of the scan.
-    pub pose: [f64; 3],
-    /// Objects, also those that are not listed.
-    pub count: u64,
-    pub objects: Vec<ObjectReport>,
-}
-
-#[derive(Debug, Serialize)]
-pub struct ObjectReport {
-    pub id: u64,
-    /// x, y (m), yaw (rad) of its centre.
-    pub pose: [f64; 3],
-    /// Along x and y, m/s.
-    pub velocity: [f64; 2],
-    /// Length and width, m.
-    pub size: [f64; 2],
-    pub moving: bool,
-}
-
-impl ObjectsReport {
-    /// Reports the objects of a message.
-    pub fn of(header: &ObjectsHeader) -> Self {
-        let report = |object: &ListedObject| ObjectReport {
-            id: object.id,
-            pose: [object.x_m, object.y_m, object.yaw_rad],
-            velocity: [object.vx_mps, object.vy_mps],
-            size: [object.length_m, object.width_m],
-            moving: object.is_moving(),
-        };
-        Self {
-            seq: header.item.seq,
-            pose: [header.x_m, header.y_m, header.yaw_rad],
-            count: header.objects,
-            objects: header.list().iter().map(report).collect(),
-        }
-    }
-}
-
-/// The newest pose.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CurrentPose {
     pub seq: u64,
@@ -192,12 +135,9 @@ impl CurrentPose {
     pub fn of(pose: &PoseHeader) -> Self {
         let interval_s = pose.motion.interval_ns as f64 * 1e-9;
         // The chain starts with a motion of no duration.
-        let per_s = |value: f64| {
-            if interval_s > 0.0 {
-                value / interval_s
-            } else {
-                0.0
-            }
+        let per_s = |value: f64| match interval_s > 0.0 {
+            true => value / interval_s,
+            false => 0.0,
         };
         Self {
             seq: pose.item.seq,

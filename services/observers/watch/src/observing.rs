@@ -7,6 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use axum::{body::Bytes, extract::ws};
 use gyre_messages::{Masked, Message, Objects, Pose, Scan};
 use gyre_stage::{
     StageError,
@@ -27,16 +28,12 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures: all scans of a radar that turns four times a second, and
 /// some of one that is played faster.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(180);
-/// Time between two reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The run to follow.
 pub struct Followed {
-    /// The folder of its results.
     pub out: PathBuf,
     /// Returns whether a run that has ended in this folder has reached the end of its recording.
     pub is_complete: fn(&Path) -> bool,
-    /// The view of the run.
     pub view: Arc<RunView>,
 }
 
@@ -84,7 +81,9 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
             Ok(()) if view.is_stopping() => return,
             Ok(()) => {
                 view.set_state(RunState::Finishing);
-                await_end(view, run);
+                while !view.is_stopping() && !run.has_ended() {
+                    thread::sleep(POLL_INTERVAL);
+                }
             }
             Err(StageError::NotRunning { .. }) => {}
             Err(error) => {
@@ -101,15 +100,6 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
     }
 }
 
-/// Waits until the results are written and the run is gone.
-fn await_end(view: &RunView, run: &ObservedRun) {
-    while !view.is_stopping() && !run.has_ended() {
-        thread::sleep(POLL_INTERVAL);
-    }
-}
-
-/// Follows the poses to their end. The track begins with the poses of the journal, and continues
-/// with the published ones.
 fn follow_poses(
     followed: &Followed,
     run: &ObservedRun,
@@ -117,6 +107,7 @@ fn follow_poses(
 ) -> Result<(), StageError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
+    let mut missed = 0;
     // Without a place for it the rates are missing, and nothing else.
     let has_samples = run.manifest().limits.samples > 0;
     let mut scans = has_samples.then(|| run.observe::<Scan>().ok()).flatten();
@@ -134,11 +125,13 @@ fn follow_poses(
             }
             Next::Idle => {}
             Next::Ended => {
-                draw_the_rest(view, track);
+                // The remaining poses of the journal.
+                while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
                 break;
             }
         }
-        view.set_missed(|missed| missed.pose = poses.missed());
+        view.add_missed(Pose::TOPIC, poses.missed().saturating_sub(missed));
+        missed = poses.missed();
         if let Some(scans) = &mut scans {
             while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
                 view.add_samples(scan.header(), scan.values());
@@ -146,11 +139,6 @@ fn follow_poses(
         }
     }
     Ok(())
-}
-
-/// Draws the remaining poses of the journal when no more poses come.
-fn draw_the_rest(view: &RunView, track: &mut JournalTrack) {
-    while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
 }
 
 /// Follows a topic as long as a browser wants one of these layers.
@@ -162,50 +150,58 @@ fn follow_pictures<M: Message>(
     let view = &followed.view;
     let is_wanted = || !view.is_stopping() && layers.iter().any(|layer| view.is_wanted(*layer));
     while !view.is_stopping() {
-        thread::sleep(POLL_INTERVAL);
-        if !is_wanted() || view.run().state != RunState::Working {
-            continue;
-        }
-        let seen = ObservedRun::writing_to(&followed.out)
-            .and_then(|run| follow_topic(view, &run, &is_wanted, picture));
+        let mut drawn: Option<Instant> = None;
+        let failed = follow_topic::<M>(followed, &is_wanted, |message, missed| {
+            view.add_missed(M::TOPIC, missed);
+            if let Some(message) = message
+                && drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL)
+            {
+                drawn = Some(Instant::now());
+                picture(view, message);
+            }
+        });
         if !is_wanted() {
-            layers.iter().for_each(|layer| view.clear_pictures(*layer));
+            // A later browser is not shown an old picture.
+            for layer in layers {
+                view.updates.of(*layer).send_replace(None);
+            }
         }
-        match seen {
-            Ok(()) | Err(StageError::NotRunning { .. }) => {}
-            Err(error) => view.set_notice(Some(format!("Not all is shown: {error}."))),
+        if let Err(error) = failed {
+            view.set_notice(Some(format!("Not all is shown: {error}.")));
         }
     }
 }
 
-fn follow_topic<M: Message>(
-    view: &RunView,
-    run: &ObservedRun,
-    is_wanted: &impl Fn() -> bool,
-    picture: fn(&RunView, &Received<M>),
+/// Waits for a poll, and follows a topic of the run, if there is one, as long as the topic is
+/// wanted: calls `take` with each message, and with the number of those missed since the last call.
+pub fn follow_topic<M: Message>(
+    followed: &Followed,
+    is_wanted: &dyn Fn() -> bool,
+    mut take: impl FnMut(Option<&Received<M>>, u64),
 ) -> Result<(), StageError> {
-    let before = view.counts().missed;
-    let mut observer = run.observe::<M>()?;
-    let mut drawn: Option<Instant> = None;
-    while is_wanted() {
-        match observer.next(POLL_INTERVAL)? {
-            Next::Message(message, _) => {
-                if drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL) {
-                    drawn = Some(Instant::now());
-                    picture(view, message);
-                }
-            }
-            Next::Idle => {}
-            Next::Ended => break,
-        }
-        let missed_now = observer.missed();
-        view.set_missed(|missed| match M::TOPIC {
-            Scan::TOPIC => missed.scan = before.scan + missed_now,
-            Objects::TOPIC => missed.objects = before.objects + missed_now,
-            _ => missed.masked = before.masked + missed_now,
-        });
+    thread::sleep(POLL_INTERVAL);
+    if !is_wanted() || followed.view.run().state != RunState::Working {
+        return Ok(());
     }
-    Ok(())
+    let followed = ObservedRun::writing_to(&followed.out).and_then(|run| {
+        let mut observer = run.observe::<M>()?;
+        let mut counted = 0;
+        while is_wanted() {
+            match observer.next(POLL_INTERVAL)? {
+                Next::Message(message, _) => take(Some(message), 0),
+                Next::Idle => {}
+                Next::Ended => break,
+            }
+            let missed = observer.missed();
+            take(None, missed.saturating_sub(counted));
+            counted = missed;
+        }
+        Ok(())
+    });
+    match followed {
+        Err(StageError::NotRunning { .. }) => Ok(()),
+        followed => followed,
+    }
 }
 
 /// Sends the picture of a scan; without memory for it, none.
@@ -214,8 +210,13 @@ fn scan(view: &RunView, message: &Received<Scan>) {
     let scan = message.header().view(message.values());
     let picture = scan.map(|scan| pictures::scan(&scan, item.seq, item.scan));
     if let Some(Ok(picture)) = picture {
-        view.updates.scan.send_replace(picture);
+        show(view, Layer::Scan, picture);
     }
+}
+
+fn show(view: &RunView, layer: Layer, picture: Bytes) {
+    let picture = ws::Message::Binary(picture);
+    view.updates.of(layer).send_replace(Some(picture));
 }
 
 fn masked(view: &RunView, message: &Received<Masked>) {
@@ -224,7 +225,7 @@ fn masked(view: &RunView, message: &Received<Masked>) {
         && let Some(pair) = header.pair(values, None)
         && let Ok(picture) = pictures::raster(pair.later, header.cell_m, seq)
     {
-        view.updates.raster.send_replace(picture);
+        show(view, Layer::Raster, picture);
     }
     if view.is_wanted(Layer::Points)
         && let Some(points) = header.points(values)

@@ -5,37 +5,30 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
+const HTML: &str = "text/html; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+const ICON: &str = "image/svg+xml";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// The path, the type and the content of each file.
-pub const FILES: [(&str, &str, &str); 11] = [
-    (
-        "/",
-        "text/html; charset=utf-8",
-        include_str!("../page/index.html"),
-    ),
-    (
-        "/style.css",
-        "text/css; charset=utf-8",
-        include_str!("../page/style.css"),
-    ),
-    (
-        "/icon.svg",
-        "image/svg+xml",
-        include_str!("../page/icon.svg"),
-    ),
-    ("/main.js", SCRIPT, include_str!("../page/main.js")),
-    (
-        "/connection.js",
-        SCRIPT,
-        include_str!("../page/connection.js"),
-    ),
-    ("/canvas.js", SCRIPT, include_str!("../page/canvas.js")),
-    ("/scan.js", SCRIPT, include_str!("../page/scan.js")),
-    ("/objects.js", SCRIPT, include_str!("../page/objects.js")),
-    ("/track.js", SCRIPT, include_str!("../page/track.js")),
-    ("/delays.js", SCRIPT, include_str!("../page/delays.js")),
-    ("/health.js", SCRIPT, include_str!("../page/health.js")),
+/// Returns the path, the type and the content of each file.
+macro_rules! files {
+    ($($path:literal $kind:ident $file:literal),* $(,)?) => {
+        [$(($path, $kind, include_str!(concat!("../page/", $file)))),*]
+    };
+}
+
+pub const FILES: [(&str, &str, &str); 11] = files![
+    "/" HTML "index.html",
+    "/style.css" STYLE "style.css",
+    "/icon.svg" ICON "icon.svg",
+    "/main.js" SCRIPT "main.js",
+    "/connection.js" SCRIPT "connection.js",
+    "/canvas.js" SCRIPT "canvas.js",
+    "/scan.js" SCRIPT "scan.js",
+    "/objects.js" SCRIPT "objects.js",
+    "/track.js" SCRIPT "track.js",
+    "/delays.js" SCRIPT "delays.js",
+    "/health.js" SCRIPT "health.js",
 ];
 
 /// Nothing but the page's own files is loaded, and nobody frames it.
@@ -54,15 +47,10 @@ const HEADERS: [(header::HeaderName, &str); 5] = [
     ),
 ];
 
-/// Adds the headers that all answers have.
 pub fn protect(headers: &mut HeaderMap) {
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
     }
-}
-
-pub fn file(kind: &'static str, content: &'static str) -> Response {
-    ([(header::CONTENT_TYPE, kind)], content).into_response()
 }
 
 /// Returns a refusal of one sentence, after which the connection is closed: who may not read does

@@ -5,7 +5,7 @@ use gyre_geometry::SparsePoint;
 use gyre_messages::MaskedHeader;
 use gyre_radar::{PolarScan, Sense};
 use ndarray::ArrayView2;
-use serde::Serialize;
+use serde_json::json;
 
 use crate::frame;
 
@@ -17,30 +17,12 @@ const MAX_BINS: usize = 256;
 const MAX_SIDE: usize = 256;
 /// Bits of a power that are dropped: 32 shades remain, and a scan compresses to a third.
 const DROPPED_BITS: u32 = 3;
-/// Share of the cells of a scan that are taken for noise.
 const NOISE_SHARE: f64 = 0.6;
 /// Unit of the coordinates of points, m: 16 bits reach 655 m.
 const POINT_UNIT_M: f64 = 0.02;
 
-/// A scan as a picture: `azimuths x bins` powers. Azimuth `a` looks at `2 pi a / azimuths`,
-/// counter-clockwise from straight ahead.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "scan")]
-struct ScanPicture {
-    seq: u64,
-    scan: u64,
-    azimuths: usize,
-    bins: usize,
-    /// Range of the outer edge of the last bin, m.
-    max_range_m: f64,
-    /// The azimuth that was measured first.
-    first: usize,
-    clockwise: bool,
-    /// Weaker powers are noise, and sent as 0.
-    floor: u8,
-}
-
-/// Makes a picture of a scan: the strongest return in each cell.
+/// Makes a picture of a scan: the strongest return in each cell. Azimuth `a` looks at
+/// `2 pi a / azimuths`, counter-clockwise from straight ahead.
 pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Bytes> {
     let geometry = &scan.geometry;
     let azimuths = geometry.azimuths.min(MAX_AZIMUTHS);
@@ -58,22 +40,24 @@ pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Byte
     }
     let floor = floor(&powers);
     for power in &mut powers {
-        *power = if *power < floor {
-            0
-        } else {
-            *power >> DROPPED_BITS << DROPPED_BITS
+        *power = match *power < floor {
+            true => 0,
+            false => *power >> DROPPED_BITS << DROPPED_BITS,
         };
     }
-    let picture = ScanPicture {
-        seq,
-        scan: number,
-        azimuths,
-        bins,
-        max_range_m: f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
-        first: column(0),
-        clockwise: geometry.sense == Sense::Clockwise,
-        floor,
-    };
+    let picture = json!({
+        "kind": "scan",
+        "seq": seq,
+        "scan": number,
+        "azimuths": azimuths,
+        "bins": bins,
+        // Of the outer edge of the last bin.
+        "max_range_m": f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
+        "first": column(0),
+        "clockwise": geometry.sense == Sense::Clockwise,
+        // Weaker powers are noise, and sent as 0.
+        "floor": floor,
+    });
     frame::encode(&picture, &powers)
 }
 
@@ -102,49 +86,25 @@ fn column_of(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
     (counter_clockwise.rem_euclid(1.0) * azimuths as f64).round() as usize % azimuths
 }
 
-/// A raster as a picture: `side x side` cells, row 0 far ahead, column 0 far left, the sensor in
-/// the middle.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "raster")]
-struct RasterPicture {
-    seq: u64,
-    side: usize,
-    /// Width of the picture, m.
-    width_m: f64,
-}
-
 /// Makes a picture of a masked raster: the strongest value of each cell, relative to the maximum.
+/// Row 0 is far ahead, column 0 far left.
 pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Result<Bytes> {
     let n = raster.nrows();
     let cells_of_one = n.div_ceil(MAX_SIDE).max(1);
     let side = n.div_ceil(cells_of_one);
     let strongest = raster.iter().copied().fold(0.0, f32::max);
-    let scale = if strongest > 0.0 {
-        255.0 / strongest
-    } else {
-        0.0
+    let scale = match strongest > 0.0 {
+        true => 255.0 / strongest,
+        false => 0.0,
     };
     let mut cells = vec![0_u8; side * side];
     for ((row, column), value) in raster.indexed_iter() {
         let cell = &mut cells[row / cells_of_one * side + column / cells_of_one];
         *cell = ((value * scale) as u8 >> DROPPED_BITS << DROPPED_BITS).max(*cell);
     }
-    let picture = RasterPicture {
-        seq,
-        side,
-        width_m: (side * cells_of_one) as f64 * f64::from(cell_m),
-    };
+    let width_m = (side * cells_of_one) as f64 * f64::from(cell_m);
+    let picture = json!({"kind": "raster", "seq": seq, "side": side, "width_m": width_m});
     frame::encode(&picture, &cells)
-}
-
-/// The points of a scan with its pose.
-#[derive(Serialize)]
-#[serde(tag = "kind", rename = "points")]
-struct PointsPicture {
-    seq: u64,
-    /// x, y (m), yaw (rad) of the scan in the frame of the first.
-    pose: [f64; 3],
-    unit_m: f64,
 }
 
 /// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
@@ -165,11 +125,7 @@ pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> PackedPoints {
 impl PackedPoints {
     /// Makes a message of the points and the pose of their scan.
     pub fn at(&self, pose: [f64; 3], seq: u64) -> std::io::Result<Bytes> {
-        let picture = PointsPicture {
-            seq,
-            pose,
-            unit_m: POINT_UNIT_M,
-        };
+        let picture = json!({"kind": "points", "seq": seq, "pose": pose, "unit_m": POINT_UNIT_M});
         frame::encode(&picture, &self.0)
     }
 }
@@ -224,12 +180,8 @@ mod tests {
         let brightest = powers.iter().position(|power| *power == 248).unwrap();
         assert_eq!((brightest / 250, brightest % 250), (300, 125));
         assert_eq!(powers.iter().filter(|power| **power != 8).count(), 1);
-    }
-
-    #[test]
-    fn the_last_azimuth_stays_within_the_picture() {
-        let (_, powers) = picture(AZIMUTHS - 1, 0);
-        assert!(powers.contains(&248));
+        let (_, of_last) = picture(AZIMUTHS - 1, 0);
+        assert!(of_last.contains(&248));
     }
 
     #[test]
@@ -255,18 +207,12 @@ mod tests {
             time_s: 0.0,
             doppler_s: 0.0,
         };
-        let seen = [
-            point(1.0, -2.0, 1.0),
-            point(5.0, 5.0, 0.0),
-            point(1e9, 0.0, 0.5),
-        ];
+        let seen = [(1.0, -2.0, 1.0), (5.0, 5.0, 0.0), (1e9, 0.0, 0.5)];
+        let seen = seen.map(|(x_m, y_m, weight)| point(x_m, y_m, weight));
         let small = points(&seen, &MaskedHeader::default());
         let (header, bytes) = frame::decode(&small.at([1.0, 2.0, 3.0], 4).unwrap()).unwrap();
         assert_eq!(header["pose"], serde_json::json!([1.0, 2.0, 3.0]));
-        let values: Vec<_> = bytes
-            .chunks_exact(2)
-            .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
-            .collect();
-        assert_eq!(values, [50, -100, i16::MAX, 0]);
+        let values = [50, -100, i16::MAX, 0].map(i16::to_le_bytes);
+        assert_eq!(bytes, values.concat());
     }
 }

@@ -9,30 +9,22 @@ use gyre_stage::{
 use gyre_supervise::Usage;
 use serde::Serialize;
 
-/// The name of the supervisor among the processes.
 const SUPERVISOR: &str = "supervisor";
 
 /// Reads the states of a run's processes, and measures their usage between two reads.
 #[derive(Debug, Default)]
 pub struct ProcessMeter {
-    /// The last usage of each process, and its time.
     before: BTreeMap<u32, (Instant, Usage)>,
 }
 
-/// A process of the run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Process {
-    /// The name of the stage or follower.
     pub name: String,
-    /// The process.
     pub pid: u32,
-    /// The activity.
     pub state: &'static str,
     /// The rating of the activity: `good`, `warn`, or `bad`.
     pub level: &'static str,
-    /// The number of restarts.
     pub restarts: usize,
-    /// The cause of its last death.
     pub last_death: Option<String>,
     /// The counts of a live radar; `None` if the process receives none.
     pub received: Option<Received>,
@@ -49,27 +41,23 @@ impl ProcessMeter {
     /// if there is no answer: the run is about to end, or its supervisor is stopped.
     pub fn read(&mut self, out: &Path) -> Option<(Status, Vec<Process>)> {
         let status = Control::of(out).and_then(|control| control.status()).ok()?;
-        let process = |name: &str, pid| Process {
-            name: name.to_owned(),
-            pid,
-            state: "running",
-            level: "good",
-            restarts: 0,
-            last_death: None,
-            received: None,
-            processor_share: None,
-            cpu_s: None,
-            own_bytes: None,
-        };
         let others = status.processes.iter().map(|it| Process {
+            name: it.name.clone(),
+            pid: it.pid,
             state: it.activity.name(),
             level: level(it.activity),
             restarts: it.restarts,
             last_death: it.last_death.clone(),
             received: it.received,
-            ..process(&it.name, it.pid)
+            ..Process::default()
         });
-        let supervisor = process(SUPERVISOR, status.pid);
+        let supervisor = Process {
+            name: SUPERVISOR.to_owned(),
+            pid: status.pid,
+            state: "running",
+            level: "good",
+            ..Process::default()
+        };
         let mut processes: Vec<_> = [supervisor].into_iter().chain(others).collect();
         self.measure(&mut processes);
         Some((status, processes))

@@ -7,12 +7,10 @@ use gyre_geometry::{ComposedMotion, OdometryMotion};
 use gyre_messages::{PoseHeader, flag};
 use serde::Serialize;
 
-/// Length of the stretch, m.
 const STRETCH_M: f64 = 100.0;
 /// Motions that are kept at most: a vehicle that stands or creeps fills the stretch with them.
 const MAX_MOTIONS: usize = 2048;
 
-/// The motions of the last stretch.
 #[derive(Debug, Default)]
 pub struct RecentDrift {
     motions: VecDeque<OdometryMotion>,
@@ -24,13 +22,11 @@ pub struct RecentDrift {
 pub struct Drift {
     /// Length of the stretch, m.
     pub over_m: f64,
-    /// Of the position along its worst direction, m.
     pub position_m: f64,
     pub yaw_rad: f64,
 }
 
 impl RecentDrift {
-    /// Adds the motion to the next pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         if pose.item.is(flag::BREAK) {
             *self = Self::default();
@@ -39,14 +35,11 @@ impl RecentDrift {
         let motion = pose.motion.motion();
         self.length_m += length_m(&motion);
         self.motions.push_back(motion);
-        while self.motions.len() > MAX_MOTIONS
-            || self
-                .motions
-                .front()
-                .is_some_and(|first| self.length_m - length_m(first) >= STRETCH_M)
+        while let Some(first) = self.motions.front()
+            && (self.motions.len() > MAX_MOTIONS || self.length_m - length_m(first) >= STRETCH_M)
         {
-            let first = self.motions.pop_front();
-            self.length_m -= first.map_or(0.0, |first| length_m(&first));
+            self.length_m -= length_m(first);
+            self.motions.pop_front();
         }
     }
 
@@ -54,14 +47,10 @@ impl RecentDrift {
     pub fn drift(&self) -> Option<Drift> {
         let first = ComposedMotion::of(self.motions.front()?);
         let rest = self.motions.iter().skip(1);
-        let covariance = rest
-            .fold(first, |all, next| all.then(next))
-            .motion()
-            .covariance;
-        let (mean, half) = (
-            0.5 * (covariance[(0, 0)] + covariance[(1, 1)]),
-            0.5 * (covariance[(0, 0)] - covariance[(1, 1)]),
-        );
+        let composed = rest.fold(first, |all, next| all.then(next)).motion();
+        let covariance = composed.covariance;
+        let (xx, yy) = (covariance[(0, 0)], covariance[(1, 1)]);
+        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
         let variance_m2 = mean + half.hypot(covariance[(0, 1)]);
         Some(Drift {
             over_m: self.length_m,
@@ -99,10 +88,7 @@ mod tests {
         }
         let drift = recent.drift().unwrap();
         assert!((drift.over_m - 60.0).abs() < 1e-9);
-        assert!(
-            (drift.position_m - (30.0f64 * 0.04).sqrt()).abs() < 1e-9,
-            "across"
-        );
+        assert!((drift.position_m - (30.0f64 * 0.04).sqrt()).abs() < 1e-9);
         assert_eq!(drift.yaw_rad, 0.0);
         for _ in 0..300 {
             recent.add(&pose(0));

@@ -8,21 +8,20 @@ use std::{
     },
 };
 
-use axum::{body::Bytes, extract::ws::Utf8Bytes};
+use axum::extract::ws::Message;
 use gyre_messages::{
-    ObjectsHeader, PoseHeader, RefinementRecord, SampleRates, ScanHeader, WitnessCounts, flag,
+    Message as _, Objects, ObjectsHeader, Pose, PoseHeader, RefinementRecord, SampleRates, Scan,
+    ScanHeader, WitnessCounts, flag,
 };
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
+use serde_json::json;
 use tokio::sync::watch;
 
 use crate::{
     delays::Delays,
     histograms::Histograms,
-    messages::{
-        CurrentPose, HealthReport, Layer, Missed, NewPoses, ObjectsReport, RunCounts, RunInfo,
-        RunState,
-    },
+    messages::{self, CurrentPose, HealthReport, Layer, RunCounts, RunInfo, RunState},
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
@@ -35,32 +34,29 @@ const LAST_MOTIONS: usize = 40;
 /// The number of poses that are kept for scans whose points come later.
 const RECENT: usize = 256;
 
-/// The view of the run.
+#[derive(Default)]
 pub struct RunView {
     state: Mutex<ViewState>,
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
     pub updates: Updates,
-    /// Browsers that want each layer.
     wanted: [AtomicUsize; 4],
-    /// Delays of all poses.
     pub histograms: Histograms,
 }
 
-/// The newest of each kind of message to a browser.
+pub type Newest = watch::Sender<Option<Message>>;
+
+#[derive(Default)]
 pub struct Updates {
-    pub run: watch::Sender<Utf8Bytes>,
-    /// Counts and delays.
-    pub health: watch::Sender<Utf8Bytes>,
-    /// The newest scan.
-    pub scan: watch::Sender<Bytes>,
-    /// The newest raster.
-    pub raster: watch::Sender<Bytes>,
-    /// The newest points.
-    pub points: watch::Sender<Bytes>,
-    /// The newest objects.
-    pub objects: watch::Sender<Utf8Bytes>,
-    /// True when the program ends.
+    pub run: Newest,
+    pub health: Newest,
+    pub layers: [Newest; 4],
     pub stop: watch::Sender<bool>,
+}
+
+impl Updates {
+    pub fn of(&self, layer: Layer) -> &Newest {
+        &self.layers[layer as usize]
+    }
 }
 
 #[derive(Default)]
@@ -73,7 +69,6 @@ struct ViewState {
     counts: RunCounts,
     last_motions: VecDeque<RefinementRecord>,
     rates: SampleRates,
-    /// The numbers and poses of the last scans.
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
@@ -84,22 +79,8 @@ struct ViewState {
 }
 
 impl RunView {
-    /// Creates an empty view of the run that writes to `out`.
     pub fn new(out: &str) -> Self {
-        let view = Self {
-            state: Mutex::default(),
-            updates: Updates {
-                run: watch::Sender::default(),
-                health: watch::Sender::default(),
-                scan: watch::Sender::default(),
-                raster: watch::Sender::default(),
-                points: watch::Sender::default(),
-                objects: watch::Sender::default(),
-                stop: watch::Sender::new(false),
-            },
-            wanted: Default::default(),
-            histograms: Histograms::default(),
-        };
+        let view = Self::default();
         view.update_run(|run| out.clone_into(&mut run.out));
         view
     }
@@ -112,7 +93,6 @@ impl RunView {
         self.state().run.clone()
     }
 
-    /// Begins with a run, and removes all of an earlier one.
     pub fn begin(&self, manifest: &Manifest) {
         {
             let mut state = self.state();
@@ -123,8 +103,8 @@ impl RunView {
                 ..ViewState::default()
             };
         }
-        for layer in [Layer::Scan, Layer::Raster, Layer::Points, Layer::Objects] {
-            self.clear_pictures(layer);
+        for layer in &self.updates.layers {
+            layer.send_replace(None);
         }
         self.update_run(|run| {
             run.id.clone_from(&manifest.prefix);
@@ -137,21 +117,6 @@ impl RunView {
         });
     }
 
-    /// Removes the newest picture of a layer, so that a later browser is not shown an old one.
-    pub fn clear_pictures(&self, layer: Layer) {
-        let pictures = match layer {
-            Layer::Scan => &self.updates.scan,
-            Layer::Raster => &self.updates.raster,
-            Layer::Points => &self.updates.points,
-            Layer::Objects => {
-                self.updates.objects.send_replace(Utf8Bytes::default());
-                return;
-            }
-        };
-        pictures.send_replace(Bytes::new());
-    }
-
-    /// Ends the run, and its processes with it.
     pub fn end(&self, state: RunState) {
         {
             let mut state = self.state();
@@ -162,7 +127,6 @@ impl RunView {
         self.report();
     }
 
-    /// Changes the state of the run.
     pub fn set_state(&self, state: RunState) {
         self.update_run(|run| run.state = state);
     }
@@ -174,7 +138,6 @@ impl RunView {
         send_json(&self.updates.run, &state.run);
     }
 
-    /// Adds the next pose of the trajectory.
     pub fn add_to_track(&self, pose: &PoseHeader) {
         let mut state = self.state();
         state.track.add(pose);
@@ -218,7 +181,6 @@ impl RunView {
         }
     }
 
-    /// Counts the samples that come with a scan.
     pub fn add_samples(&self, scan: &ScanHeader, bytes: &[u8]) {
         let mut state = self.state();
         state.rates.add(scan, bytes);
@@ -236,16 +198,16 @@ impl RunView {
 
     fn send_points(&self, points: &PackedPoints, place: [f64; 3], seq: u64) {
         if let Ok(message) = points.at(place, seq) {
-            self.updates.points.send_replace(message);
+            let points = self.updates.of(Layer::Points);
+            points.send_replace(Some(Message::Binary(message)));
         }
     }
 
     /// Shows the objects of a scan.
     pub fn set_objects(&self, header: &ObjectsHeader) {
-        send_json(&self.updates.objects, &ObjectsReport::of(header));
+        send_json(self.updates.of(Layer::Objects), &messages::objects(header));
     }
 
-    /// Sets the supervisor's status of the run, and the processes.
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
         let mut state = self.state();
         let with_pose = status.poses + status.dropped;
@@ -261,9 +223,15 @@ impl RunView {
         self.state().processes.clone()
     }
 
-    /// Changes the counts of missed messages.
-    pub fn set_missed(&self, change: impl FnOnce(&mut Missed)) {
-        change(&mut self.state().counts.missed);
+    pub fn add_missed(&self, topic: &str, missed: u64) {
+        let mut state = self.state();
+        let counts = &mut state.counts.missed;
+        *match topic {
+            Pose::TOPIC => &mut counts.pose,
+            Scan::TOPIC => &mut counts.scan,
+            Objects::TOPIC => &mut counts.objects,
+            _ => &mut counts.masked,
+        } += missed;
     }
 
     /// Sets the reason why something is not shown; `None`: all is.
@@ -275,7 +243,6 @@ impl RunView {
         self.state().counts
     }
 
-    /// Sends the report of this second.
     pub fn report(&self) {
         let now_ns = clock::now_ns();
         let mut state = self.state();
@@ -299,7 +266,7 @@ impl RunView {
 
     /// Returns the message of new poses for a browser that has received those up to `last`; `None`
     /// if there are no new poses.
-    pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Utf8Bytes> {
+    pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Message> {
         let state = self.state();
         let seq = state.latest.map(|latest| latest.seq);
         let (vertices, replace) = state.track.since(cursor);
@@ -307,13 +274,13 @@ impl RunView {
             return None;
         }
         *last = seq;
-        let poses = NewPoses {
-            replace,
-            vertices,
-            pose: state.latest,
-            drift: state.drift.drift(),
-        };
-        serde_json::to_string(&poses).ok().map(Utf8Bytes::from)
+        json(&json!({
+            "kind": "poses",
+            "replace": replace,
+            "vertices": vertices,
+            "pose": state.latest,
+            "drift": state.drift.drift(),
+        }))
     }
 
     /// Returns the trajectory: x, y (m), yaw (rad).
@@ -322,9 +289,8 @@ impl RunView {
         let latest = state.latest.map(|latest| latest.vertex);
         let (vertices, _) = state.track.since(&mut Cursor::default());
         let vertices = vertices.iter().chain(&latest);
-        vertices
-            .map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw])
-            .collect()
+        let poses = vertices.map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw]);
+        poses.collect()
     }
 
     /// Returns the time of the newest pose on the sensor's clock, ns.
@@ -332,7 +298,6 @@ impl RunView {
         self.state().latest.map(|latest| latest.stamp_ns)
     }
 
-    /// Counts one more or one less browser that wants a layer.
     pub fn want(&self, layer: Layer, more: bool) {
         let wanted = &self.wanted[layer as usize];
         match more {
@@ -341,7 +306,6 @@ impl RunView {
         };
     }
 
-    /// Returns whether a browser wants a layer that the run has.
     pub fn is_wanted(&self, layer: Layer) -> bool {
         if layer == Layer::Objects && !self.state().run.objects {
             return false;
@@ -349,12 +313,10 @@ impl RunView {
         self.wanted[layer as usize].load(Ordering::Relaxed) > 0
     }
 
-    /// Ends all threads and connections.
     pub fn stop(&self) {
         self.updates.stop.send_replace(true);
     }
 
-    /// Returns whether the program ends.
     pub fn is_stopping(&self) -> bool {
         *self.updates.stop.borrow()
     }
@@ -363,16 +325,19 @@ impl RunView {
 /// Returns the part of gyro, wheels and Doppler in the last motions, and their rates, in words.
 fn others(state: &ViewState) -> Option<String> {
     let used = WitnessCounts::of(&state.last_motions).in_words();
-    let words: Vec<String> = used
-        .into_iter()
-        .chain(state.counts.samples.in_words())
-        .collect();
+    let samples = state.counts.samples.in_words();
+    let words: Vec<String> = used.into_iter().chain(samples).collect();
     (!words.is_empty()).then(|| words.join("; "))
 }
 
-fn send_json(channel: &watch::Sender<Utf8Bytes>, message: &impl Serialize) {
-    if let Ok(text) = serde_json::to_string(message) {
-        channel.send_replace(text.into());
+fn json(message: &impl Serialize) -> Option<Message> {
+    let text = serde_json::to_string(message).ok()?;
+    Some(Message::Text(text.into()))
+}
+
+fn send_json(channel: &Newest, message: &impl Serialize) {
+    if let Some(message) = json(message) {
+        channel.send_replace(Some(message));
     }
 }
 
@@ -407,20 +372,29 @@ mod tests {
         pictures::points(&[point], &MaskedHeader::default())
     }
 
+    fn parsed(message: &Message) -> Value {
+        serde_json::from_str(message.to_text().unwrap()).unwrap()
+    }
+
+    fn newest(channel: &Newest) -> Value {
+        parsed(channel.borrow().as_ref().unwrap())
+    }
+
     #[test]
     fn points_are_sent_with_the_pose_of_their_scan_whichever_comes_first() {
         let view = RunView::new("out");
         let sent = || {
-            let message = view.updates.points.borrow().clone();
-            frame::decode(&message).map(|(header, _)| header["pose"][0].as_f64())
+            let message = view.updates.of(Layer::Points).borrow().clone()?;
+            let (header, _) = frame::decode(&message.into_data())?;
+            header["pose"][0].as_f64()
         };
         view.add_pose(&pose(3));
         view.add_points(points(), 4);
         assert_eq!(sent(), None);
         view.add_pose(&pose(4));
-        assert_eq!(sent(), Some(Some(4.0)));
+        assert_eq!(sent(), Some(4.0));
         view.add_points(points(), 3);
-        assert_eq!(sent(), Some(Some(3.0)));
+        assert_eq!(sent(), Some(3.0));
     }
 
     #[test]
@@ -429,23 +403,19 @@ mod tests {
         let (mut cursor, mut last) = (Cursor::default(), None);
         let mut next = || -> Option<Value> {
             let message = view.poses(&mut cursor, &mut last)?;
-            Some(serde_json::from_str(&message).unwrap())
+            Some(parsed(&message))
         };
         let first = next().unwrap();
-        assert_eq!(
-            (&first["kind"], &first["pose"]),
-            (&"poses".into(), &Value::Null)
-        );
+        assert_eq!(first["kind"], "poses");
+        assert_eq!(first["pose"], Value::Null);
         assert_eq!(next(), None);
         view.add_to_track(&pose(0));
         view.add_to_track(&pose(1));
         view.add_pose(&pose(1));
         let second = next().unwrap();
         assert_eq!(second["vertices"].as_array().unwrap().len(), 2);
-        assert_eq!(
-            (&second["replace"], &second["pose"]["seq"]),
-            (&false.into(), &1.into())
-        );
+        assert_eq!(second["replace"], false);
+        assert_eq!(second["pose"]["seq"], 1);
         assert_eq!(next(), None);
     }
 
@@ -471,7 +441,7 @@ mod tests {
             ..ListedObject::default()
         };
         view.set_objects(&header);
-        let sent: Value = serde_json::from_str(&view.updates.objects.borrow()).unwrap();
+        let sent = newest(view.updates.of(Layer::Objects));
         let expected = serde_json::json!({
             "kind": "objects", "seq": 0, "pose": [7.0, 0.0, 0.0], "count": 1,
             "objects": [{
@@ -480,8 +450,6 @@ mod tests {
             }],
         });
         assert_eq!(sent, expected);
-        view.clear_pictures(Layer::Objects);
-        assert!(view.updates.objects.borrow().is_empty());
     }
 
     #[test]
@@ -489,11 +457,9 @@ mod tests {
         let view = RunView::new("out");
         view.add_pose(&pose(6));
         view.report();
-        let health: Value = serde_json::from_str(&view.updates.health.borrow()).unwrap();
-        assert_eq!(
-            (&health["kind"], &health["poses"]),
-            (&"health".into(), &7.into())
-        );
+        let health = newest(&view.updates.health);
+        assert_eq!(health["kind"], "health");
+        assert_eq!(health["poses"], 7);
         assert_eq!(health["delays"]["samples"], 1);
         assert_eq!(health["processes"], serde_json::json!([]));
     }

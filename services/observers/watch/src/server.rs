@@ -4,10 +4,7 @@ use std::{
     io,
     net::{SocketAddr, TcpListener},
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
-    },
+    sync::Arc,
     thread,
     time::Duration,
 };
@@ -22,7 +19,11 @@ use axum::{
 };
 use gyre_stage::{StageError, wake::Signals};
 use thiserror::Error;
-use tokio::{runtime, sync::watch, time};
+use tokio::{
+    runtime,
+    sync::{Semaphore, watch},
+    time,
+};
 
 use crate::{
     access::{Access, Token, Verdict},
@@ -41,25 +42,19 @@ const MAX_READERS: usize = 16;
 const MAX_RECEIVED: usize = 1024;
 /// The longest request of a viewer, bytes.
 const MAX_REQUESTED: usize = 64 << 10;
-/// Time between two checks whether the server has failed.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A failure of the server.
 #[derive(Debug, Error)]
 pub enum WatchError {
-    /// The address cannot be listened at.
     #[error("cannot serve at {address}: {source}; choose another address")]
     Listen {
         address: SocketAddr,
-        /// The reason.
         source: io::Error,
     },
-    /// The server fails.
     #[error("cannot serve: {0}")]
     Serve(#[from] io::Error),
-    /// Signals cannot be received.
     #[error(transparent)]
     Stage(#[from] StageError),
 }
@@ -82,17 +77,8 @@ struct Shared {
     view: Arc<RunView>,
     hub: Arc<Hub>,
     access: Arc<Access>,
-    readers: Arc<AtomicUsize>,
+    places: Arc<Semaphore>,
 }
-
-impl Shared {
-    fn judge(&self, request: &Request) -> Verdict {
-        self.access.judge(request.uri(), request.headers())
-    }
-}
-
-/// One of the places for readers. Dropped, it is free again.
-struct ReaderSlot(Arc<AtomicUsize>);
 
 impl Endpoint {
     /// Listens at an address. Without a token only this machine is answered.
@@ -122,7 +108,6 @@ impl Endpoint {
         format!("{scheme}://{host}/{query}")
     }
 
-    /// Serves until the program stops.
     async fn serve(self, router: Router, stop: watch::Receiver<bool>) -> io::Result<()> {
         self.listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(self.listener)?;
@@ -132,7 +117,6 @@ impl Endpoint {
 }
 
 impl Server {
-    /// Creates a server of the page and the metrics.
     pub fn new(page: Endpoint) -> Self {
         Self {
             page,
@@ -140,7 +124,6 @@ impl Server {
         }
     }
 
-    /// Serves Foxglove too.
     pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
         Self { foxglove, ..self }
     }
@@ -183,21 +166,23 @@ impl Server {
     }
 
     fn serve(self, view: &Arc<RunView>, hub: Arc<Hub>) -> io::Result<()> {
-        let shared = |access: Access| Shared {
-            view: Arc::clone(view),
-            hub: Arc::clone(&hub),
-            access: Arc::new(access),
-            readers: Arc::default(),
+        let shared = |endpoint: &Endpoint, of_viewers| {
+            let (address, token) = (endpoint.address, endpoint.token.clone());
+            Shared {
+                view: Arc::clone(view),
+                hub: Arc::clone(&hub),
+                access: Arc::new(Access::new(address, token, of_viewers)),
+                places: Arc::new(Semaphore::new(MAX_READERS)),
+            }
         };
         let stop = || view.updates.stop.subscribe();
-        let access = Access::new(self.page.address, self.page.token.clone());
-        let page = self.page.serve(router(shared(access)), stop());
+        let of_page = router(shared(&self.page, false));
+        let page = self.page.serve(of_page, stop());
         let foxglove = async {
             let Some(endpoint) = self.foxglove else {
                 return Ok(());
             };
-            let access = Access::new(endpoint.address, endpoint.token.clone());
-            let router = foxglove_router(shared(access.of_viewers()));
+            let router = foxglove_router(shared(&endpoint, true));
             endpoint.serve(router, stop()).await
         };
         let runtime = runtime::Builder::new_current_thread()
@@ -219,7 +204,8 @@ impl Server {
 fn router(shared: Shared) -> Router {
     let files = page::FILES.into_iter();
     let router = files.fold(Router::new(), |router, (path, kind, content)| {
-        router.route(path, get(move || async move { page::file(kind, content) }))
+        let file = ([(header::CONTENT_TYPE, kind)], content);
+        router.route(path, get(move || async move { file }))
     });
     router
         .route("/stream", get(stream))
@@ -231,30 +217,44 @@ fn router(shared: Shared) -> Router {
 fn foxglove_router(shared: Shared) -> Router {
     Router::new()
         .fallback(view)
-        .layer(middleware::from_fn_with_state(
-            shared.clone(),
-            guard_viewers,
-        ))
+        .layer(middleware::from_fn_with_state(shared.clone(), guard))
         .with_state(shared)
 }
 
-/// Answers only viewers that may read.
-async fn guard_viewers(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    match shared.judge(&request) {
+/// The sentences of the page to those that may not read, and those of viewers' connections:
+/// without the token, by the name of another host, and from a page of another site.
+const REFUSALS: [[&str; 3]; 2] = [
+    [
+        "This page needs the token: open the whole address that `gyre watch` has printed.",
+        "This page is for this machine alone: open it as http://localhost, or start `gyre watch` with --listen.",
+        "A page of another site asked for this.",
+    ],
+    [
+        "This needs the token: open the whole address that `gyre watch` has printed.",
+        "This is for this machine alone: open it as ws://localhost, or start `gyre watch` with --foxglove and an address.",
+        "A page of another site asked for this: start `gyre watch` with --token-file, and give the token in the address.",
+    ],
+];
+
+/// Answers only requests that may read, whatever the path.
+async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let access = &shared.access;
+    let [no_token, foreign_host, foreign_origin] = REFUSALS[usize::from(access.of_viewers)];
+    let mut response = match access.judge(request.uri(), request.headers()) {
+        Verdict::GrantedByAddress if !access.of_viewers && request.uri().path() == "/" => {
+            // The token does not stay in the address, where others may see it.
+            let cookie = access.cookie().unwrap_or_default();
+            ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+        }
         Verdict::Granted | Verdict::GrantedByAddress => next.run(request).await,
-        Verdict::NoToken => page::refusal(
-            StatusCode::UNAUTHORIZED,
-            "This needs the token: open the whole address that `gyre watch` has printed.",
-        ),
-        Verdict::ForeignHost => page::refusal(
-            StatusCode::FORBIDDEN,
-            "This is for this machine alone: open it as ws://localhost, or start `gyre watch` with --foxglove and an address.",
-        ),
-        Verdict::ForeignOrigin => page::refusal(
-            StatusCode::FORBIDDEN,
-            "A page of another site asked for this: start `gyre watch` with --token-file, and give the token in the address.",
-        ),
+        Verdict::NoToken => page::refusal(StatusCode::UNAUTHORIZED, no_token),
+        Verdict::ForeignHost => page::refusal(StatusCode::FORBIDDEN, foreign_host),
+        Verdict::ForeignOrigin => page::refusal(StatusCode::FORBIDDEN, foreign_origin),
+    };
+    if !access.of_viewers {
+        page::protect(response.headers_mut());
     }
+    response
 }
 
 async fn view(
@@ -266,51 +266,22 @@ async fn view(
         let other = "This is for Foxglove and Lichtblick: open a connection of the kind Foxglove WebSocket to this address.";
         return page::refusal(StatusCode::BAD_REQUEST, other);
     };
-    let Some(place) = ReaderSlot::take(&shared.readers) else {
+    let Ok(place) = Arc::clone(&shared.places).try_acquire_owned() else {
         let full = "As many viewers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
-    let upgrade = bounded(upgrade, MAX_REQUESTED);
-    upgrade.on_upgrade(move |socket| async move {
+    bounded(upgrade, MAX_REQUESTED).on_upgrade(move |socket| async move {
         foxglove::serve(socket, shared.hub, shared.view).await;
         drop(place);
     })
 }
 
-/// Answers only requests that may read, whatever the path.
-async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let mut response = match shared.judge(&request) {
-        Verdict::Granted => next.run(request).await,
-        Verdict::GrantedByAddress if request.uri().path() == "/" => {
-            // The token does not stay in the address, where others may see it.
-            let cookie = shared.access.cookie().unwrap_or_default();
-            ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
-        }
-        Verdict::GrantedByAddress => next.run(request).await,
-        Verdict::NoToken => page::refusal(
-            StatusCode::UNAUTHORIZED,
-            "This page needs the token: open the whole address that `gyre watch` has printed.",
-        ),
-        Verdict::ForeignHost => page::refusal(
-            StatusCode::FORBIDDEN,
-            "This page is for this machine alone: open it as http://localhost, or start `gyre watch` with --listen.",
-        ),
-        Verdict::ForeignOrigin => page::refusal(
-            StatusCode::FORBIDDEN,
-            "A page of another site asked for this.",
-        ),
-    };
-    page::protect(response.headers_mut());
-    response
-}
-
 async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Some(place) = ReaderSlot::take(&shared.readers) else {
+    let Ok(place) = Arc::clone(&shared.places).try_acquire_owned() else {
         let full = "As many browsers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
-    let upgrade = bounded(upgrade, MAX_RECEIVED);
-    upgrade.on_upgrade(move |socket| async move {
+    bounded(upgrade, MAX_RECEIVED).on_upgrade(move |socket| async move {
         stream::serve(socket, shared.view).await;
         drop(place);
     })
@@ -324,18 +295,4 @@ fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
 async fn scrape(State(shared): State<Shared>) -> Response {
     let text = metrics::scrape(&shared.view);
     ([(header::CONTENT_TYPE, metrics::OPEN_METRICS)], text).into_response()
-}
-
-impl ReaderSlot {
-    fn take(readers: &Arc<AtomicUsize>) -> Option<Self> {
-        let place = Self(Arc::clone(readers));
-        let taken = readers.fetch_add(1, Ordering::Relaxed);
-        (taken < MAX_READERS).then_some(place)
-    }
-}
-
-impl Drop for ReaderSlot {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
 }

@@ -8,13 +8,16 @@ use tokio::{
     time::{self, MissedTickBehavior},
 };
 
-use crate::{messages::Layer, run_view::RunView, track::Cursor};
+use crate::{
+    messages::Layer,
+    run_view::{Newest, RunView},
+    track::Cursor,
+};
 
-/// Time between two messages of poses.
 const POSES_INTERVAL: Duration = Duration::from_millis(200);
 /// The longest time that a browser may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
-/// The layers by the names that a browser gives them.
+/// The layers by the names that a browser gives them, in the order of their numbers.
 const LAYERS: [(&str, Layer); 4] = [
     ("scan", Layer::Scan),
     ("raster", Layer::Raster),
@@ -22,14 +25,12 @@ const LAYERS: [(&str, Layer); 4] = [
     ("objects", Layer::Objects),
 ];
 
-/// The layers that a browser wants. Dropped, it wants none.
 struct Wanted {
     view: Arc<RunView>,
     layers: [bool; 4],
 }
 
 impl Wanted {
-    /// Takes the names of the layers, separated by spaces.
     fn set(&mut self, names: &str) {
         for (name, layer) in LAYERS {
             let is_wanted = names.split(' ').any(|named| named == name);
@@ -55,21 +56,16 @@ impl Drop for Wanted {
 /// Sends updates to a browser until it disconnects, is too slow, or the program ends.
 pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
     let updates = &view.updates;
-    let (mut run, mut health) = (updates.run.subscribe(), updates.health.subscribe());
-    let (mut scan, mut raster, mut points) = (
-        updates.scan.subscribe(),
-        updates.raster.subscribe(),
-        updates.points.subscribe(),
-    );
-    let mut objects = updates.objects.subscribe();
+    let subscribe = |to: &Newest| {
+        let mut receiver = to.subscribe();
+        // The newest is new to this browser.
+        receiver.mark_changed();
+        receiver
+    };
+    let (mut run, mut health) = (subscribe(&updates.run), subscribe(&updates.health));
+    let [mut scan, mut raster, mut points, mut objects] =
+        LAYERS.map(|(_, layer)| subscribe(updates.of(layer)));
     let mut stop = updates.stop.subscribe();
-    // The newest of each is new to this browser.
-    run.mark_changed();
-    health.mark_changed();
-    objects.mark_changed();
-    for pictures in [&mut scan, &mut raster, &mut points] {
-        pictures.mark_changed();
-    }
     let mut wanted = Wanted {
         view: Arc::clone(&view),
         layers: [false; 4],
@@ -89,13 +85,13 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
                 Some(Ok(Message::Close(_)) | Err(_)) | None => return,
                 Some(Ok(_)) => None,
             },
-            Ok(()) = run.changed() => text(&mut run),
-            Ok(()) = health.changed() => text(&mut health),
-            _ = tick.tick() => view.poses(&mut cursor, &mut last).map(Message::Text),
-            Ok(()) = objects.changed(), if wanted.has(Layer::Objects) => text(&mut objects),
-            Ok(()) = points.changed(), if wanted.has(Layer::Points) => binary(&mut points),
-            Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => binary(&mut raster),
-            Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => binary(&mut scan),
+            Ok(()) = run.changed() => newest(&mut run),
+            Ok(()) = health.changed() => newest(&mut health),
+            _ = tick.tick() => view.poses(&mut cursor, &mut last),
+            Ok(()) = objects.changed(), if wanted.has(Layer::Objects) => newest(&mut objects),
+            Ok(()) = points.changed(), if wanted.has(Layer::Points) => newest(&mut points),
+            Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => newest(&mut raster),
+            Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => newest(&mut scan),
         };
         let Some(message) = message else { continue };
         let is_last = matches!(message, Message::Close(_));
@@ -107,12 +103,6 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
 }
 
 /// Returns the newest message of a channel; `None` if nothing was ever sent.
-fn text(updates: &mut Receiver<axum::extract::ws::Utf8Bytes>) -> Option<Message> {
-    let newest = updates.borrow_and_update().clone();
-    (!newest.is_empty()).then_some(Message::Text(newest))
-}
-
-fn binary(updates: &mut Receiver<axum::body::Bytes>) -> Option<Message> {
-    let newest = updates.borrow_and_update().clone();
-    (!newest.is_empty()).then_some(Message::Binary(newest))
+fn newest(updates: &mut Receiver<Option<Message>>) -> Option<Message> {
+    updates.borrow_and_update().clone()
 }

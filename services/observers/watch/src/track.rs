@@ -7,14 +7,12 @@ use serde::Serialize;
 const MAX_VERTICES: usize = 4000;
 /// The first distance between two vertices, m.
 const SPACING_M: f64 = 0.25;
-/// The turn after which there is a vertex in any case, rad.
 const TURN_RAD: f64 = 0.1;
 
 /// A pose: x, y (m), yaw (rad), and the covariance of the position: xx, xy, yy (m^2).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Vertex(pub [f64; 6]);
 
-/// The vertices so far.
 #[derive(Debug)]
 pub struct Track {
     vertices: Vec<Vertex>,
@@ -33,7 +31,6 @@ pub struct Cursor {
 }
 
 impl Vertex {
-    /// Returns the vertex of a pose.
     pub fn of(pose: &PoseHeader) -> Self {
         let [xx, xy, _, yy, _, _] = pose.covariance;
         Self([pose.x_m, pose.y_m, pose.yaw_rad, xx, xy, yy])
@@ -96,7 +93,6 @@ impl Track {
         (&self.vertices[first..], replaces)
     }
 
-    /// Removes all vertices, for another run.
     pub fn clear(&mut self) {
         *self = Self {
             version: self.version + 1,

@@ -9,6 +9,8 @@ use super::{TrackedObject, TrueObject, distance_m, share};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Band(f64, f64);
 
+pub(super) const ALL: Band = Band(0.0, f64::INFINITY);
+
 /// Bands of range, m. Up to 60 m a beam of 1.8 degrees is no wider than a car, and a step of 0.9
 /// degrees no wider than half of one.
 pub(super) const RANGES_M: [Band; 3] =
@@ -18,7 +20,6 @@ pub(super) const SPEEDS_MPS: [Band; 3] =
     [Band(0.0, 5.0), Band(5.0, 10.0), Band(10.0, f64::INFINITY)];
 
 impl Band {
-    /// Returns whether a value is in it.
     pub fn contains(&self, value: f64) -> bool {
         (self.0..self.1).contains(&value)
     }
@@ -32,9 +33,7 @@ pub struct ObjectBand {
     pub from: f64,
     /// The upper bound, m or m/s; `None`: the band has no end.
     pub to: Option<f64>,
-    /// Required objects, once for each scan.
     pub required: usize,
-    /// Share of them that were matched.
     pub recall: f64,
     /// Share of the tracked ones that were matched.
     pub precision: f64,
@@ -47,32 +46,26 @@ pub struct ObjectBand {
 }
 
 impl ObjectBand {
-    /// Returns the figures in a line.
     pub(super) fn line(&self, unit: &str) -> String {
         let band = match self.to {
             Some(to) => format!("{} to {to} {unit}", self.from),
             None => format!("from {} {unit}", self.from),
         };
+        let [recall, precision] = [self.recall, self.precision].map(|it| 100.0 * it);
+        let (position, velocity) = (self.position_rmse_m, self.velocity_rmse_mps);
+        let (heading, required) = (self.heading_rmse_deg, self.required);
         format!(
-            "{band:<13} recall {:.1} %, precision {:.1} %, {:.2} m, {:.2} m/s, {:.1} deg, of {}",
-            100.0 * self.recall,
-            100.0 * self.precision,
-            self.position_rmse_m,
-            self.velocity_rmse_mps,
-            self.heading_rmse_deg,
-            self.required
+            "{band:<13} recall {recall:.1} %, precision {precision:.1} %, {position:.2} m, {velocity:.2} m/s, {heading:.1} deg, of {required}"
         )
     }
 }
 
-/// Sums over required objects.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     pub required: usize,
     pub matched: usize,
     pub false_positives: usize,
     position_m2: f64,
-    /// Pairs whose true velocity is known.
     moving_pairs: usize,
     velocity_m2_s2: f64,
     heading_rad2: f64,
@@ -80,7 +73,6 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Adds a required object, and what matches it.
     pub fn add(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
         self.required += 1;
         let Some(found) = found else {
@@ -99,42 +91,22 @@ impl Sums {
         self.nees += (error.transpose() * inverse * error)[0] / 2.0;
     }
 
-    pub fn recall(&self) -> f64 {
-        share(self.matched as f64, self.required)
-    }
-
-    pub fn precision(&self) -> f64 {
-        share(self.matched as f64, self.matched + self.false_positives)
-    }
-
-    pub fn position_rmse_m(&self) -> f64 {
-        share(self.position_m2, self.matched).sqrt()
-    }
-
-    pub fn velocity_rmse_mps(&self) -> f64 {
-        share(self.velocity_m2_s2, self.moving_pairs).sqrt()
-    }
-
-    pub fn heading_rmse_deg(&self) -> f64 {
-        let squares_rad2 = share(self.heading_rad2, self.moving_pairs);
-        squares_rad2.sqrt().to_degrees()
-    }
-
     pub fn velocity_nees(&self) -> f64 {
         share(self.nees, self.moving_pairs)
     }
 
-    /// Returns the figures of a band whose sums they are.
     pub fn in_band(&self, band: &Band) -> ObjectBand {
         ObjectBand {
             from: band.0,
             to: Some(band.1).filter(|bound| bound.is_finite()),
             required: self.required,
-            recall: self.recall(),
-            precision: self.precision(),
-            position_rmse_m: self.position_rmse_m(),
-            velocity_rmse_mps: self.velocity_rmse_mps(),
-            heading_rmse_deg: self.heading_rmse_deg(),
+            recall: share(self.matched as f64, self.required),
+            precision: share(self.matched as f64, self.matched + self.false_positives),
+            position_rmse_m: share(self.position_m2, self.matched).sqrt(),
+            velocity_rmse_mps: share(self.velocity_m2_s2, self.moving_pairs).sqrt(),
+            heading_rmse_deg: share(self.heading_rad2, self.moving_pairs)
+                .sqrt()
+                .to_degrees(),
         }
     }
 }

@@ -33,19 +33,14 @@ pub struct Hota {
 
 impl fmt::Display for Hota {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            hota,
-            detection,
-            association,
-        } = self;
         write!(
             f,
-            "{hota:.3}: detection {detection:.3}, association {association:.3}"
+            "{:.3}: detection {:.3}, association {:.3}",
+            self.hota, self.detection, self.association
         )
     }
 }
 
-/// The objects of a scan that are compared.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Compared {
     truth: Vec<u64>,
@@ -91,12 +86,11 @@ impl Identities {
     fn of(scans: &[Compared]) -> Self {
         let mut identities = Self::default();
         for scan in scans {
-            for (ids, counts) in [
-                (&scan.truth, &mut identities.truth),
-                (&scan.tracked, &mut identities.tracked),
-            ] {
-                ids.iter()
-                    .for_each(|id| *counts.entry(*id).or_default() += 1.0);
+            for id in &scan.truth {
+                *identities.truth.entry(*id).or_default() += 1.0;
+            }
+            for id in &scan.tracked {
+                *identities.tracked.entry(*id).or_default() += 1.0;
             }
             let similarity = &scan.similarity;
             for (row, column) in scan.all() {
@@ -144,21 +138,16 @@ impl Hota {
                 let similarity = scan.similarity[row][column] + ROUNDING;
                 let reached = (similarity / LEVEL_STEP) as usize;
                 let counts = matches.entry(scan.identities(row, column)).or_default();
-                counts
-                    .iter_mut()
-                    .take(reached)
-                    .for_each(|count| *count += 1);
+                let counts = counts.iter_mut().take(reached);
+                counts.for_each(|count| *count += 1);
             }
         }
+        let both = identities.truth.values().chain(identities.tracked.values());
+        let all: f64 = both.sum();
         let mut sum = Self::default();
         for level in 0..LEVELS {
             let counts = || matches.iter().map(|(ids, counts)| (*ids, counts[level]));
             let pairs: usize = counts().map(|(_, count)| count).sum();
-            let all: f64 = identities
-                .truth
-                .values()
-                .chain(identities.tracked.values())
-                .sum();
             let overlap = |(ids, count)| count as f64 * identities.overlap(ids, count as f64);
             let detection = share(pairs as f64, all as usize - pairs);
             let association = share(counts().map(overlap).sum(), pairs);
@@ -179,7 +168,6 @@ impl Hota {
 mod tests {
     use super::*;
 
-    /// A scan with one true object, and one tracked one that is so similar.
     fn scan(tracked: u64, similarity: f64) -> Compared {
         Compared {
             truth: vec![1],
@@ -222,12 +210,10 @@ mod tests {
         let up_to = (4.0 / 5.0f64, 1.0);
         let above = (3.0 / 6.0f64, 3.0 / 5.0);
         let mean = |low: f64, high: f64| (16.0 * low + 3.0 * high) / 19.0;
+        let detection = found.detection - mean(up_to.0, above.0);
+        let association = found.association - mean(up_to.1, above.1);
         assert!(
-            (found.detection - mean(up_to.0, above.0)).abs() < 1e-12,
-            "{found}"
-        );
-        assert!(
-            (found.association - mean(up_to.1, above.1)).abs() < 1e-12,
+            detection.abs() < 1e-12 && association.abs() < 1e-12,
             "{found}"
         );
     }

@@ -22,45 +22,22 @@ const BAND: RGBColor = RGBColor(205, 226, 243);
 /// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma
 /// band.
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
-    let last = bands
-        .chains
-        .iter()
-        .flatten()
-        .map(|sample| sample.time_s)
-        .reduce(f64::max)
-        .ok_or(PlotError::Empty)?;
-    let legend = [
-        Entry {
-            label: "estimate - ground truth",
-            symbol: Symbol::Line(line(ESTIMATE, 2.0)),
-        },
-        Entry {
-            label: "+-3 sigma",
-            symbol: Symbol::Area(BAND),
-        },
-    ];
-    let panels = [
-        Panel::new(bands, "x (m)", 0, 1.0),
-        Panel::new(bands, "y (m)", 1, 1.0),
-        Panel::new(bands, "yaw (deg)", 2, 1f64.to_degrees()),
-    ];
+    let times_s = bands.chains.iter().flatten().map(|sample| sample.time_s);
+    let last = times_s.reduce(f64::max).ok_or(PlotError::Empty)?;
+    let error = ("estimate - ground truth", Symbol::Line(line(ESTIMATE, 2.0)));
+    let legend = [error, ("+-3 sigma", Symbol::Area(BAND))];
+    let title = "Error over time with 3-sigma bands";
     document(SIZE, |area| {
-        header(
-            area,
-            "Error over time with 3-sigma bands",
-            &caption(bands),
-            &legend,
-        )?;
+        header(area, title, &caption(bands), &legend)?;
         let mut rest = area.split_vertically(px(f64::from(HEADER))).1;
-        for (index, panel) in panels.iter().enumerate() {
+        for (part, y_desc) in ["x (m)", "y (m)", "yaw (deg)"].into_iter().enumerate() {
             let (this, below) = rest.split_vertically(px(f64::from(PANEL)));
-            let is_last = index + 1 == panels.len();
-            draw_panel(
-                if is_last { &rest } else { &this },
-                panel,
-                0.0..last,
-                is_last,
-            )?;
+            // The last panel has the time axis.
+            let (area, x_desc) = match part {
+                2 => (&rest, Some("time (s)")),
+                _ => (&this, None),
+            };
+            draw_panel(area, &chains(bands, part), 0.0..last, x_desc, y_desc)?;
             rest = below;
         }
         Ok(())
@@ -78,86 +55,48 @@ fn caption(bands: &Bands) -> String {
     }
 }
 
-/// One of the three diagrams.
-struct Panel {
-    y_desc: &'static str,
-    chains: Vec<Vec<Point>>,
-}
+/// A time, s, and the error and half the band's width then, m or degrees.
+type Point = [f64; 3];
 
-/// Error and half the band's width, in the panel's unit.
-#[derive(Clone, Copy)]
-struct Point {
-    time_s: f64,
-    error: f64,
-    band: f64,
-}
-
-impl Panel {
-    /// The panel of one component (x, y, yaw) of the error; `scale` units of the panel are one SI
-    /// unit.
-    fn new(bands: &Bands, y_desc: &'static str, part: usize, scale: f64) -> Self {
-        let point = |s: &BandSample| Point {
-            time_s: s.time_s,
-            error: scale * s.error[part],
-            band: SIGMAS * scale * s.sigma[part],
-        };
-        Self {
-            y_desc,
-            chains: bands
-                .chains
-                .iter()
-                .map(|chain| chain.iter().map(point).collect())
-                .collect(),
-        }
-    }
-
-    /// Returns a range that is symmetric about zero and contains all errors and bands.
-    fn range(&self) -> Range<f64> {
-        let largest = self
-            .chains
-            .iter()
-            .flatten()
-            .map(|p| p.error.abs().max(p.band))
-            .fold(0.0, f64::max);
-        let top = if largest > 1e-9 {
-            (1.0 + HEADROOM) * largest
-        } else {
-            1.0
-        };
-        -top..top
-    }
+/// Returns one component (x, y, yaw) of the errors in each chain.
+fn chains(bands: &Bands, part: usize) -> Vec<Vec<Point>> {
+    let scale = if part == 2 { 1f64.to_degrees() } else { 1.0 };
+    let point = |s: &BandSample| {
+        let (error, sigma) = (scale * s.error[part], scale * s.sigma[part]);
+        [s.time_s, error, SIGMAS * sigma]
+    };
+    let chains = bands.chains.iter();
+    let chains = chains.map(|chain| chain.iter().map(point).collect());
+    chains.collect()
 }
 
 fn draw_panel(
     area: &Area<'_>,
-    panel: &Panel,
+    chains: &[Vec<Point>],
     time_s: Range<f64>,
-    with_time_axis: bool,
+    x_desc: Option<&str>,
+    y_desc: &str,
 ) -> Result<(), PlotError> {
-    let mut builder = within_margins(area, 16.0);
-    if with_time_axis {
-        builder.set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(TIME_AXIS)));
+    let size = |[_, error, band]: &Point| error.abs().max(*band);
+    let largest = chains.iter().flatten().map(size).fold(0.0, f64::max);
+    let top = match largest > 1e-9 {
+        true => (1.0 + HEADROOM) * largest,
+        false => 1.0,
+    };
+    let below = x_desc.map_or(0, |_| TIME_AXIS);
+    let mut chart = chart(area, [16, below], time_s.clone(), -top..top)?;
+    for chain in chains {
+        let upper = chain.iter().map(|[time_s, _, band]| (*time_s, *band));
+        let lower = chain.iter().rev().map(|[time_s, _, band]| (*time_s, -band));
+        let band = Polygon::new(upper.chain(lower).collect::<Vec<_>>(), BAND.filled());
+        chart.draw_series([band]).map_err(drawing)?;
     }
-    let mut chart = builder
-        .build_cartesian_2d(time_s.clone(), panel.range())
-        .map_err(drawing)?;
-    for chain in &panel.chains {
-        chart.draw_series([band(chain)]).map_err(drawing)?;
-    }
-    let x_desc = with_time_axis.then_some("time (s)");
-    axes(&mut chart, [10, 5], x_desc, panel.y_desc)?;
+    axes(&mut chart, [10, 5], x_desc, y_desc)?;
     let ends = [(time_s.start, 0.0), (time_s.end, 0.0)];
     curve(&mut chart, ends, line(TRUTH, 1.0))?;
-    for chain in &panel.chains {
-        let errors = chain.iter().map(|p| (p.time_s, p.error));
+    for chain in chains {
+        let errors = chain.iter().map(|[time_s, error, _]| (*time_s, *error));
         curve(&mut chart, errors, line(ESTIMATE, 2.0))?;
     }
     Ok(())
-}
-
-/// Returns the area between both limits.
-fn band(chain: &[Point]) -> Polygon<(f64, f64)> {
-    let upper = chain.iter().map(|p| (p.time_s, p.band));
-    let lower = chain.iter().rev().map(|p| (p.time_s, -p.band));
-    Polygon::new(upper.chain(lower).collect::<Vec<_>>(), BAND.filled())
 }

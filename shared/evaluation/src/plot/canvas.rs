@@ -11,10 +11,8 @@ use plotters::{
 
 use super::PlotError;
 
-/// An area of the SVG.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// A diagram with two axes.
 pub type Chart<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
@@ -22,66 +20,47 @@ pub type Chart<'a, 'b> =
 /// everything is drawn this much larger and shown smaller.
 const UNITS_PER_PX: u32 = 8;
 
-/// The colour of the estimate and of errors.
 pub const ESTIMATE: RGBColor = RGBColor(0, 98, 178);
-/// The colour of the ground truth.
 pub const TRUTH: RGBColor = RGBColor(120, 124, 130);
-/// The colour of marks on top of lines.
 pub const MARK: RGBColor = RGBColor(213, 94, 0);
-/// The colour of text.
+/// The colours of text, of secondary text, and of grid lines.
 pub const INK: RGBColor = RGBColor(34, 38, 44);
-/// The colour of secondary text.
 pub const QUIET: RGBColor = RGBColor(96, 102, 110);
-/// The colour of grid lines.
 pub const GRID: RGBColor = RGBColor(226, 229, 233);
 
 /// Height of the header, px.
 pub const HEADER: u32 = 84;
 
-/// Returns a length in px of the shown document in canvas units.
 pub fn px(length: f64) -> u32 {
     (length * f64::from(UNITS_PER_PX)).round() as u32
 }
 
 /// Returns a font of `size` px. The SVG back end divides sizes by 1.24, which is compensated here.
 pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
-    ("sans-serif", 1.24 * size * f64::from(UNITS_PER_PX))
-        .into_font()
-        .color(&colour)
+    let size = 1.24 * size * f64::from(UNITS_PER_PX);
+    ("sans-serif", size).into_font().color(&colour)
 }
 
-/// Returns the style of a line of `width` px.
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width))
 }
 
-/// Returns an empty diagram with its axes and their descriptions.
+/// Returns an empty diagram with margins, `bottom` px the lowest, and space for labels on the left
+/// and, `below` px, below it.
 pub fn chart<'a, 'b>(
     area: &Area<'b>,
+    [bottom, below]: [u32; 2],
     x: Range<f64>,
     y: Range<f64>,
-    [x_desc, y_desc]: [&str; 2],
 ) -> Result<Chart<'a, 'b>, PlotError> {
-    let mut chart = within_margins(area, 16.0)
-        .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
-        .build_cartesian_2d(x, y)
-        .map_err(drawing)?;
-    axes(&mut chart, [10, 5], Some(x_desc), y_desc)?;
-    Ok(chart)
-}
-
-/// Returns a diagram to be built with margins, `bottom` px the lowest, and labels on the left.
-pub fn within_margins<'a, 'b>(
-    area: &'a Area<'b>,
-    bottom: f64,
-) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
-    let mut builder = ChartBuilder::on(area);
-    builder
+    ChartBuilder::on(area)
         .margin_left(px(20.0))
         .margin_right(px(20.0))
-        .margin_bottom(px(bottom))
-        .set_label_area_size(LabelAreaPosition::Left, px(84.0));
-    builder
+        .margin_bottom(px(f64::from(bottom)))
+        .set_label_area_size(LabelAreaPosition::Left, px(84.0))
+        .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(below)))
+        .build_cartesian_2d(x, y)
+        .map_err(drawing)
 }
 
 /// Draws the grid and both axes with about so many ticks, and their descriptions.
@@ -109,7 +88,6 @@ pub fn axes(
     mesh.draw().map_err(drawing)
 }
 
-/// Draws a line through points.
 pub fn curve(
     chart: &mut Chart<'_, '_>,
     points: impl IntoIterator<Item = (f64, f64)>,
@@ -119,7 +97,6 @@ pub fn curve(
     chart.draw_series(series).map(drop).map_err(drawing)
 }
 
-/// Returns a white document of `size` px with what `draw` draws.
 pub fn document(
     size: (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
@@ -140,19 +117,11 @@ pub fn document(
     Ok(svg.replacen(&as_drawn, &as_shown, 1))
 }
 
-/// One entry of a legend.
-pub struct Entry<'a> {
-    /// The text.
-    pub label: &'a str,
-    /// The symbol in front of the text.
-    pub symbol: Symbol,
-}
+/// An entry of a legend: its label and its symbol.
+pub type Entry<'a> = (&'a str, Symbol);
 
-/// The symbol of a legend entry.
 pub enum Symbol {
-    /// A piece of a line.
     Line(ShapeStyle),
-    /// A filled area.
     Area(RGBColor),
     /// A dot of [`MARK`]'s colour.
     Dot,
@@ -166,48 +135,34 @@ pub fn header(
     legend: &[Entry<'_>],
 ) -> Result<(), PlotError> {
     let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
-    area.draw(&Text::new(
-        title.to_owned(),
-        at(24.0, 18.0),
-        font(20.0, INK),
-    ))
-    .map_err(drawing)?;
-    area.draw(&Text::new(
-        caption.to_owned(),
-        at(24.0, 48.0),
-        font(14.0, QUIET),
-    ))
-    .map_err(drawing)?;
-    let label = font(14.0, INK).pos(text_anchor::Pos::new(
-        text_anchor::HPos::Left,
-        text_anchor::VPos::Center,
-    ));
+    let write = |text: &str, at: (i32, i32), font: TextStyle<'static>| {
+        area.draw(&Text::new(text.to_owned(), at, font))
+            .map_err(drawing)
+    };
+    write(title, at(24.0, 18.0), font(20.0, INK))?;
+    write(caption, at(24.0, 48.0), font(14.0, QUIET))?;
+    let centre = text_anchor::Pos::new(text_anchor::HPos::Left, text_anchor::VPos::Center);
+    let label = font(14.0, INK).pos(centre);
     let width = f64::from(area.dim_in_pixel().0) / f64::from(UNITS_PER_PX);
     let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
     for entry in legend {
-        match entry.symbol {
+        match entry.1 {
             Symbol::Line(style) => {
                 area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style))
             }
-            Symbol::Area(colour) => area.draw(&Rectangle::new(
-                [at(x, 21.0), at(x + 26.0, 35.0)],
-                colour.filled(),
-            )),
+            Symbol::Area(colour) => {
+                let corners = [at(x, 21.0), at(x + 26.0, 35.0)];
+                area.draw(&Rectangle::new(corners, colour.filled()))
+            }
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;
-        area.draw(&Text::new(
-            entry.label.to_owned(),
-            at(x + 33.0, 28.0),
-            label.clone(),
-        ))
-        .map_err(drawing)?;
+        write(entry.0, at(x + 33.0, 28.0), label.clone())?;
         x += entry_width(entry);
     }
     Ok(())
 }
 
-/// Returns a mark.
 pub fn dot<C>(at: C) -> Circle<C, u32> {
     Circle::new(at, px(6.0), MARK.filled())
 }
@@ -216,20 +171,15 @@ pub fn dot<C>(at: C) -> Circle<C, u32> {
 pub fn number(value: &f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    if text == "-0" { "0" } else { text }.to_owned()
 }
 
 /// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as
 /// high.
 fn entry_width(entry: &Entry<'_>) -> f64 {
-    33.0 + 7.6 * entry.label.len() as f64 + 14.0
+    33.0 + 7.6 * entry.0.len() as f64 + 14.0
 }
 
-/// Converts an error of the drawing library.
 pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
     PlotError::Draw(error.to_string())
 }

@@ -1,5 +1,7 @@
 //! Errors over distance.
 
+use std::ops::Range;
+
 use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
@@ -9,6 +11,10 @@ use crate::{Evaluation, Kitti, Rpe};
 const SIZE: (u32, u32) = (900, 640);
 /// Margin above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
+
+/// The errors of translation and of rotation, each with a description, points and a mean, which is
+/// drawn as a dashed line.
+type Panels = [(&'static str, Vec<(f64, f64)>, f64); 2];
 
 /// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the
 /// RPE over the distance travelled.
@@ -21,133 +27,74 @@ pub fn errors_svg(evaluation: &Evaluation) -> Result<String, PlotError> {
 }
 
 fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
-    let points = |value: fn(&crate::kitti::KittiLength) -> f64| -> Vec<(f64, f64)> {
-        kitti
-            .by_length
-            .iter()
-            .map(|l| (l.length_m, value(l)))
-            .collect()
-    };
+    let (translation, rotation) = (kitti.translation_percent, kitti.rotation_deg_per_100m);
     let caption = format!(
-        "mean over {} segments, step {}: {:.2} %, {:.2} deg/100 m (dashed)",
-        kitti.segments, kitti.step, kitti.translation_percent, kitti.rotation_deg_per_100m
+        "mean over {} segments, step {}: {translation:.2} %, {rotation:.2} deg/100 m (dashed)",
+        kitti.segments, kitti.step
     );
-    let longest = kitti.by_length.last().map_or(100.0, |l| l.length_m);
-    let panel = |y_desc, values, mean| Panel {
-        x_desc: "segment length (m)",
-        y_desc,
-        values,
-        mean: Some(mean),
-        x: 50.0..longest + 50.0,
-    };
+    let lengths = || kitti.by_length.iter();
+    let translations = lengths().map(|l| (l.length_m, l.translation_percent));
+    let rotations = lengths().map(|l| (l.length_m, l.rotation_deg_per_100m));
+    let longest = lengths().last().map_or(100.0, |l| l.length_m);
+    let title = "KITTI errors over segment length";
     draw(
-        "KITTI errors over segment length",
-        &caption,
+        [title, &caption, "segment length (m)"],
+        50.0..longest + 50.0,
         [
-            panel(
-                "translation (%)",
-                points(|l| l.translation_percent),
-                kitti.translation_percent,
-            ),
-            panel(
-                "rotation (deg/100 m)",
-                points(|l| l.rotation_deg_per_100m),
-                kitti.rotation_deg_per_100m,
-            ),
+            ("translation (%)", translations.collect(), translation),
+            ("rotation (deg/100 m)", rotations.collect(), rotation),
         ],
     )
 }
 
 fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
-    let points = |value: fn(&crate::PairError) -> f64| -> Vec<(f64, f64)> {
-        rpe.pairs.iter().map(|p| (p.distance_m, value(p))).collect()
-    };
+    let (translation, rotation) = (rpe.translation_rmse_m, rpe.rotation_rmse_deg);
     let caption = format!(
-        "{} pairs, path too short for segments of 100 m; rmse {:.3} m, {:.3} deg (dashed)",
-        rpe.pairs.len(),
-        rpe.translation_rmse_m,
-        rpe.rotation_rmse_deg
+        "{} pairs, path too short for segments of 100 m; rmse {translation:.3} m, {rotation:.3} deg (dashed)",
+        rpe.pairs.len()
     );
-    let end = rpe.pairs.last().map_or(0.0, |p| p.distance_m).max(1.0);
-    let panel = |y_desc, values, mean| Panel {
-        x_desc: "distance travelled (m)",
-        y_desc,
-        values,
-        mean: Some(mean),
-        x: 0.0..1.03 * end,
-    };
+    let pairs = || rpe.pairs.iter();
+    let translations = pairs().map(|p| (p.distance_m, p.translation_m));
+    let rotations = pairs().map(|p| (p.distance_m, p.rotation_deg.abs()));
+    let end = pairs().last().map_or(0.0, |p| p.distance_m).max(1.0);
+    let title = "Relative pose error over distance";
     draw(
-        "Relative pose error over distance",
-        &caption,
+        [title, &caption, "distance travelled (m)"],
+        0.0..1.03 * end,
         [
-            panel(
-                "translation (m)",
-                points(|p| p.translation_m),
-                rpe.translation_rmse_m,
-            ),
-            panel(
-                "rotation (deg)",
-                points(|p| p.rotation_deg.abs()),
-                rpe.rotation_rmse_deg,
-            ),
+            ("translation (m)", translations.collect(), translation),
+            ("rotation (deg)", rotations.collect(), rotation),
         ],
     )
 }
 
-/// One of the two diagrams.
-struct Panel {
-    x_desc: &'static str,
-    y_desc: &'static str,
-    values: Vec<(f64, f64)>,
-    /// Drawn as a dashed line.
-    mean: Option<f64>,
-    x: std::ops::Range<f64>,
-}
-
-fn draw(title: &str, caption: &str, panels: [Panel; 2]) -> Result<String, PlotError> {
+fn draw(
+    [title, caption, x_desc]: [&str; 3],
+    x: Range<f64>,
+    panels: Panels,
+) -> Result<String, PlotError> {
     document(SIZE, |area| {
         header(area, title, caption, &[])?;
         let below_header = area.split_vertically(px(f64::from(HEADER))).1;
-        for (area, panel) in below_header.split_evenly((2, 1)).iter().zip(&panels) {
-            draw_panel(area, panel)?;
+        for (area, (y_desc, values, mean)) in below_header.split_evenly((2, 1)).iter().zip(panels) {
+            let largest = values.iter().map(|v| v.1).fold(0.0, f64::max);
+            // An estimate without error still needs an axis.
+            let top = match largest > 1e-9 {
+                true => (1.0 + HEADROOM) * largest,
+                false => 1.0,
+            };
+            let mut chart = chart(area, [16, 46], x.clone(), 0.0..top)?;
+            axes(&mut chart, [10, 5], Some(x_desc), y_desc)?;
+            let ends = [(x.start, mean), (x.end, mean)];
+            let dashed = DashedLineSeries::new(ends, px(6.0), px(5.0), line(MARK, 1.5));
+            chart.draw_series(dashed).map_err(drawing)?;
+            curve(&mut chart, values.iter().copied(), line(ESTIMATE, 2.0))?;
+            // Dots as long as they do not overlap.
+            if values.len() <= 60 {
+                let dot = |&at: &(f64, f64)| Circle::new(at, px(4.0), ESTIMATE.filled());
+                chart.draw_series(values.iter().map(dot)).map_err(drawing)?;
+            }
         }
         Ok(())
     })
-}
-
-fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
-    let largest = panel.values.iter().map(|v| v.1).fold(0.0, f64::max);
-    // An estimate without error still needs an axis.
-    let top = if largest > 1e-9 {
-        (1.0 + HEADROOM) * largest
-    } else {
-        1.0
-    };
-    let mut chart = chart(
-        area,
-        panel.x.clone(),
-        0.0..top,
-        [panel.x_desc, panel.y_desc],
-    )?;
-    if let Some(mean) = panel.mean {
-        let ends = [(panel.x.start, mean), (panel.x.end, mean)];
-        chart
-            .draw_series(DashedLineSeries::new(
-                ends,
-                px(6.0),
-                px(5.0),
-                line(MARK, 1.5),
-            ))
-            .map_err(drawing)?;
-    }
-    let values = panel.values.iter().copied();
-    curve(&mut chart, values, line(ESTIMATE, 2.0))?;
-    // Dots as long as they do not overlap.
-    if panel.values.len() <= 60 {
-        let dot = |&at: &(f64, f64)| Circle::new(at, px(4.0), ESTIMATE.filled());
-        chart
-            .draw_series(panel.values.iter().map(dot))
-            .map_err(drawing)?;
-    }
-    Ok(())
 }

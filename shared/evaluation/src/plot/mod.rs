@@ -13,7 +13,6 @@ pub use trajectory::{path_svg, paths_svg, trajectory_svg};
 
 use crate::EvaluationError;
 
-/// The reason why a plot was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
     /// There is no pose to draw.

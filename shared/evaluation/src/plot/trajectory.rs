@@ -5,11 +5,11 @@ use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
 use crate::{
-    MatchedPoses, Side, ate,
+    MatchedPoses, ate,
+    error::ESTIMATE as NAME,
     matched::{path_m, require_poses},
 };
 
-/// Largest plotting area, px.
 const LARGEST: (f64, f64) = (900.0, 720.0);
 /// Smallest plotting area, px: the header needs the width.
 const SMALLEST: (f64, f64) = (600.0, 260.0);
@@ -19,7 +19,6 @@ const BELOW: u32 = 48;
 const MARGIN: u32 = 20;
 /// Border around the paths, as a share of the larger extent.
 const BORDER: f64 = 0.06;
-/// Smallest extent shown, m.
 const MIN_EXTENT_M: f64 = 1.0;
 
 /// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or
@@ -30,7 +29,7 @@ pub fn trajectory_svg(
 ) -> Result<String, PlotError> {
     match matched {
         Some(matched) => {
-            require_poses(Side::Estimate, estimate)?;
+            require_poses(NAME, estimate)?;
             scene_svg(&Scene::matched(matched))
         }
         None => path_svg(estimate, estimate.len(), path_m(estimate)),
@@ -40,7 +39,7 @@ pub fn trajectory_svg(
 /// Returns the plot of a trajectory with this number of poses and this length; only the poses
 /// `drawn` are plotted.
 pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
-    require_poses(Side::Estimate, drawn)?;
+    require_poses(NAME, drawn)?;
     scene_svg(&Scene {
         paths: vec![("estimate", positions(drawn))],
         truth: None,
@@ -53,7 +52,7 @@ pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, P
 /// one.
 pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<String, PlotError> {
     for (_, poses) in paths {
-        require_poses(Side::Estimate, poses)?;
+        require_poses(NAME, poses)?;
     }
     let positions = |poses: &[Pose]| positions(poses);
     let title = match paths {
@@ -87,9 +86,7 @@ fn scene_svg(scene: &Scene<'_>) -> Result<String, PlotError> {
     })
 }
 
-/// The content of the plot, positions in m.
 struct Scene<'a> {
-    /// The estimates by their names.
     paths: Vec<(&'a str, Vec<(f64, f64)>)>,
     truth: Option<Vec<(f64, f64)>>,
     title: &'static str,
@@ -99,51 +96,39 @@ struct Scene<'a> {
 impl Scene<'_> {
     fn matched(matched: &MatchedPoses) -> Self {
         let ate = ate(matched);
-        let aligned: Vec<_> = matched
-            .estimate()
-            .iter()
-            .map(|p| ate.truth_from_estimate * p)
-            .collect();
+        let rmse_m = ate.rmse_m;
+        let align = |pose: &Pose| ate.truth_from_estimate * pose;
+        let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
         Self {
             paths: vec![("estimate", positions(&aligned))],
             truth: Some(positions(matched.truth())),
             title: "Trajectory and ground truth",
-            caption: format!(
-                "estimate after SE(2) alignment; ATE {:.2} m rmse",
-                ate.rmse_m
-            ),
+            caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
         }
     }
 
     fn legend(&self) -> Vec<Entry<'_>> {
-        let entry = |label, style| Entry {
-            label,
-            symbol: Symbol::Line(style),
-        };
-        let truth = self
-            .truth
-            .iter()
-            .map(|_| entry("ground truth", line(TRUTH, 4.0)));
+        let entry = |label, style| (label, Symbol::Line(style));
+        let truth = self.truth.iter();
+        let truth = truth.map(|_| entry("ground truth", line(TRUTH, 4.0)));
         let paths = self.paths.iter().zip(colours());
         let paths = paths.map(|((name, _), colour)| entry(shortened(name), line(colour, 2.0)));
-        let start = Entry {
-            label: "start",
-            symbol: Symbol::Dot,
-        };
+        let start = ("start", Symbol::Dot);
         truth.chain(paths).chain([start]).collect()
     }
 }
 
 /// Returns the colours of estimates: distinct also for those who do not see red and green.
 fn colours() -> impl Iterator<Item = RGBColor> {
-    let others = [
-        (0, 158, 115),
-        (204, 121, 167),
-        (230, 159, 0),
-        (86, 180, 233),
-    ];
-    let others = others.map(|(red, green, blue)| RGBColor(red, green, blue));
-    [ESTIMATE].into_iter().chain(others).cycle()
+    [
+        ESTIMATE,
+        RGBColor(0, 158, 115),
+        RGBColor(204, 121, 167),
+        RGBColor(230, 159, 0),
+        RGBColor(86, 180, 233),
+    ]
+    .into_iter()
+    .cycle()
 }
 
 /// Letters of a name in the legend.
@@ -156,10 +141,8 @@ fn shortened(name: &str) -> &str {
 }
 
 fn positions(poses: &[Pose]) -> Vec<(f64, f64)> {
-    poses
-        .iter()
-        .map(|p| (p.translation.x, p.translation.y))
-        .collect()
+    let position = |pose: &Pose| (pose.translation.x, pose.translation.y);
+    poses.iter().map(position).collect()
 }
 
 /// The part of the plane that is shown, at the same scale on both axes.
@@ -199,10 +182,8 @@ impl View {
 
 fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), PlotError> {
     let below_header = area.split_vertically(px(f64::from(HEADER))).1;
-    let mut chart = within_margins(&below_header, f64::from(MARGIN))
-        .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(BELOW)))
-        .build_cartesian_2d(view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1)
-        .map_err(drawing)?;
+    let (x_m, y_m) = (view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1);
+    let mut chart = chart(&below_header, [MARGIN, BELOW], x_m, y_m)?;
     // One tick in about 90 px on both axes.
     let ticks = [view.width_px, view.height_px].map(|px| (px / 90).max(2) as usize);
     axes(&mut chart, ticks, Some("x (m)"), "y (m)")?;

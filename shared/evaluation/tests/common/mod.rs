@@ -1,8 +1,20 @@
 //! Drives for tests.
 #![allow(dead_code)] // No test uses all of it.
 
+use std::num::NonZeroUsize;
+
+use gyre_evaluation::{Association, Evaluation, Options, TimedPoses, evaluate};
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
+
+pub fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
+    let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
+    let options = Options {
+        step: NonZeroUsize::new(step).unwrap(),
+        association: Association::Index,
+    };
+    evaluate(estimate, truth, &options).unwrap()
+}
 
 /// Returns the poses of motions from `start`.
 pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> {
@@ -19,10 +31,8 @@ pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> 
 /// repeat every `bend` motions, more to the left.
 pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
-    chain(
-        pose(7.0, -3.0, 0.4),
-        (0..n).map(|k| pose(2.37, 0.0, turn(k))),
-    )
+    let motions = (0..n).map(|k| pose(2.37, 0.0, turn(k)));
+    chain(pose(7.0, -3.0, 0.4), motions)
 }
 
 /// The parameters of a random [`drive`] of 150 m to 1.2 km.

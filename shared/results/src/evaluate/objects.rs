@@ -1,7 +1,7 @@
 //! `gyre evaluate --objects`: the objects of a run against true ones.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_evaluation::{
@@ -17,7 +17,6 @@ use serde::de::DeserializeOwned;
 /// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
 
-/// A row of a run's `objects.csv`.
 #[derive(Deserialize)]
 struct TrackedRow {
     scan: u64,
@@ -47,7 +46,6 @@ struct TrueRow {
     counts: f64,
 }
 
-/// A row of a run's `poses.csv`.
 #[derive(Deserialize)]
 struct PoseRow {
     scan: u64,
@@ -62,7 +60,10 @@ struct PoseRow {
 /// `ground_truth.tum`.
 pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     let poses: Vec<PoseRow> = rows(&run.join("poses.csv"))?;
-    let (folder, truth) = files(truth);
+    let (folder, truth) = match truth.is_dir() {
+        true => (truth, truth.join("objects.csv")),
+        false => (truth.parent().unwrap_or(truth), truth.to_owned()),
+    };
     let true_poses = read_trajectory(&folder.join("ground_truth.tum"))?;
     let mut tracked: BTreeMap<u64, Vec<TrackedRow>> = BTreeMap::new();
     for row in rows::<TrackedRow>(&run.join("objects.csv"))? {
@@ -93,14 +94,6 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
         });
     }
     Ok(object_errors(&scans, &ObjectOptions::default()))
-}
-
-/// The folder of the truth, and the file of its objects.
-fn files(truth: &Path) -> (PathBuf, PathBuf) {
-    match truth.is_dir() {
-        true => (truth.to_owned(), truth.join("objects.csv")),
-        false => (truth.parent().unwrap_or(truth).to_owned(), truth.to_owned()),
-    }
 }
 
 fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {

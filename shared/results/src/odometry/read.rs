@@ -10,19 +10,8 @@ use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
 use gyre_terminal::Failure;
 use serde::Deserialize;
 
-const COLUMNS: [&str; 11] = [
-    "stamp_ns",
-    "interval_ns",
-    "x_m",
-    "y_m",
-    "yaw_rad",
-    "cov_xx",
-    "cov_xy",
-    "cov_xyaw",
-    "cov_yy",
-    "cov_yyaw",
-    "cov_yawyaw",
-];
+const COLUMNS: &str =
+    "stamp_ns interval_ns x_m y_m yaw_rad cov_xx cov_xy cov_xyaw cov_yy cov_yyaw cov_yawyaw";
 
 /// The fields of [`COLUMNS`], and the correlation of the errors of motions: zero if it is missing.
 #[derive(Deserialize)]
@@ -60,7 +49,6 @@ const LONGEST_LINE: usize = 1 << 16;
 /// Refuses a line without end, which would be kept in memory.
 struct ShortLines<R> {
     text: R,
-    /// Bytes of the current line.
     line: usize,
 }
 
@@ -86,14 +74,12 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
         .trim(csv::Trim::All)
         .from_reader(text);
     let header = reader.headers()?;
-    let missing = |name: &&&str| header.iter().all(|column| column != **name);
-    if let Some(name) = COLUMNS.iter().find(missing) {
+    let missing = |name: &&str| header.iter().all(|column| column != *name);
+    if let Some(name) = COLUMNS.split(' ').find(missing) {
         return Err(format!("not an odometry.csv: its header has no column {name}").into());
     }
-    reader
-        .deserialize()
-        .map(|row| MotionRow::motion(&row?))
-        .collect()
+    let rows = reader.deserialize();
+    rows.map(|row| MotionRow::motion(&row?)).collect()
 }
 
 impl MotionRow {
@@ -167,10 +153,8 @@ mod tests {
     fn what_was_written_is_read_whatever_columns_are_beside_it() {
         let (poses, text) = (poses(), csv(&poses()));
         assert_eq!(parse(text.as_bytes()).unwrap(), motions(&poses));
-        let wider: String = text
-            .lines()
-            .map(|line| format!("new,{line},newer\n"))
-            .collect();
+        let wider = text.lines().map(|line| format!("new,{line},newer\n"));
+        let wider: String = wider.collect();
         assert_eq!(parse(wider.as_bytes()).unwrap(), motions(&poses));
     }
 
@@ -178,10 +162,8 @@ mod tests {
     fn an_empty_covariance_is_none_and_the_motion_stays() {
         let read = parse(csv(&poses()).replace("0.040000000000", "").as_bytes()).unwrap();
         assert_eq!(read.len(), 3);
-        assert!(
-            read[0].estimate.motion == motions(&poses())[0].estimate.motion
-                && !read[0].estimate.alone().has_covariance()
-        );
+        assert!(read[0].estimate.motion == motions(&poses())[0].estimate.motion);
+        assert!(!read[0].estimate.alone().has_covariance());
     }
 
     #[test]
@@ -191,10 +173,7 @@ mod tests {
         assert!(refused("").contains("no column stamp_ns"));
         assert!(refused(&text.replacen("cov_yyaw", "c", 1)).contains("no column cov_yyaw"));
         let far = refused(&text.replacen("1.500000000", "far", 1));
-        assert!(
-            far.contains("line: 2") && far.contains("invalid float"),
-            "{far}"
-        );
+        assert!(far.contains("line: 2") && far.contains("invalid float"));
         assert!(refused(&text[..text.len() - 40]).contains("line: 4"));
         let out_of_range = text.replace(",250000000,", ",-9223372036854775808,");
         assert!(refused(&out_of_range).contains("interval_ns"));

@@ -14,9 +14,9 @@ const MOST: usize = 1_000_000;
 /// The poses of a run, up to [`MOST`].
 #[derive(Debug, Default)]
 pub struct Estimate {
-    trajectory: Trajectory,
-    motions: Vec<TimedMotion>,
-    poses: usize,
+    pub trajectory: Trajectory,
+    pub motions: Vec<TimedMotion>,
+    pub poses: usize,
 }
 
 impl Estimate {
@@ -33,22 +33,6 @@ impl Estimate {
         self.motions.extend(odometry::motion(pose));
     }
 
-    /// Returns the number of poses.
-    pub fn poses(&self) -> usize {
-        self.poses
-    }
-
-    /// Returns the poses with the scans' times.
-    pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
-    }
-
-    /// Returns the motions with their times and covariances.
-    pub fn motions(&self) -> &[TimedMotion] {
-        &self.motions
-    }
-
-    /// Checks that no pose was let go.
     pub fn require_all(&self) -> Result<(), Failure> {
         match self.poses <= MOST {
             true => Ok(()),

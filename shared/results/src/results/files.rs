@@ -7,7 +7,6 @@ use gyre_terminal::Failure;
 
 use crate::out::{FILES, Out, SIMULATED_TRUTH};
 
-/// Results that take their places together.
 #[derive(Debug)]
 pub struct Files<'a> {
     out: &'a Out,
@@ -23,17 +22,14 @@ impl<'a> Files<'a> {
         }
     }
 
-    /// Creates a file that is written piece by piece.
     pub fn create(&self, name: &str) -> Result<Draft, Failure> {
         Ok(Draft::create(&self.out.join(name))?)
     }
 
-    /// Adds a file that is written.
     pub fn push(&mut self, draft: Draft) {
         self.drafts.push(draft);
     }
 
-    /// Writes a file and adds it.
     pub fn add(&mut self, name: &str, content: impl AsRef<[u8]>) -> Result<(), Failure> {
         let mut draft = self.create(name)?;
         draft.append(content)?;
@@ -46,10 +42,8 @@ impl<'a> Files<'a> {
         let made = |path: &Path| self.drafts.iter().any(|draft| draft.path() == path);
         // The truth of a simulation is written when the run begins.
         let results = FILES.iter().filter(|name| **name != SIMULATED_TRUTH);
-        let others: Vec<_> = results
-            .map(|name| self.out.join(name))
-            .filter(|path| !made(path))
-            .collect();
+        let paths = results.map(|name| self.out.join(name));
+        let others: Vec<_> = paths.filter(|path| !made(path)).collect();
         self.drafts.into_iter().try_for_each(Draft::commit)?;
         others.iter().try_for_each(|path| storage::remove(path))?;
         Ok(storage::sync_folder(self.out.path())?)

@@ -8,7 +8,6 @@ use gyre_objects::Object;
 use gyre_slam::RecordReader;
 use gyre_terminal::Failure;
 
-/// The header line of `objects.csv`.
 const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,moving,age,\
     cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy\n";
 
@@ -30,29 +29,15 @@ pub fn csv(out: &Path) -> Result<String, Failure> {
 fn write_object(rows: &mut String, object: &Object) -> fmt::Result {
     write!(rows, "{}", object.id)?;
     let (at, velocity) = (object.position, object.velocity);
-    let [length_m, width_m] = [object.length_m, object.width_m];
-    for value in [
-        at.x,
-        at.y,
-        object.yaw_rad,
-        velocity.x,
-        velocity.y,
-        length_m,
-        width_m,
-    ] {
+    let size = [object.length_m, object.width_m];
+    let place = [at.x, at.y, object.yaw_rad, velocity.x, velocity.y];
+    for value in place.into_iter().chain(size) {
         write!(rows, ",{value:.4}")?;
     }
     write!(rows, ",{},{}", u8::from(object.moving), object.age)?;
-    let (position, velocity) = (object.position_covariance, object.velocity_covariance);
-    for value in [
-        position.m11,
-        position.m12,
-        position.m22,
-        velocity.m11,
-        velocity.m12,
-        velocity.m22,
-    ] {
-        write!(rows, ",{value:.6}")?;
+    for covariance in [object.position_covariance, object.velocity_covariance] {
+        let (xx, xy, yy) = (covariance.m11, covariance.m12, covariance.m22);
+        write!(rows, ",{xx:.6},{xy:.6},{yy:.6}")?;
     }
     writeln!(rows)
 }

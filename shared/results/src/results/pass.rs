@@ -7,7 +7,7 @@ use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
 use gyre_terminal::Failure;
 
-use super::{Estimate, Files, Sketch, Slam};
+use super::{Estimate, Files, Slam, sketch::Sketch};
 use crate::{odometry, poses, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
@@ -25,23 +25,16 @@ pub struct Pass<'a, 'b> {
     read: Read,
 }
 
-/// The data that was read.
 #[derive(Debug, Default)]
 pub struct Read {
-    /// The end of the stream, if it came to that.
     pub end: Option<Item>,
-    /// The poses of all sessions.
     pub counter: Counter,
     /// The latencies of this session only: earlier sessions may belong to a different boot with a
     /// different clock.
     pub latency: LatencyMeter,
-    /// The path to be drawn.
     pub sketch: Sketch,
-    /// The poses to be evaluated.
     pub estimate: Estimate,
-    /// The corrected poses to be evaluated.
     pub corrected: Trajectory,
-    /// The corrected path to be drawn.
     pub corrected_sketch: Sketch,
 }
 
@@ -72,7 +65,6 @@ impl<'a, 'b> Pass<'a, 'b> {
         })
     }
 
-    /// Adds the next record.
     pub fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
         if pose.item.is(flag::END) {
             self.read.end = Some(pose.item);
@@ -118,7 +110,6 @@ impl<'a, 'b> Pass<'a, 'b> {
         Ok(tum.append(line)?)
     }
 
-    /// Returns the collected data.
     pub fn finish(self) -> Read {
         self.files.push(self.odometry);
         self.files.push(self.tum);

@@ -8,35 +8,22 @@ const ENOUGH: usize = 1 << 15;
 
 /// A path that is thinned as it grows: of a long one every 2nd, 4th, 8th, ... pose is kept, and the
 /// last one.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Sketch {
     kept: Vec<Pose>,
-    every: usize,
+    halvings: u32,
     poses: usize,
-    length_m: f64,
+    pub length_m: f64,
     last: Option<Pose>,
 }
 
-impl Default for Sketch {
-    fn default() -> Self {
-        Self {
-            kept: Vec::new(),
-            every: 1,
-            poses: 0,
-            length_m: 0.0,
-            last: None,
-        }
-    }
-}
-
 impl Sketch {
-    /// Adds the next pose.
     pub fn add(&mut self, pose: Pose) {
         if let Some(last) = &self.last {
             let step = pose.translation.vector - last.translation.vector;
             self.length_m += step.norm();
         }
-        if self.poses.is_multiple_of(self.every) {
+        if self.poses.is_multiple_of(1 << self.halvings) {
             self.kept.push(pose);
         }
         self.poses += 1;
@@ -45,18 +32,13 @@ impl Sketch {
             let mut index = 0..;
             self.kept
                 .retain(|_| index.next().is_some_and(|k: usize| k.is_multiple_of(2)));
-            self.every *= 2;
+            self.halvings += 1;
         }
     }
 
-    /// Returns the length of the path, m.
-    pub fn length_m(&self) -> f64 {
-        self.length_m
-    }
-
-    /// Returns the poses that were kept, and the last one.
     pub fn path(&self) -> Vec<Pose> {
-        let last_is_kept = self.poses.saturating_sub(1).is_multiple_of(self.every);
+        let last = self.poses.saturating_sub(1);
+        let last_is_kept = last.is_multiple_of(1 << self.halvings);
         let last = self.last.filter(|_| !last_is_kept);
         self.kept.iter().copied().chain(last).collect()
     }
@@ -102,7 +84,7 @@ mod tests {
         for count in [2 * ENOUGH + 1, 5 * ENOUGH + 3, 9 * ENOUGH] {
             let sketch = sketch(count);
             assert!(sketch.kept.len() <= 2 * ENOUGH, "{count}");
-            assert_eq!(sketch.kept.len(), count.div_ceil(sketch.every));
+            assert_eq!(sketch.kept.len(), count.div_ceil(1 << sketch.halvings));
             assert_eq!(sketch.kept.first(), poses(1).last().as_ref());
             let svg = sketch.svg().unwrap().unwrap();
             assert!(svg.contains(&format!("{count} poses")), "{count}");

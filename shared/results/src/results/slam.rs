@@ -27,14 +27,11 @@ const DRAWN: usize = 1000;
 
 const HEADER: &str = "scan,found_scan,x_m,y_m,yaw_rad,similarity,correlation,searched,runner_up,chi_square,weight,verdict\n";
 
-/// Keyframes, loops and corrected poses.
 pub struct Slam {
     estimator: TrajectoryEstimator,
     correction: Correction,
     queries: Vec<Query>,
-    /// The scan and the time of each keyframe.
     keyframes: Vec<(u64, i64)>,
-    /// The log of the fixes, where there is one.
     gnss: Option<GnssLog>,
 }
 
@@ -90,12 +87,10 @@ impl Slam {
         }))
     }
 
-    /// Corrects the pose of scan `seq`.
     pub fn correct(&self, seq: u64, pose: &Pose) -> Pose {
         self.correction.correct(seq, pose)
     }
 
-    /// Returns the corrected poses of the keyframes.
     pub fn poses(&self) -> &[Pose] {
         self.estimator.poses()
     }
@@ -124,12 +119,12 @@ impl Slam {
                 let [query, place] = [ends.0, ends.1].map(|keyframe| self.keyframes[keyframe].0);
                 let [x, y, yaw] = xy_yaw(&candidate.motion.motion);
                 write!(rows, "{query},{place},{x:.4},{y:.4},{yaw:.6},")?;
-                for figure in [
-                    candidate.similarity,
+                let scores = [
                     candidate.correlation,
                     candidate.searched,
                     candidate.runner_up,
-                ] {
+                ];
+                for figure in [candidate.similarity].into_iter().chain(scores) {
                     write!(rows, "{figure:.4},")?;
                 }
                 match candidate.chi_square.is_nan() {
@@ -148,10 +143,8 @@ impl Slam {
     /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that
     /// are used.
     pub fn graph_g2o(&self) -> String {
-        G2o::write(
-            self.estimator.poses(),
-            self.estimator.odometry().chain(self.used()),
-        )
+        let constraints = self.estimator.odometry().chain(self.used());
+        G2o::write(self.estimator.poses(), constraints)
     }
 
     /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.
@@ -177,13 +170,11 @@ impl Slam {
             let pose = self.estimator.pose(keyframe)?;
             let (map_from_truth, start_ns) =
                 *start.get_or_insert((pose.motion * truth.inverse(), stamp_ns));
+            let variances = pose.covariance.diagonal();
             samples.push(BandSample {
                 time_s: (stamp_ns - start_ns) as f64 * 1e-9,
                 error: pose.error(&(map_from_truth * truth)),
-                sigma: pose
-                    .covariance
-                    .diagonal()
-                    .map(|variance| variance.max(0.0).sqrt()),
+                sigma: variances.map(|variance| variance.max(0.0).sqrt()),
             });
         }
         Ok(Bands {
@@ -192,7 +183,6 @@ impl Slam {
         })
     }
 
-    /// Compares the loops that are used with a trajectory.
     pub fn errors_of(&self, trajectory: &Trajectory) -> Option<LoopErrors> {
         let at = |keyframe: usize| trajectory.at(self.keyframes[keyframe].1);
         loop_errors(self.used().filter_map(|it| {
@@ -204,22 +194,17 @@ impl Slam {
     pub fn summary(&self) -> SlamSummary {
         let loops_used = self.used().count();
         let verified = |query: &Query| {
+            let verified = [LoopOutcome::Accepted, LoopOutcome::ContradictsOdometry];
             let candidates = query.candidates.iter();
-            let verified = |outcome| {
-                matches!(
-                    outcome,
-                    LoopOutcome::Accepted | LoopOutcome::ContradictsOdometry
-                )
-            };
-            candidates.filter(|it| verified(it.outcome)).count()
+            candidates
+                .filter(|it| verified.contains(&it.outcome))
+                .count()
         };
         SlamSummary {
             keyframes: self.keyframes.len(),
             loops_used,
             loops_rejected: self.queries.iter().map(verified).sum::<usize>() - loops_used,
-            odometry: None,
-            ground_truth: None,
-            ate_m: None,
+            ..SlamSummary::default()
         }
     }
 }

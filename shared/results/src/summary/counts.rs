@@ -19,13 +19,10 @@ const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
-    /// Scans that the source published.
     pub published: u64,
-    /// Scans with a pose.
     pub processed: u64,
     /// Scans published and not processed: what live mode dropped.
     pub dropped: u64,
-    /// Scans that could not be read.
     pub unreadable: u64,
     /// Scans that the recording lacks, by the gaps in its times.
     pub missing: u64,
@@ -48,10 +45,8 @@ pub struct Counts {
     pub doppler: Option<DopplerCounts>,
 }
 
-/// The path that was driven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Course {
-    /// Length, m.
     pub path_m: f64,
     /// Time from the first pose to the last one, s.
     pub duration_s: f64,
@@ -60,12 +55,9 @@ pub struct Course {
     pub period_s: Option<f64>,
 }
 
-/// Counts of lost azimuths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LostCounts {
-    /// Scans with lost azimuths.
     pub scans: u64,
-    /// Azimuths that were lost in all.
     pub azimuths: u64,
     /// Azimuths in bursts at unknown places.
     pub unplaced: u64,
@@ -80,7 +72,6 @@ impl LostCounts {
     }
 }
 
-/// The contribution of a gyro.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GyroCounts {
     /// Motions whose turn it measured; the radar alone measured the others.
@@ -104,21 +95,20 @@ pub struct GyroCounts {
 impl GyroCounts {
     fn add(&mut self, motion: &MotionEstimate) {
         let refinement = &motion.refinement;
-        if refinement.gyro != gyro::NONE {
-            self.motions += 1;
-            self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
-            self.refused += u64::from(refinement.gyro == gyro::REFUSED);
-            self.bias_radps = refinement.gyro_bias_radps;
-            self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
-            self.scale = refinement.gyro_scale;
+        if refinement.gyro == gyro::NONE {
+            return;
         }
+        self.motions += 1;
+        self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
+        self.refused += u64::from(refinement.gyro == gyro::REFUSED);
+        self.bias_radps = refinement.gyro_bias_radps;
+        self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
+        self.scale = refinement.gyro_scale;
     }
 }
 
-/// The contribution of wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WheelCounts {
-    /// Motions whose distance they measured.
     pub motions: u64,
     /// Motions with slip: the distance differed from the radar's distance, or had differed
     /// recently.
@@ -127,7 +117,6 @@ pub struct WheelCounts {
     pub predicted: u64,
     /// True distance over distance of the wheels, after the last of them.
     pub scale: f64,
-    /// Standard deviation of that scale.
     pub scale_sigma: f64,
     /// Delay of the stamps and its standard deviation, s; `None`: it is unknown.
     pub delay_s: Option<[f64; 2]>,
@@ -148,7 +137,6 @@ impl WheelCounts {
     }
 }
 
-/// The contribution of the velocity by Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DopplerCounts {
     /// Motions between two scans that both measured it.
@@ -159,7 +147,6 @@ pub struct DopplerCounts {
     pub predicted: u64,
     /// True velocity over the measured one, after the last of them.
     pub scale: f64,
-    /// Standard deviation of that scale.
     pub scale_sigma: f64,
 }
 
@@ -180,7 +167,6 @@ impl DopplerCounts {
     }
 }
 
-/// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
     pub refined: u64,
@@ -188,13 +174,11 @@ pub struct MotionCounts {
     pub weak: u64,
     /// Predicted from the motions before, because nothing matched.
     pub predicted: u64,
-    /// Weak or predicted.
     pub doubtful: u64,
     /// Weak ones, and predicted ones whose distance neither wheels nor Doppler measured.
     pub unsure: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
-    /// Motions of a standing vehicle.
     pub stationary: u64,
     /// Motions along walls without structure, where the radar does not observe the distance:
     /// wheels, Doppler or earlier motions determine it.
@@ -237,7 +221,6 @@ impl Counts {
     }
 }
 
-/// Counts the poses of a journal.
 #[derive(Debug, Default)]
 pub struct Counter {
     processed: u64,
@@ -255,7 +238,6 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Counts a pose.
     pub fn add(&mut self, pose: &PoseHeader) {
         self.processed += 1;
         self.starts += u64::from(pose.item.is(flag::BREAK));
@@ -275,7 +257,6 @@ impl Counter {
         self.wheel_clock.add(pose, motion.x_m, distance);
     }
 
-    /// Returns the path, which is so long.
     pub fn course(&mut self, path_m: f64) -> Course {
         let span_ns = |(first_ns, last): (i64, Item)| last.stamp_ns - first_ns;
         let duration_ns = self.first_ns.zip(self.last).map_or(0, span_ns);
@@ -289,10 +270,8 @@ impl Counter {
     /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan
     /// played.
     pub fn counts(self, end: Option<&Item>, first: usize, refines: bool) -> Counts {
-        let next = |of: fn(&Item) -> u64| {
-            let after_last = || self.last.as_ref().map(|last| of(last) + 1);
-            end.map(of).or_else(after_last)
-        };
+        let last = self.last.as_ref();
+        let next = |of: fn(&Item) -> u64| end.map(of).or(last.map(|last| of(last) + 1));
         let published = next(|item| item.published).unwrap_or(0);
         let seen = next(|item| item.scan).map_or(0, |next| next.saturating_sub(first as u64));
         let (mut gyro, mut wheels) = (self.gyro, self.wheels);
@@ -301,7 +280,7 @@ impl Counter {
         Counts {
             published,
             processed: self.processed,
-            dropped: end.or(self.last.as_ref()).map_or(0, Item::dropped),
+            dropped: end.or(last).map_or(0, Item::dropped),
             unreadable: seen.saturating_sub(published),
             missing: self.gaps.missing(),
             breaks: self.starts.saturating_sub(1),
@@ -317,24 +296,17 @@ impl Counter {
 /// Counts the scans that a recording lacks, by the intervals between those that it has.
 #[derive(Debug, Default)]
 struct Gaps {
-    /// The first motions, which determine the period.
     first: Vec<Motion>,
     period_ns: Option<i64>,
     missing: u64,
 }
 
-/// The time that a motion takes, and the turns of the radar in it by the numbers of its scans.
-#[derive(Clone, Copy, Debug)]
-struct Motion {
-    interval_ns: i64,
-    turns: u64,
-}
+/// The time that a motion takes, ns, and the turns of the radar in it by the numbers of its scans.
+type Motion = (i64, u64);
 
-impl Motion {
-    fn missing(&self, period_ns: i64) -> u64 {
-        let fit = (self.interval_ns as f64 / period_ns as f64).round() as u64;
-        fit.saturating_sub(self.turns)
-    }
+fn missing_within(&(interval_ns, turns): &Motion, period_ns: i64) -> u64 {
+    let fit = (interval_ns as f64 / period_ns as f64).round() as u64;
+    fit.saturating_sub(turns)
 }
 
 impl Gaps {
@@ -343,12 +315,9 @@ impl Gaps {
             return;
         }
         let turns = pose.item.scan.saturating_sub(pose.item.previous_scan);
-        let motion = Motion {
-            interval_ns: pose.motion.interval_ns,
-            turns: turns.max(1),
-        };
+        let motion = (pose.motion.interval_ns, turns.max(1));
         match self.period_ns {
-            Some(period_ns) => self.missing += motion.missing(period_ns),
+            Some(period_ns) => self.missing += missing_within(&motion, period_ns),
             None => {
                 self.first.push(motion);
                 if self.first.len() == MOTIONS_OF_PERIOD {
@@ -360,13 +329,13 @@ impl Gaps {
 
     /// Takes the median of the first motions' periods, and counts missing scans among them.
     fn settle(&mut self) {
-        let period = |motion: &Motion| motion.interval_ns / motion.turns as i64;
+        let period = |motion: &Motion| motion.0 / motion.1 as i64;
         let mut periods: Vec<i64> = self.first.iter().map(period).collect();
         periods.sort_unstable();
         let median = periods.get(periods.len() / 2).copied();
         if let Some(period_ns) = median.filter(|period_ns| *period_ns > 0) {
-            let missing = |motion: &Motion| motion.missing(period_ns);
-            self.missing += self.first.iter().map(missing).sum::<u64>();
+            let missing = self.first.iter().map(|it| missing_within(it, period_ns));
+            self.missing += missing.sum::<u64>();
             self.period_ns = Some(period_ns);
         }
         self.first.clear();
@@ -400,28 +369,22 @@ mod tests {
 
     #[test]
     fn every_scan_is_accounted_for() {
-        let pose = |seq, published, scan| PoseHeader {
-            item: Item {
-                seq,
-                published,
-                scan,
-                ..Item::default()
-            },
-            ..PoseHeader::default()
+        let pose = |seq, published, scan| {
+            let mut pose = PoseHeader::default();
+            (pose.item.seq, pose.item.published, pose.item.scan) = (seq, published, scan);
+            pose
         };
         let end = pose(3, 9, 15).item;
         let poses = [pose(0, 0, 5), pose(1, 3, 8), pose(2, 7, 13)];
         let counts = counted(&poses).counts(Some(&end), 5, false);
-        assert_eq!(
-            counts,
-            Counts {
-                published: 9,
-                processed: 3,
-                dropped: 6,
-                unreadable: 1,
-                ..Counts::default()
-            }
-        );
+        let expected = Counts {
+            published: 9,
+            processed: 3,
+            dropped: 6,
+            unreadable: 1,
+            ..Counts::default()
+        };
+        assert_eq!(counts, expected);
     }
 
     #[test]
@@ -446,20 +409,15 @@ mod tests {
     #[test]
     fn weak_and_predicted_motions_are_doubtful() {
         let pose = |(outcome, initial_guess)| {
-            let refinement = RefinementRecord {
+            let mut pose = PoseHeader::default();
+            pose.motion.refinement = RefinementRecord {
                 outcome,
                 initial_guess,
                 stationary: u64::from(outcome == outcome::WEAK),
                 wheels: u64::from(initial_guess == initial_guess::SEARCH) * wheels::USED,
                 ..RefinementRecord::default()
             };
-            PoseHeader {
-                motion: MotionEstimate {
-                    refinement,
-                    ..MotionEstimate::default()
-                },
-                ..PoseHeader::default()
-            }
+            pose
         };
         let poses = [
             (outcome::SEARCHED, initial_guess::NONE),
@@ -486,31 +444,24 @@ mod tests {
     }
 
     fn pose(scan: u64, previous_scan: u64, interval_ms: i64) -> PoseHeader {
-        PoseHeader {
-            item: Item {
-                scan,
-                previous_scan,
-                flags: if scan == 0 { flag::BREAK } else { 0 },
-                ..Item::default()
-            },
-            motion: MotionEstimate {
-                interval_ns: interval_ms * 1_000_000,
-                ..MotionEstimate::default()
-            },
-            ..PoseHeader::default()
-        }
+        let mut pose = PoseHeader::default();
+        (pose.item.scan, pose.item.previous_scan) = (scan, previous_scan);
+        pose.item.flags = if scan == 0 { flag::BREAK } else { 0 };
+        pose.motion.interval_ns = interval_ms * 1_000_000;
+        pose
     }
 
     #[test]
     fn scans_that_the_recording_lacks_show_in_its_times_and_skipped_ones_do_not_count() {
         let missing = |poses: &[PoseHeader]| counted(poses).gaps.missing();
-        let mut poses = vec![
-            pose(0, 0, 0),
-            pose(1, 0, 251),
-            pose(2, 1, 249),
-            pose(4, 2, 500),
-            pose(5, 4, 250),
+        let poses = [
+            (0, 0, 0),
+            (1, 0, 251),
+            (2, 1, 249),
+            (4, 2, 500),
+            (5, 4, 250),
         ];
+        let mut poses = poses.map(|(a, b, ms)| pose(a, b, ms)).to_vec();
         assert_eq!(missing(&poses), 0);
         poses.extend([pose(6, 5, 500), pose(8, 6, 1_000)]);
         assert_eq!(missing(&poses), 1 + 2);
@@ -521,9 +472,8 @@ mod tests {
     fn gaps_of_a_long_run_are_counted_in_bounded_memory() {
         let scans = 3 * MOTIONS_OF_PERIOD as u64;
         let interval_ms = |scan| if scan % 1000 == 999 { 750 } else { 250 };
-        let poses: Vec<_> = (0..scans)
-            .map(|scan| pose(scan, scan.saturating_sub(1), interval_ms(scan)))
-            .collect();
+        let pose = |scan: u64| pose(scan, scan.saturating_sub(1), interval_ms(scan));
+        let poses: Vec<_> = (0..scans).map(pose).collect();
         let counter = counted(&poses);
         assert!(counter.gaps.first.is_empty());
         assert_eq!(counter.gaps.missing(), 2 * (scans / 1000));

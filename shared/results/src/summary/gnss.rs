@@ -6,6 +6,7 @@ use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_mapping::Origin;
 use gyre_slam::{FixRefusal, TrajectoryEstimator};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Fixes with a smaller weight count as refused: they pull less than a quarter as hard.
 const LEAST_WEIGHT: f64 = 0.25;
@@ -13,14 +14,11 @@ const LEAST_WEIGHT: f64 = 0.25;
 /// The fixes of GNSS in the summary, and the place of the run on the earth.
 #[derive(Debug, Serialize)]
 pub struct GnssSummary {
-    /// The log, or the bag.
     log: String,
-    /// The topic in the bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     topic: Option<String>,
     /// Fixes of the log without the faulty ones.
     fixes: usize,
-    /// The faults of the log.
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
     outside: usize,
@@ -32,7 +30,6 @@ pub struct GnssSummary {
     used: usize,
     /// Fixes that contradict the others, the odometry or the loops.
     refused: usize,
-    /// Why none are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
     /// Delay of the fixes, estimated from their speeds, beyond `gnss.delay_s`, s; `None` if the
@@ -44,7 +41,7 @@ pub struct GnssSummary {
     residual_rms_m: Option<f64>,
     /// The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    east_north: Option<EastNorth>,
+    east_north: Option<Value>,
     /// Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     plane: Option<[f64; 2]>,
@@ -53,42 +50,28 @@ pub struct GnssSummary {
     origin: Option<Origin>,
 }
 
-/// A pose in the plane of the fixes, with its standard deviations.
-#[derive(Debug, Serialize)]
-struct EastNorth {
-    /// Place, m.
-    east_m: f64,
-    north_m: f64,
-    /// Direction of the x axis, counter-clockwise from east, degrees.
-    yaw_deg: f64,
-    east_sigma_m: f64,
-    north_sigma_m: f64,
-    yaw_sigma_deg: f64,
-}
-
-impl EastNorth {
-    fn of(pose: &UncertainMotion) -> Self {
-        let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
-        let sigma = |axis: usize| pose.covariance[(axis, axis)].max(0.0).sqrt();
-        Self {
-            east_m,
-            north_m,
-            yaw_deg: yaw_rad.to_degrees(),
-            east_sigma_m: sigma(0),
-            north_sigma_m: sigma(1),
-            yaw_sigma_deg: sigma(2).to_degrees(),
-        }
-    }
+/// Returns a pose in the plane of the fixes with its standard deviations; the direction of the x
+/// axis is counter-clockwise from east.
+fn east_north(pose: &UncertainMotion) -> Value {
+    let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
+    let variances = pose.covariance.diagonal();
+    let sigma = variances.map(|variance| variance.max(0.0).sqrt());
+    json!({
+        "east_m": east_m,
+        "north_m": north_m,
+        "yaw_deg": yaw_rad.to_degrees(),
+        "east_sigma_m": sigma.x,
+        "north_sigma_m": sigma.y,
+        "yaw_sigma_deg": sigma.z.to_degrees(),
+    })
 }
 
 impl GnssSummary {
-    /// Summarises the fixes of a log by the last solution.
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
-        let squares: Vec<f64> = used
-            .map(|it| it.chi_square * it.position.variance_m2)
-            .collect();
+        let squares = used.map(|it| it.chi_square * it.position.variance_m2);
+        let squares: Vec<f64> = squares.collect();
         let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         let frame = estimator.east_north_from_map()?;
         let origin = frame.zip(log.plane).map(|(frame, plane)| {
@@ -102,6 +85,7 @@ impl GnssSummary {
         });
         let fixes = estimator.fixes();
         let counts = fixes.counts();
+        let refusal = || fixes.refusal().map(ToString::to_string);
         Ok(Self {
             log: log.path.display().to_string(),
             topic: log.topic.clone(),
@@ -112,13 +96,10 @@ impl GnssSummary {
             far: counts.far,
             used: squares.len(),
             refused: counts.taken - squares.len(),
-            refusal: log
-                .unusable
-                .clone()
-                .or_else(|| fixes.refusal().map(ToString::to_string)),
+            refusal: log.unusable.clone().or_else(refusal),
             delay_s: fixes.clock().map(|clock| clock.delay_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
-            east_north: frame.as_ref().map(EastNorth::of),
+            east_north: frame.as_ref().map(east_north),
             plane: log.plane.map(|plane| {
                 let origin = plane.origin();
                 [origin.latitude_deg, origin.longitude_deg]

@@ -23,7 +23,6 @@ const MOTIONS_OF_DELAY: usize = 1 << 14;
 pub struct Clock(VecDeque<Compared>);
 
 impl Clock {
-    /// Adds the motion to a pose.
     pub fn add(&mut self, pose: &PoseHeader, by_radar: f64, by_sensor: Option<f64>) {
         if self.0.is_empty() && by_sensor.is_none() {
             return;
@@ -111,7 +110,6 @@ fn cause(section: &str, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
     }
 }
 
-/// Returns whether contradictions are more than chance, and more than this share of all motions.
 pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
     contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
 }

@@ -3,7 +3,6 @@
 use gyre_evaluation::LoopErrors;
 use serde::Serialize;
 
-/// The counts of loops in the summary.
 #[derive(Debug, Default, Serialize)]
 pub struct SlamSummary {
     pub keyframes: usize,
@@ -11,14 +10,12 @@ pub struct SlamSummary {
     pub loops_used: usize,
     /// Verified loops that contradict odometry or other loops.
     pub loops_rejected: usize,
-    /// The loops that are used against odometry.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<LoopErrors>,
     /// The same loops against the ground truth: where it contradicts them much more than odometry
     /// does, it is the ground truth that is wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<LoopErrors>,
-    /// ATE of the corrected trajectory, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ate_m: Option<f64>,
 }

@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, fmt};
 
-/// The messages that were received and missed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Received {
     pub topics: BTreeMap<String, ReceivedCount>,
@@ -10,18 +9,14 @@ pub struct Received {
     pub is_interrupted: bool,
 }
 
-/// The messages of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReceivedCount {
     pub received: u64,
-    /// Messages between them that did not arrive.
     pub missed: u64,
-    /// True if none may be missed.
     pub is_lossless: bool,
 }
 
 impl Received {
-    /// Returns whether nothing was missed that must not be.
     pub fn is_complete(&self) -> bool {
         let mut topics = self.topics.values();
         topics.all(|count| !count.is_lossless || count.missed == 0)
@@ -31,13 +26,11 @@ impl Received {
 impl fmt::Display for Received {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |number: fn(&ReceivedCount) -> u64| {
-            let topics = self.topics.iter().filter(|(_, count)| number(count) > 0);
-            let topics: Vec<String> = topics
-                .map(|(topic, count)| format!("{} {topic}", number(count)))
-                .collect();
-            match topics.is_empty() {
-                true => "nothing".to_owned(),
-                false => topics.join(", "),
+            let topics = self.topics.iter().filter(|it| number(it.1) > 0);
+            let topics = topics.map(|(topic, count)| format!("{} {topic}", number(count)));
+            match &topics.collect::<Vec<String>>()[..] {
+                [] => "nothing".to_owned(),
+                topics => topics.join(", "),
             }
         };
         let (received, missed) = (list(|it| it.received), list(|it| it.missed));

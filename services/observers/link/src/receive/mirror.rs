@@ -16,12 +16,9 @@ use crate::{
     waker::Waker,
 };
 
-/// The copy of a run of another machine.
 pub(super) struct Mirror<'a> {
     pub session: Session,
-    /// The name of the link.
     pub link: String,
-    /// The identity of this receiver.
     pub receiver: String,
     pub offer: RunOffer,
     /// The answers to the question for another sender, while nothing arrives.
@@ -34,7 +31,6 @@ pub(super) struct Mirror<'a> {
     pub rig: Rig<'a>,
 }
 
-/// A topic of the copy.
 pub(super) struct MirroredTopic {
     name: &'static str,
     header_bytes: usize,
@@ -45,9 +41,8 @@ pub(super) struct MirroredTopic {
 }
 
 impl Mirror<'_> {
-    /// Opens a topic for publishing, and requests its messages.
     pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
-        let other_version = || LinkError::other_version(ASK_FOR_RUN.other);
+        let other_version = || LinkError::other_version(ASK_FOR_RUN.1);
         let topic = topic(&offered.name).ok_or_else(other_version)?;
         let from = match topic.name {
             Pose::TOPIC => self.next_pose,
@@ -146,10 +141,7 @@ impl Mirror<'_> {
         let continues = match began_ns {
             Some(_) => other.began_ns == began_ns,
             // Without a pose of the drive nothing of it may be there.
-            None => self
-                .topics
-                .iter()
-                .all(|topic| topic.sequence.next.is_none()),
+            None => self.topics.iter().all(|it| it.sequence.next.is_none()),
         };
         Ok(properties(&self.offer) == properties(other) && continues)
     }
@@ -185,11 +177,8 @@ impl Mirror<'_> {
             for feed in &feeds {
                 feed.answer_handshakes()?;
             }
-            let descriptor = self.waker.descriptor();
-            if self
-                .rig
-                .sleep_until_readable(&feeds, descriptor, MAX_WAIT)?
-            {
+            let (rig, descriptor) = (&self.rig, self.waker.descriptor());
+            if rig.sleep_until_readable(&feeds, descriptor, MAX_WAIT)? {
                 return Ok(self.received(true));
             }
         }
@@ -197,11 +186,10 @@ impl Mirror<'_> {
 
     fn received(&self, is_interrupted: bool) -> Received {
         let topics = self.topics.iter();
+        let counts = topics.map(|topic| (topic.name.to_owned(), topic.count));
         Received {
             is_interrupted,
-            topics: topics
-                .map(|topic| (topic.name.to_owned(), topic.count))
-                .collect(),
+            topics: counts.collect(),
         }
     }
 }
@@ -224,7 +212,6 @@ impl MirroredTopic {
     }
 }
 
-/// Journals a valid pose, and returns the number of the next one.
 fn append(
     journal: &mut Journal,
     message: &RecordedMessage,

@@ -7,7 +7,7 @@ use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
 
 use super::{add, add_item, item};
 use crate::replay_buffer::{
-    MemoryBuffer, Message, MotionBuffer, Next, Place, PoseBuffer, PoseLog, ReplayBuffer,
+    LogBuffer, MemoryBuffer, Message, MotionBuffer, Next, Place, ReplayBuffer,
 };
 
 fn message(seq: u64) -> Message {
@@ -81,7 +81,7 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
         ..PoseHeader::default()
     };
     (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
-    let poses = Arc::new(PoseBuffer::of(PoseLog::of(out.path())));
+    let poses = Arc::new(LogBuffer::of_poses(out.path()));
     let motions = MotionBuffer(poses.clone());
     let next = next_of;
     // Journalled before it is published, a pose is not sent before.
@@ -100,10 +100,8 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     let Next::Message(motion) = next(&motions, 7) else {
         panic!("there is no motion");
     };
-    assert_eq!(
-        (motion.seq, motion.bytes.len()),
-        (7, size_of::<MotionHeader>())
-    );
+    let found = (motion.seq, motion.bytes.len());
+    assert_eq!(found, (7, size_of::<MotionHeader>()));
     let end = PoseHeader {
         item: Item {
             flags: flag::END,
@@ -113,13 +111,7 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     };
     journal.append(&end).unwrap();
     poses.end().unwrap();
-    assert_eq!(
-        next(&*poses, 39),
-        sent(39),
-        "also what was not seen to come"
-    );
-    assert_eq!(
-        (next(&*poses, 40), next(&motions, 40)),
-        (Next::Ended, Next::Ended)
-    );
+    assert_eq!(next(&*poses, 39), sent(39));
+    let both = [next(&*poses, 40), next(&motions, 40)];
+    assert_eq!(both, [Next::Ended, Next::Ended]);
 }

@@ -9,39 +9,32 @@ use gyre_colossus::{Configuration, SweepAssembler};
 use gyre_stages::live_radar::Sizes;
 use thiserror::Error;
 
-use super::{
-    Settings,
-    configuration_estimate::ConfigurationEstimate,
-    driver::{Driver, DriverError},
-};
+use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
+use crate::NodeError;
 
 /// The longest wait for the configuration, which the driver repeats every four turns, and for
 /// azimuths to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// A driver's radar that cannot be used.
 #[derive(Debug, Error)]
-pub enum AskError {
-    #[error(transparent)]
-    Driver(#[from] DriverError),
-    #[error(
-        "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
-    )]
-    NoTopic { topic: String, domain: u16 },
-    #[error(
-        "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
-    )]
-    Silent { topic: String },
-    #[error(
-        "the driver publishes no {topic}, and nothing else tells the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
-    )]
-    NoConfiguration { topic: String },
-    #[error("the radar on {topic} cannot be used: {source}")]
-    Unusable {
-        topic: String,
-        source: gyre_colossus::BadConfiguration,
-    },
+#[error("{reason}")]
+pub struct AskError {
+    reason: String,
+    /// True of a driver that may still come, or whose radar may.
+    pub may_pass: bool,
+}
+
+impl AskError {
+    fn of(reason: String, may_pass: bool) -> Self {
+        Self { reason, may_pass }
+    }
+}
+
+impl From<NodeError> for AskError {
+    fn from(error: NodeError) -> Self {
+        Self::of(error.to_string(), false)
+    }
 }
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
@@ -51,18 +44,17 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
         Some(configuration) => configuration,
         None => estimated(&mut driver, settings)?,
     };
-    let unusable = |source| AskError::Unusable {
-        topic: settings.topic.clone(),
-        source,
-    };
-    let assembler = SweepAssembler::new(&configuration, settings.constants).map_err(unusable)?;
+    let assembler = SweepAssembler::new(&configuration, settings.constants);
+    let assembler = assembler.map_err(|error| {
+        let reason = format!("the radar on {} cannot be used: {error}", settings.topic);
+        AskError::of(reason, false)
+    })?;
     Ok(Sizes {
         period_ns: configuration.period_ns(),
         limits: assembler.limits(),
     })
 }
 
-/// Waits for the configuration that the driver publishes.
 fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuration>, AskError> {
     let started = Instant::now();
     while started.elapsed() < MAX_WAIT {
@@ -72,21 +64,23 @@ fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuratio
         }
         sleep(POLL_INTERVAL);
     }
-    match driver.found()? {
-        Some(_) => Ok(None),
-        None => Err(AskError::NoTopic {
-            topic: settings.topic.clone(),
-            domain: settings.domain.id(),
-        }),
+    if driver.found()?.is_some() {
+        return Ok(None);
     }
+    let (topic, domain) = (&settings.topic, settings.domain.id());
+    let reason = format!(
+        "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
+    );
+    Err(AskError::of(reason, true))
 }
 
-/// Estimates the configuration from azimuths.
 fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
     let Some(resolution_m) = settings.constants.range_resolution_m else {
-        return Err(AskError::NoConfiguration {
-            topic: settings.configuration_topic(),
-        });
+        let topic = settings.configuration_topic();
+        let reason = format!(
+            "the driver publishes no {topic}, and nothing else tells the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
+        );
+        return Err(AskError::of(reason, false));
     };
     let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {
@@ -99,7 +93,9 @@ fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, 
         }
         sleep(POLL_INTERVAL);
     }
-    Err(AskError::Silent {
-        topic: settings.topic.clone(),
-    })
+    let reason = format!(
+        "the driver publishes {}, but no azimuth arrives: check that the radar is on and in reach of its driver",
+        settings.topic
+    );
+    Err(AskError::of(reason, true))
 }

@@ -9,10 +9,8 @@ const MAX_AZIMUTHS: usize = 4_000;
 /// Whole turns that are needed.
 const TURNS: usize = 2;
 
-/// The estimate of a radar's configuration.
 #[derive(Clone, Debug, Default)]
 pub struct ConfigurationEstimate {
-    /// The last encoder count.
     last: Option<u16>,
     /// Encoder counts from one azimuth to the next in a turn.
     steps: Vec<u16>,
@@ -37,7 +35,6 @@ impl ConfigurationEstimate {
         }
     }
 
-    /// Adds a turn of so many rows, which arrived when it had ended.
     fn add_turn(&mut self, rows: usize, bins: usize, arrival_ns: i64) {
         if let Ok(rows @ 1..) = u16::try_from(rows) {
             self.azimuths = Some(rows);
@@ -46,7 +43,6 @@ impl ConfigurationEstimate {
         }
     }
 
-    /// Adds an azimuth that arrived at this time, ns.
     fn add(&mut self, encoder: u16, bins: usize, arrival_ns: i64) {
         self.bins = self.bins.max(bins);
         let Some(last) = self.last.replace(encoder) else {
@@ -111,11 +107,7 @@ mod tests {
                     continue;
                 }
                 let encoder = (azimuth % 400 * counts / 400) as u16;
-                assert_eq!(
-                    estimate.configuration(counts as u16, 0.04),
-                    None,
-                    "{azimuth}"
-                );
+                assert_eq!(estimate.configuration(counts as u16, 0.04), None);
                 estimate.add(encoder, 3768, azimuth * 625_000);
                 if azimuth == 1_200 {
                     break;

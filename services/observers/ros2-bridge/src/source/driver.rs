@@ -14,16 +14,10 @@ use gyre_ros2_messages::{
 use gyre_samples::Sample;
 use gyre_stage::clock;
 use ros2_client::{Gid, ReadError, Subscription};
-use thiserror::Error;
 
-use super::{
-    Settings,
-    fixes::{FixError, Fixes},
-    wakeups::Wakeups,
-};
+use super::{Settings, fixes::Fixes, wakeups::Wakeups};
 use crate::{NodeError, node::Node};
 
-/// The name of the node.
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
 const AZIMUTHS: usize = 4_000;
@@ -31,28 +25,6 @@ const AZIMUTHS: usize = 4_000;
 const SAMPLES: usize = 4_000;
 /// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
-
-/// A driver that cannot be received.
-#[derive(Debug, Error)]
-pub enum DriverError {
-    #[error(transparent)]
-    Node(#[from] NodeError),
-    #[error(transparent)]
-    Fixes(#[from] FixError),
-    #[error("cannot wait for topics of ROS 2: {0}")]
-    Wait(#[from] io::Error),
-    #[error("{topic} carries {found}, but Gyre reads {}", names().join(", "))]
-    Type { topic: String, found: String },
-}
-
-/// A message that cannot be used.
-#[derive(Debug, Error)]
-pub enum BadPacket {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    #[error(transparent)]
-    Message(#[from] BadMessage),
-}
 
 /// The types of azimuths that are read.
 fn names() -> [String; 3] {
@@ -64,7 +36,6 @@ fn names() -> [String; 3] {
     .map(|definition| definition.dds_name())
 }
 
-/// A message of a driver, and its publisher.
 pub struct Packet {
     pub message: PacketMessage,
     pub publisher: Gid,
@@ -78,7 +49,6 @@ pub enum PacketMessage {
 }
 
 impl PacketMessage {
-    /// Returns the driver's header.
     pub fn header(&self) -> &Header {
         match self {
             Self::Azimuth(message) => &message.header,
@@ -105,7 +75,6 @@ impl PacketMessage {
     }
 }
 
-/// The topic of the azimuths, as it is published.
 enum Azimuths {
     Azimuth(Subscription<RadarFftDataMsg>),
     Bytes(Subscription<RadarFftDataMessage>),
@@ -116,25 +85,19 @@ enum Azimuths {
 pub struct Driver {
     node: Node,
     topic: String,
-    /// The name of the azimuths' topic on DDS.
     dds_name: String,
     wakeups: Wakeups,
-    /// The name of the configurations' topic on DDS.
     configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
-    /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
     azimuths: Option<Azimuths>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
-    /// Samples of an inertial sensor.
     gyro: Option<Subscription<Imu>>,
     wheels: Option<Subscription<Odometry>>,
-    /// A GNSS receiver, whose fixes others need.
     fixes: Option<Fixes>,
 }
 
-/// The radar's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
     pub radar: Configuration,
@@ -143,56 +106,45 @@ pub struct DescribedRadar {
 }
 
 impl Driver {
-    pub fn open(settings: &Settings) -> Result<Self, DriverError> {
+    pub fn open(settings: &Settings) -> Result<Self, NodeError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
-        let mut configurations = node.subscribe(&topic, TURNS)?;
-        let mut older = node.subscribe(&topic, TURNS)?;
-        wakeups.add(&mut configurations)?;
-        wakeups.add(&mut older)?;
         let mut sample_wakeups = Wakeups::new()?;
-        let gyro = settings.gyro_topic.as_ref();
-        let gyro = gyro.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
-        let mut gyro = gyro.transpose()?;
-        gyro.iter_mut().try_for_each(|it| sample_wakeups.add(it))?;
-        let wheels = settings.wheels_topic.as_ref();
-        let wheels = wheels.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
-        let mut wheels = wheels.transpose()?;
-        wheels
-            .iter_mut()
-            .try_for_each(|it| sample_wakeups.add(it))?;
+        let (gyro, wheels) = (&settings.gyro_topic, &settings.wheels_topic);
         let fixes = settings.fixes.as_ref();
         let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
             configuration_dds_name: node.dds_name(&topic)?,
+            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
+            older: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
+            azimuths: None,
+            gyro: sensor(&mut node, &mut sample_wakeups, gyro.as_deref())?,
+            wheels: sensor(&mut node, &mut sample_wakeups, wheels.as_deref())?,
+            fixes: fixes.transpose()?,
             node,
             wakeups,
-            configurations,
-            older,
-            azimuths: None,
             sample_wakeups,
-            gyro,
-            wheels,
-            fixes: fixes.transpose()?,
         })
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    pub fn found(&self) -> Result<Option<String>, DriverError> {
+    pub fn found(&self) -> Result<Option<String>, NodeError> {
         match self.node.type_of(&self.dds_name) {
-            Some(found) if !names().contains(&found) => Err(DriverError::Type {
-                topic: self.topic.clone(),
-                found,
-            }),
+            Some(found) if !names().contains(&found) => {
+                let (topic, names) = (&self.topic, names().join(", "));
+                Err(NodeError(format!(
+                    "{topic} carries {found}, but Gyre reads {names}"
+                )))
+            }
             found => Ok(found),
         }
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    pub fn receive(&mut self) -> Result<bool, DriverError> {
+    pub fn receive(&mut self) -> Result<bool, NodeError> {
         if self.azimuths.is_some() {
             return Ok(true);
         }
@@ -223,7 +175,7 @@ impl Driver {
 
     /// Takes the next configuration. A reader also receives messages of the other type, and may
     /// decode them to meaningless numbers: the published type decides.
-    pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadPacket> {
+    pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadMessage> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
@@ -232,20 +184,17 @@ impl Driver {
                 azimuth_offset: message.azimuth_offset,
             }));
         }
-        match self.older.take() {
-            Ok(Some((message, _)))
-                if self.is_described_as(RadarConfigurationMessage::DEFINITION) =>
-            {
-                Ok(Some(DescribedRadar {
-                    radar: message.configuration()?,
-                    azimuth_offset: 0,
-                }))
-            }
-            Ok(_) | Err(_) => Ok(None),
+        if let Ok(Some((message, _))) = self.older.take()
+            && self.is_described_as(RadarConfigurationMessage::DEFINITION)
+        {
+            return Ok(Some(DescribedRadar {
+                radar: message.configuration()?,
+                azimuth_offset: 0,
+            }));
         }
+        Ok(None)
     }
 
-    /// Returns whether configurations are published in this form.
     fn is_described_as(&self, form: &Definition) -> bool {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
@@ -267,14 +216,12 @@ impl Driver {
         }
     }
 
-    /// Passes the fixes of GNSS on that have arrived.
     pub fn pass_fixes_on(&mut self) {
         if let Some(fixes) = &mut self.fixes {
             fixes.pass_on();
         }
     }
 
-    /// Takes the next message with azimuths.
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         Ok(match &self.azimuths {
             Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,
@@ -290,10 +237,23 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     wakeups: &mut Wakeups,
     topic: &str,
     depth: usize,
-) -> Result<Subscription<M>, DriverError> {
-    let mut subscription = node.subscribe(topic, depth)?;
+) -> Result<Subscription<M>, NodeError> {
+    let mut subscription = node.subscribe(topic, depth, false)?;
     wakeups.add(&mut subscription)?;
     Ok(subscription)
+}
+
+fn sensor<M: Ros2Message + Send + 'static>(
+    node: &mut Node,
+    wakeups: &mut Wakeups,
+    topic: Option<&str>,
+) -> Result<Option<Subscription<M>>, NodeError> {
+    let Some(topic) = topic else {
+        return Ok(None);
+    };
+    let mut subscription = node.subscribe(topic, SAMPLES, true)?;
+    wakeups.add(&mut subscription)?;
+    Ok(Some(subscription))
 }
 
 fn take<M: Ros2Message + 'static>(

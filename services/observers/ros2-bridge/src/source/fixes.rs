@@ -6,7 +6,6 @@ use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use gyre_stage::clock;
 use ros2_client::Subscription;
-use thiserror::Error;
 
 use super::wakeups::Wakeups;
 use crate::{NodeError, node::Node};
@@ -14,19 +13,8 @@ use crate::{NodeError, node::Node};
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
 
-/// Fixes that cannot be received, or not be passed on.
-#[derive(Debug, Error)]
-pub enum FixError {
-    #[error(transparent)]
-    Node(#[from] NodeError),
-    #[error("cannot pass the fixes of GNSS on to {listen} (gnss.listen): {source}")]
-    Address { listen: String, source: io::Error },
-}
-
-/// Where fixes come from, and where they go to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FixSettings {
-    /// The topic of a receiver.
     pub topic: String,
     /// Who takes them: where the corrected trajectory receives datagrams.
     pub listen: String,
@@ -46,13 +34,15 @@ impl Fixes {
         node: &mut Node,
         wakeups: &mut Wakeups,
         settings: &FixSettings,
-    ) -> Result<Self, FixError> {
-        let failed = |source| FixError::Address {
-            listen: settings.listen.clone(),
-            source,
+    ) -> Result<Self, NodeError> {
+        let failed = |error: io::Error| {
+            let listen = &settings.listen;
+            NodeError(format!(
+                "cannot pass the fixes of GNSS on to {listen} (gnss.listen): {error}"
+            ))
         };
         let (socket, listen) = socket_to(&settings.listen).map_err(failed)?;
-        let mut topic = node.subscribe_to_sensor(&settings.topic, FIXES)?;
+        let mut topic = node.subscribe(&settings.topic, FIXES, true)?;
         wakeups.add(&mut topic).map_err(failed)?;
         Ok(Self {
             topic,
@@ -80,7 +70,6 @@ impl Fixes {
     }
 }
 
-/// Returns a socket that can send to an address.
 fn socket_to(address: &str) -> io::Result<(UdpSocket, SocketAddr)> {
     let first = address.to_socket_addrs()?.next();
     let to = first.ok_or(io::ErrorKind::AddrNotAvailable)?;

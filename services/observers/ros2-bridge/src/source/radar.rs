@@ -19,19 +19,18 @@ use ros2_client::Gid;
 use super::{
     Settings,
     configuration_estimate::ConfigurationEstimate,
-    driver::{DescribedRadar, Driver, DriverError, Packet, PacketMessage},
+    driver::{DescribedRadar, Driver, Packet, PacketMessage},
 };
+use crate::NodeError;
 
 /// The most messages between two checks for signals and new readers.
 const MAX_MESSAGES: usize = 512;
-/// Time between two polls for a driver.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time after which a configuration is estimated: the driver sends it every four turns.
 const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
 /// Time without an azimuth of a publisher after which a different publisher takes its place.
 const PUBLISHER_WAIT: Duration = Duration::from_secs(1);
 
-/// A radar behind its driver.
 pub struct Radar {
     settings: Settings,
     driver: Driver,
@@ -52,7 +51,7 @@ pub struct Radar {
 }
 
 impl Radar {
-    pub fn open(settings: Settings) -> Result<Self, DriverError> {
+    pub fn open(settings: Settings) -> Result<Self, NodeError> {
         let now = Instant::now();
         Ok(Self {
             intake: Intake::new(settings.constants),
@@ -70,7 +69,6 @@ impl Radar {
         })
     }
 
-    /// Takes the newest configuration.
     fn take_configuration(&mut self, room: usize) -> Result<(), StageError> {
         for _ in 0..MAX_MESSAGES {
             match self.driver.configuration() {
@@ -130,14 +128,10 @@ impl Radar {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> bool {
-        let Some(DescribedRadar {
-            radar,
-            azimuth_offset,
-        }) = self.described
-        else {
+        let Some(of) = self.described else {
             return false;
         };
-        let completed = match turn.rows(&radar, azimuth_offset, clock::since_1970_ns()) {
+        let completed = match turn.rows(&of.radar, of.azimuth_offset, clock::since_1970_ns()) {
             Ok(rows) => rows.enumerate().skip(from).find_map(|(index, row)| {
                 let is_complete = self.intake.add(row.azimuth, row.arrived_ns, header, bytes);
                 is_complete.then_some(index + 1)
@@ -189,14 +183,11 @@ impl Radar {
         room: usize,
     ) -> Result<(), StageError> {
         self.estimate.add_message(message, arrival_ns);
+        let is_due = self.opened.elapsed() >= CONFIGURATION_WAIT;
         let resolution_m = self.settings.constants.range_resolution_m;
-        let Some(resolution_m) =
-            resolution_m.filter(|_| self.opened.elapsed() >= CONFIGURATION_WAIT)
-        else {
-            return Ok(());
-        };
         let counts = self.settings.encoder_counts;
-        let Some(radar) = self.estimate.configuration(counts, resolution_m) else {
+        let estimated = |resolution_m| self.estimate.configuration(counts, resolution_m);
+        let Some(radar) = resolution_m.filter(|_| is_due).and_then(estimated) else {
             return Ok(());
         };
         let (azimuths, bins) = (radar.azimuth_samples, radar.range_in_bins);
@@ -239,7 +230,7 @@ impl Sensor for Radar {
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
-        let input = |error: DriverError| StageError::Input(error.to_string());
+        let input = |error: NodeError| StageError::Input(error.to_string());
         let is_received = self.driver.receive().map_err(input)?;
         self.driver.clear().map_err(|error| input(error.into()))?;
         self.driver.pass_fixes_on();

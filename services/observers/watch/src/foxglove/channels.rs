@@ -10,7 +10,6 @@ use super::measurements::{HEALTH, LATENCY, health_schema, latency_schema};
 
 /// A channel. Its number is its place in [`all`].
 pub struct Channel {
-    /// The name that viewers show.
     pub name: &'static str,
     /// The topic of the run that it is made of; `None`: every run has the channel.
     pub topic: Option<&'static str>,
@@ -21,7 +20,6 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// Returns whether a run has the topic of the channel.
     pub fn is_of(&self, manifest: &Manifest) -> bool {
         self.topic.is_none_or(|name| {
             let has = topics(&manifest.window).any(|topic| topic.name == name);
@@ -29,7 +27,6 @@ impl Channel {
         })
     }
 
-    /// Returns a channel of JSON.
     fn measured(name: &'static str, topic: Option<&'static str>, schema: &Value) -> Self {
         let advertised = json!({
             "topic": name,
@@ -47,7 +44,6 @@ impl Channel {
     }
 }
 
-/// Returns all channels that a run can have.
 pub fn all() -> Vec<Channel> {
     let drawn = CHANNELS.iter().filter_map(|channel| {
         let schema = (channel.schema)()?;

@@ -16,32 +16,24 @@ use gyre_recording::{
     LogTail,
     view::{LOG, POINTS, TRAJECTORY, View, views},
 };
-use gyre_stage::{
-    StageError, clock,
-    observer::{Next, ObservedRun, Observer},
-    reader::Received,
-};
+use gyre_stage::{clock, observer::ObservedRun, reader::Received};
 
 use super::{
     Hub,
     measurements::{HEALTH, LATENCY, latency},
 };
-use crate::{messages::RunState, observing::Followed};
+use crate::observing::{Followed, follow_topic};
 
-/// Time between two polls for a run, for viewers that want a topic, and for a request to stop.
+/// Time between two polls for the log and the report, and for a request to stop.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures of a topic, for recordings that are played fast.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The shortest time between two complete trajectories.
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A topic that is published to viewers.
-struct FollowedTopic<M: Message> {
+struct Publisher {
     hub: Arc<Hub>,
     followed: Arc<Followed>,
-    /// Publishes the views that need the payload.
-    more: fn(&mut FollowedTopic<M>, &Received<M>),
     /// When the last picture or trajectory was made.
     drawn: Option<Instant>,
 }
@@ -55,75 +47,52 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
     };
     Ok(vec![
         report,
-        follow::<Scan>(followed, hub, picture)?,
-        follow::<Masked>(followed, hub, masked)?,
-        follow::<Rotation>(followed, hub, nothing)?,
-        follow::<Motion>(followed, hub, nothing)?,
-        follow::<Refined>(followed, hub, nothing)?,
-        follow::<Pose>(followed, hub, pose)?,
-        follow::<Loop>(followed, hub, nothing)?,
-        follow::<Correction>(followed, hub, nothing)?,
-        follow::<Fix>(followed, hub, nothing)?,
-        follow::<Objects>(followed, hub, nothing)?,
+        follow::<Scan>(followed, hub, Publisher::scan)?,
+        follow::<Masked>(followed, hub, Publisher::masked)?,
+        follow::<Rotation>(followed, hub, |_, _| {})?,
+        follow::<Motion>(followed, hub, |_, _| {})?,
+        follow::<Refined>(followed, hub, |_, _| {})?,
+        follow::<Pose>(followed, hub, Publisher::pose)?,
+        follow::<Loop>(followed, hub, |_, _| {})?,
+        follow::<Correction>(followed, hub, |_, _| {})?,
+        follow::<Fix>(followed, hub, |_, _| {})?,
+        follow::<Objects>(followed, hub, |_, _| {})?,
     ])
 }
 
+/// Follows a topic; `more` publishes the views that need the payload.
 fn follow<M: Message>(
     followed: &Arc<Followed>,
     hub: &Arc<Hub>,
-    more: fn(&mut FollowedTopic<M>, &Received<M>),
+    more: fn(&mut Publisher, &Received<M>),
 ) -> io::Result<JoinHandle<()>> {
-    let mut topic = FollowedTopic {
-        hub: Arc::clone(hub),
-        followed: Arc::clone(followed),
-        more,
-        drawn: None,
-    };
+    let (hub, followed) = (Arc::clone(hub), Arc::clone(followed));
     let thread = thread::Builder::new().name(format!("fox-{}", M::TOPIC));
-    thread.spawn(move || topic.follow_runs())
+    thread.spawn(move || {
+        let is_wanted = || !followed.view.is_stopping() && hub.wants_topic(M::TOPIC);
+        while !followed.view.is_stopping() {
+            let mut publisher = Publisher {
+                hub: Arc::clone(&hub),
+                followed: Arc::clone(&followed),
+                drawn: None,
+            };
+            let published = follow_topic::<M>(&followed, &is_wanted, |message, _| {
+                let Some(message) = message else { return };
+                let stamp_ns = message.item().stamp_ns;
+                for view in views(M::TOPIC, bytes_of(message.header())) {
+                    hub.publish(view.channel, stamp_ns, view.data);
+                }
+                more(&mut publisher, message);
+            });
+            if let Err(error) = published {
+                let notice = format!("{} is not shown: {error}.", M::TOPIC);
+                hub.notice.send_replace(notice);
+            }
+        }
+    })
 }
 
-impl<M: Message> FollowedTopic<M> {
-    fn is_wanted(&self) -> bool {
-        !self.followed.view.is_stopping() && self.hub.wants_topic(M::TOPIC)
-    }
-
-    fn follow_runs(&mut self) {
-        while !self.followed.view.is_stopping() {
-            thread::sleep(POLL_INTERVAL);
-            if !self.is_wanted() || self.followed.view.run().state != RunState::Working {
-                continue;
-            }
-            match ObservedRun::writing_to(&self.followed.out).and_then(|run| self.follow(&run)) {
-                Ok(()) | Err(StageError::NotRunning { .. }) => {}
-                Err(error) => {
-                    let notice = format!("{} is not shown: {error}.", M::TOPIC);
-                    self.hub.notice.send_replace(notice);
-                }
-            }
-        }
-    }
-
-    /// Follows a run as long as a viewer wants the topic.
-    fn follow(&mut self, run: &ObservedRun) -> Result<(), StageError> {
-        let mut observer: Observer<'_, M> = run.observe()?;
-        self.drawn = None;
-        while self.is_wanted() {
-            match observer.next(POLL_INTERVAL)? {
-                Next::Message(message, _) => {
-                    let stamp_ns = message.item().stamp_ns;
-                    for view in views(M::TOPIC, bytes_of(message.header())) {
-                        self.hub.publish(view.channel, stamp_ns, view.data);
-                    }
-                    (self.more)(self, message);
-                }
-                Next::Idle => {}
-                Next::Ended => break,
-            }
-        }
-        Ok(())
-    }
-
+impl Publisher {
     /// Publishes a view if it is wanted. A message that is too short for its header has none.
     fn publish(&self, channel: &str, stamp_ns: i64, view: impl FnOnce() -> Option<View>) {
         if self.hub.is_wanted(channel)
@@ -133,7 +102,6 @@ impl<M: Message> FollowedTopic<M> {
         }
     }
 
-    /// Returns whether another picture is due.
     fn is_due(&mut self, interval: Duration) -> bool {
         let is_due = self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
         if is_due {
@@ -141,46 +109,43 @@ impl<M: Message> FollowedTopic<M> {
         }
         is_due
     }
-}
 
-fn nothing<M: Message>(_: &mut FollowedTopic<M>, _: &Received<M>) {}
-
-fn picture(topic: &mut FollowedTopic<Scan>, message: &Received<Scan>) {
-    if topic.is_due(PICTURE_INTERVAL) {
-        image(topic, "/scan", message);
+    fn scan(&mut self, message: &Received<Scan>) {
+        if self.is_due(PICTURE_INTERVAL) {
+            self.image("/scan", message);
+        }
     }
-}
 
-fn masked(topic: &mut FollowedTopic<Masked>, message: &Received<Masked>) {
-    if !topic.is_due(PICTURE_INTERVAL) {
-        return;
+    fn masked(&mut self, message: &Received<Masked>) {
+        if !self.is_due(PICTURE_INTERVAL) {
+            return;
+        }
+        self.image("/masked", message);
+        let header = message.header();
+        self.publish(POINTS, header.item.stamp_ns, || {
+            let points = header.points(message.values())?;
+            Some(View::points(points, header))
+        });
     }
-    image(topic, "/masked", message);
-    let header = message.header();
-    topic.publish(POINTS, header.item.stamp_ns, || {
-        let points = header.points(message.values())?;
-        Some(View::points(points, header))
-    });
-}
 
-fn image<M: Message>(topic: &FollowedTopic<M>, channel: &str, message: &Received<M>) {
-    let stamp_ns = message.item().stamp_ns;
-    topic.publish(channel, stamp_ns, || {
-        let header = bytes_of(message.header());
-        View::image_of(M::TOPIC, header, message.values(), stamp_ns)
-    });
-}
-
-fn pose(topic: &mut FollowedTopic<Pose>, message: &Received<Pose>) {
-    let item = message.item();
-    let stamp_ns = item.stamp_ns;
-    if topic.hub.is_wanted(LATENCY) {
-        topic.hub.publish(LATENCY, stamp_ns, latency(item));
+    fn image<M: Message>(&self, channel: &str, message: &Received<M>) {
+        let stamp_ns = message.item().stamp_ns;
+        self.publish(channel, stamp_ns, || {
+            let header = bytes_of(message.header());
+            View::image_of(M::TOPIC, header, message.values(), stamp_ns)
+        });
     }
-    if topic.hub.is_wanted(TRAJECTORY) && topic.is_due(TRAJECTORY_INTERVAL) {
-        let poses = topic.followed.view.trajectory();
-        let view = View::trajectory(poses.into_iter(), stamp_ns);
-        topic.hub.publish(TRAJECTORY, stamp_ns, view.data);
+
+    fn pose(&mut self, message: &Received<Pose>) {
+        let item = message.item();
+        if self.hub.is_wanted(LATENCY) {
+            self.hub.publish(LATENCY, item.stamp_ns, latency(item));
+        }
+        if self.hub.is_wanted(TRAJECTORY) && self.is_due(TRAJECTORY_INTERVAL) {
+            let poses = self.followed.view.trajectory().into_iter();
+            let view = View::trajectory(poses, item.stamp_ns);
+            self.hub.publish(TRAJECTORY, item.stamp_ns, view.data);
+        }
     }
 }
 
@@ -213,13 +178,13 @@ fn report(followed: &Followed, hub: &Hub) {
             }
         }
         if health.has_changed().unwrap_or(false) {
-            let report = health.borrow_and_update().as_bytes().to_vec();
-            hub.publish(HEALTH, stamp_ns, report);
+            let report = health.borrow_and_update().clone();
+            let report = report.map(|report| report.into_data().to_vec());
+            hub.publish(HEALTH, stamp_ns, report.unwrap_or_default());
         }
     }
 }
 
-/// Announces the channels of the run, and returns the path of its log.
 fn announce(followed: &Followed, hub: &Hub) -> Option<PathBuf> {
     let run = ObservedRun::writing_to(&followed.out).ok()?;
     let channels = hub.channels.iter().enumerate();

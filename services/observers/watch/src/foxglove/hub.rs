@@ -14,9 +14,7 @@ use super::{
 
 /// The channels, and the viewers that have subscribed to them.
 pub struct Hub {
-    /// All channels that a run can have.
     pub channels: Vec<Channel>,
-    /// The numbers of those that this run has.
     pub of_run: watch::Sender<Vec<usize>>,
     /// The newest sentence about a topic that is not shown.
     pub notice: watch::Sender<String>,
@@ -28,7 +26,6 @@ pub struct Hub {
 /// A viewer in the hub. Dropped, it is removed with its subscriptions.
 pub struct HubMember {
     hub: Arc<Hub>,
-    /// The messages that wait for it.
     pub queue: Arc<ViewerQueue>,
 }
 
@@ -54,7 +51,6 @@ impl Hub {
         self.channels.iter().position(|it| it.name == name)
     }
 
-    /// Returns whether a viewer has subscribed to a channel.
     pub fn is_wanted(&self, name: &str) -> bool {
         let has = |channel: usize| self.wanted[channel].load(Ordering::Relaxed) > 0;
         self.position(name).is_some_and(has)
@@ -80,7 +76,6 @@ impl Hub {
         self.viewers().iter().for_each(|it| it.put(&message));
     }
 
-    /// Adds a viewer.
     pub fn join(self: &Arc<Self>) -> HubMember {
         let queue = Arc::new(ViewerQueue::default());
         self.viewers().push(Arc::clone(&queue));
@@ -131,10 +126,7 @@ mod tests {
         let id = |name| hub.position(name).unwrap_or(usize::MAX);
         let (first, second) = (hub.join(), hub.join());
         assert!(first.subscribe(id("/tf"), 1) && second.subscribe(id("/points"), 1));
-        assert!(
-            first.subscribe(id("/tf"), 2),
-            "another number, no other channel"
-        );
+        assert!(first.subscribe(id("/tf"), 2));
         assert!(!first.subscribe(hub.channels.len(), 3));
         let wanted = || ["pose", "masked", "scan"].map(|topic| hub.wants_topic(topic));
         assert_eq!(wanted(), [true, true, false]);

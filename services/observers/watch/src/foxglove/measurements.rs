@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use gyre_messages::{Item, StageId};
-use serde::Serialize;
 use serde_json::{Value, json};
 
 /// The channel of the delays of each pose.
@@ -11,52 +10,32 @@ pub const LATENCY: &str = "/latency";
 /// The channel of the report that the page shows once a second.
 pub const HEALTH: &str = "/health";
 
-/// The delays of a pose, ms.
-#[derive(Debug, Serialize)]
-struct Latency {
-    seq: u64,
-    scan: u64,
-    /// Scans that live mode has dropped so far.
-    dropped: u64,
-    sensor_to_pose_ms: f64,
-    /// By the stage's name, with `_` for `-`: paths of plots have no hyphens.
-    stages: BTreeMap<String, Hop>,
-}
-
-#[derive(Debug, Serialize)]
-struct Hop {
-    transport_ms: f64,
-    wait_ms: f64,
-    work_ms: f64,
-}
-
-/// Returns the delays of a pose in JSON.
+/// Returns the delays of a pose. The names of stages have `_` for `-`: paths of plots have no
+/// hyphens.
 pub fn latency(item: &Item) -> Vec<u8> {
     let ms = |duration_ns: i64| duration_ns as f64 * 1e-6;
     let hops = item.hop_times().map(|times| {
-        let hop = Hop {
-            transport_ms: ms(times.transport_ns.unwrap_or(0)),
-            wait_ms: ms(times.wait_ns),
-            work_ms: ms(times.work_ns),
-        };
+        let hop = json!({
+            "transport_ms": ms(times.transport_ns.unwrap_or(0)),
+            "wait_ms": ms(times.wait_ns),
+            "work_ms": ms(times.work_ns),
+        });
         (key(times.stage), hop)
     });
-    let latency = Latency {
-        seq: item.seq,
-        scan: item.scan,
-        dropped: item.dropped(),
-        sensor_to_pose_ms: ms(item.sensor_to_pose_ns()),
-        stages: hops.collect(),
-    };
-    // Numbers and names always are JSON.
-    serde_json::to_vec(&latency).unwrap_or_default()
+    let latency = json!({
+        "seq": item.seq,
+        "scan": item.scan,
+        "dropped": item.dropped(),
+        "sensor_to_pose_ms": ms(item.sensor_to_pose_ns()),
+        "stages": hops.collect::<BTreeMap<_, _>>(),
+    });
+    latency.to_string().into()
 }
 
 fn key(stage: StageId) -> String {
     stage.name().replace('-', "_")
 }
 
-/// Returns the schema of [`latency`].
 pub fn latency_schema() -> Value {
     let hop = object(numbers(["transport_ms", "wait_ms", "work_ms"]));
     let stages = StageId::ALL.map(|stage| (key(stage), hop.clone()));
@@ -68,23 +47,13 @@ pub fn latency_schema() -> Value {
 pub fn health_schema() -> Value {
     let counts = ["published", "poses", "dropped", "in_flight"];
     let missed = object(numbers(["pose", "scan", "masked", "objects"]));
-    let process = [
-        ("name".to_owned(), json!({"type": "string"})),
-        ("state".to_owned(), json!({"type": "string"})),
-    ];
-    let process = process.into_iter().chain(numbers([
-        "pid",
-        "restarts",
-        "processor_share",
-        "cpu_s",
-        "own_bytes",
-    ]));
+    let words = ["name", "state"].map(|name| (name.to_owned(), json!({"type": "string"})));
+    let usage = ["pid", "restarts", "processor_share", "cpu_s", "own_bytes"];
+    let process = words.into_iter().chain(numbers(usage));
     let processes = json!({"type": "array", "items": object(process)});
     let own = numbers(counts).chain(numbers(["scans_per_s", "distance_m"]));
-    object(own.chain([
-        ("missed".to_owned(), missed),
-        ("processes".to_owned(), processes),
-    ]))
+    let lists = [("missed", missed), ("processes", processes)];
+    object(own.chain(lists.map(|(name, schema)| (name.to_owned(), schema))))
 }
 
 fn numbers<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, Value)> + use<N> {

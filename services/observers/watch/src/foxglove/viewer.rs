@@ -15,7 +15,6 @@ use crate::run_view::RunView;
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 /// The longest time that a viewer may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
-/// The shortest time between two sentences about skipped messages.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(2);
 /// The first byte of a message of a channel, and of one that sets the viewer's clock.
 const MESSAGE_DATA: u8 = 1;
@@ -46,12 +45,10 @@ struct Subscription {
     channel_id: usize,
 }
 
-/// A connection.
 struct Viewer {
     socket: WebSocket,
     hub: Arc<Hub>,
     member: HubMember,
-    /// The advertised channels.
     advertised: Vec<usize>,
     /// The viewer's clock: the newest time of the sensor that it was sent, ns.
     time_ns: i64,
@@ -59,7 +56,6 @@ struct Viewer {
     last_warning: Option<Instant>,
 }
 
-/// The viewer has disconnected, or takes too long.
 struct Disconnected;
 
 /// Serves a viewer until it disconnects, is too slow, or the program ends.
@@ -145,24 +141,20 @@ impl Viewer {
         let gone = self.advertised.iter().filter(|it| !is_in(&of_run, it));
         let gone: Vec<usize> = gone.copied().collect();
         let new = of_run.iter().filter(|it| !is_in(&self.advertised, it));
-        let new: Vec<Value> = new
-            .map(|channel| self.hub.channels[*channel].advertised.clone())
-            .collect();
+        let new = new.map(|channel| self.hub.channels[*channel].advertised.clone());
+        let new: Vec<Value> = new.collect();
         self.advertised = of_run;
         if !gone.is_empty() {
-            self.send_json(&json!({"op": "unadvertise", "channelIds": gone}))
-                .await?;
+            let message = json!({"op": "unadvertise", "channelIds": gone});
+            self.send_json(&message).await?;
         }
-        match new.is_empty() {
-            true => Ok(()),
-            false => {
-                self.send_json(&json!({"op": "advertise", "channels": new}))
-                    .await
-            }
+        if !new.is_empty() {
+            let message = json!({"op": "advertise", "channels": new});
+            self.send_json(&message).await?;
         }
+        Ok(())
     }
 
-    /// Sends a message of a channel, and before it the time.
     async fn send_data(
         &mut self,
         subscription: u32,
@@ -185,10 +177,8 @@ impl Viewer {
     }
 
     async fn warn_of_skipped(&mut self) -> Result<(), Disconnected> {
-        if self
-            .last_warning
-            .is_some_and(|at| at.elapsed() < SENTENCE_PERIOD)
-        {
+        let is_recent = |at: Instant| at.elapsed() < SENTENCE_PERIOD;
+        if self.last_warning.is_some_and(is_recent) {
             return Ok(());
         }
         let skipped = self.member.queue.skipped();
@@ -204,7 +194,6 @@ impl Viewer {
         self.send_status(WARNING, "skipped", &sentence).await
     }
 
-    /// Sends a status sentence, which replaces the one before with the same name.
     async fn send_status(
         &mut self,
         level: u8,
@@ -221,10 +210,7 @@ impl Viewer {
 
     async fn send(&mut self, message: Message) -> Result<(), Disconnected> {
         let sent = time::timeout(MAX_SEND, self.socket.send(message)).await;
-        match sent {
-            Ok(Ok(())) => Ok(()),
-            _ => Err(Disconnected),
-        }
+        sent.map_err(|_| Disconnected)?.map_err(|_| Disconnected)
     }
 }
 

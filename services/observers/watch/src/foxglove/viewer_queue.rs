@@ -20,22 +20,18 @@ pub struct ViewerQueue {
     added: Notify,
 }
 
-/// An encoded message, which all viewers share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodedMessage {
-    /// The channel's number.
     pub channel: usize,
     /// True if only the newest of the channel waits.
     pub is_bulky: bool,
     /// Time of the scan on the sensor's clock, ns.
     pub stamp_ns: i64,
-    /// The message.
     pub data: Bytes,
 }
 
 #[derive(Default)]
 struct Queue {
-    /// The viewer's number of each subscription, by channel.
     subscriptions: BTreeMap<usize, u32>,
     messages: VecDeque<EncodedMessage>,
     bytes: usize,
@@ -59,7 +55,6 @@ impl ViewerQueue {
         queue.subscriptions.insert(channel, subscription).is_none()
     }
 
-    /// Ends a subscription, and returns its channel.
     pub fn unsubscribe(&self, subscription: u32) -> Option<usize> {
         let mut queue = self.queue();
         let mut all = queue.subscriptions.iter();
@@ -69,7 +64,6 @@ impl ViewerQueue {
         Some(channel)
     }
 
-    /// Returns the channels that are subscribed to.
     pub fn subscribed(&self) -> Vec<usize> {
         self.queue().subscriptions.keys().copied().collect()
     }
@@ -122,7 +116,6 @@ impl Queue {
         Some((subscription, message))
     }
 
-    /// Removes the messages of a channel, and returns their number.
     fn remove(&mut self, channel: usize) -> u64 {
         let before = self.messages.len();
         self.messages.retain(|message| message.channel != channel);
