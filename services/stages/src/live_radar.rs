@@ -12,7 +12,7 @@ mod turn_counter;
 
 use std::time::Duration;
 
-use gyre_colossus::{Address, BadAddress, Constants, Datagrams, Parser};
+use gyre_colossus::{Address, BadAddress, Constants};
 use gyre_datasets::DatasetOptions;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
@@ -59,10 +59,7 @@ impl Settings {
     }
 
     pub(crate) fn parser(&self) -> RadarParser {
-        match self.address.is_udp() {
-            false => RadarParser::Stream(Parser::default()),
-            true => RadarParser::Datagrams(Datagrams::new(self.encoder_counts)),
-        }
+        RadarParser::new(self.address.is_udp(), self.encoder_counts)
     }
 }
 

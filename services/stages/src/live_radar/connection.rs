@@ -278,6 +278,14 @@ pub enum RadarParser {
 }
 
 impl RadarParser {
+    /// `encoder_counts` per turn are those of a radar that does not report them.
+    pub fn new(is_udp: bool, encoder_counts: u16) -> Self {
+        match is_udp {
+            false => Self::Stream(Parser::default()),
+            true => Self::Datagrams(Datagrams::new(encoder_counts)),
+        }
+    }
+
     pub fn space(&mut self) -> &mut [u8] {
         match self {
             Self::Stream(parser) => parser.space(CHUNK),

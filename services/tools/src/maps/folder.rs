@@ -141,7 +141,9 @@ mod tests {
 
     fn write_all(folder: &Path, text: &str) {
         fs::create_dir_all(folder.join("tiles")).unwrap();
-        FILES.map(|name| fs::write(folder.join(name), text).unwrap());
+        FILES
+            .iter()
+            .for_each(|name| fs::write(folder.join(name), text).unwrap());
     }
 
     /// Asserts that a folder has one map, which is of this text, and this many entries.

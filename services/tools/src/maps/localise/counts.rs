@@ -115,7 +115,7 @@ mod tests {
             4 of 8 scans localised (50.0 %): 2 found, 2 tracked; 1 predicted, 3 lost; 1 more could not be used\n\
             lost: scans 0 to 1, 5 to 5";
         assert_eq!(counts(&drive).summary(1), expected);
-        let elsewhere = counts(&[Status::Lost; 3]);
+        let elsewhere = counts(&[Lost; 3]);
         assert!(!elsewhere.has_fix());
         let none = "no scan was found in the map\n0 of 3 scans localised (0.0 %)";
         assert!(elsewhere.summary(0).starts_with(none));
