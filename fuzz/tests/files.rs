@@ -165,7 +165,7 @@ fn refinement_maps() {
         }
     };
     check!().with_type::<Vec<Edit>>().for_each(|edits| {
-        fs::write(&file, edited(&valid, edits, &word)).unwrap();
+        fs::write(&file, edited(&valid, edits, word)).unwrap();
         target.run(|| use_map(&file));
     });
 }
