@@ -58,18 +58,30 @@ impl Draft {
 
     /// Adds text or bytes at the end.
     pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
-        self.buffer.extend_from_slice(bytes.as_ref());
-        match self.buffer.len() >= BUFFER {
-            true => self.flush(),
-            false => Ok(()),
+        let bytes = bytes.as_ref();
+        if self.buffer.len() + bytes.len() > BUFFER {
+            self.flush()?;
         }
+        if bytes.len() > BUFFER {
+            // So a large file is not held twice.
+            return self.write(bytes);
+        }
+        self.buffer.extend_from_slice(bytes);
+        Ok(())
     }
 
     fn flush(&mut self) -> Result<(), StorageError> {
-        let written = self.file.write_at(&self.buffer, self.written);
+        let mut buffer = std::mem::take(&mut self.buffer);
+        let written = self.write(&buffer);
+        buffer.clear();
+        self.buffer = buffer;
+        written
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
+        let written = self.file.write_at(bytes, self.written);
         written.map_err(|error| StorageError::at("write", &self.path)(error.source))?;
-        self.written += self.buffer.len() as u64;
-        self.buffer.clear();
+        self.written += bytes.len() as u64;
         Ok(())
     }
 

@@ -46,7 +46,10 @@ pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
 /// process can have changed it for a moment.
 fn open_to_owner(folder: &Path) -> io::Result<()> {
     let mode = fs::metadata(folder)?.permissions().mode();
-    fs::set_permissions(folder, fs::Permissions::from_mode(mode | 0o700))
+    match mode & 0o700 == 0o700 {
+        true => Ok(()),
+        false => fs::set_permissions(folder, fs::Permissions::from_mode(mode | 0o700)),
+    }
 }
 
 /// Removes a file, if there is one. [`sync_folder`] makes that survive a power failure.

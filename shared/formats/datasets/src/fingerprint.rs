@@ -57,7 +57,7 @@ impl Fingerprint {
         let first = [self, now].map(|it| stamp(it.first_stamp_ns));
         let last = [self, now].map(|it| stamp(it.last_stamp_ns));
         let texts = |value: fn(&Self) -> String| [self, now].map(value);
-        // What comes before, between and behind the earlier and the present value.
+        // What comes before the earlier value, and between it and the present one.
         for ([was, now], [before, between]) in [
             (
                 texts(|it| it.format.to_string()),

@@ -191,10 +191,21 @@ fn numbers<'a, const N: usize>(
             LineError::new(line, reason)
         })
     };
-    let values = fields.map(number).collect::<Result<Vec<_>, _>>()?;
-    let count = values.len();
-    let wrong = |_| LineError::new(line, format!("{count} columns instead of {N}"));
-    values.try_into().map_err(wrong)
+    let (mut values, mut count) = ([0.0; N], 0);
+    for field in fields {
+        let value = number(field)?;
+        if let Some(into) = values.get_mut(count) {
+            *into = value;
+        }
+        count += 1;
+    }
+    match count == N {
+        true => Ok(values),
+        false => Err(LineError::new(
+            line,
+            format!("{count} columns instead of {N}"),
+        )),
+    }
 }
 
 /// Returns the columns of a csv with the given names.

@@ -28,9 +28,13 @@ impl Ahead {
         if !std::mem::replace(&mut self.looked, true) {
             return false;
         }
-        self.coming.retain(|(at, _)| *at >= index);
-        if self.coming.front().is_some_and(|(at, _)| *at > index) {
-            self.coming.clear();
+        let goes_on = self.coming.front().is_some_and(|(at, _)| *at <= index);
+        for (at, image) in std::mem::take(&mut self.coming) {
+            match goes_on && at >= index {
+                true => self.coming.push_back((at, image)),
+                // Waits, or a reader that jumps would start ever more threads.
+                false => drop(image.join()),
+            }
         }
         let next = self.coming.back().map_or(index, |(last, _)| last + 1);
         for at in next..(index + AHEAD).min(drive.scans()) {
