@@ -37,8 +37,10 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
         &["/nowhere/at/all", "is no file or folder"],
     );
     let data = format!("source.data={}", file.display());
-    let text = Run::of_recording().set(&data);
-    refused(text, &["scan.txt is a file", "folder"]);
+    refused(
+        Run::configured("").set(&data),
+        &["scan.txt is a file", "folder"],
+    );
     let few = ["has 1 scan:", "a motion is between two"];
     refused(run_of(one.path()), &few);
     refused(run_of(empty.path()), &["first image", ".png"]);
