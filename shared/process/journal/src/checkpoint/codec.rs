@@ -163,7 +163,7 @@ impl<F: FnMut(&mut u64)> Words<F> {
         });
     }
 
-    /// All fields are named here, so that none is forgotten.
+    /// Names all fields, so that the compiler finds a forgotten one.
     fn tracker(&mut self, state: &mut TrackerState) {
         let TrackerState {
             pose,
