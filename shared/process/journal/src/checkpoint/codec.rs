@@ -12,8 +12,8 @@ use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, Unit
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the velocity
-/// by Doppler.
+/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the
+/// velocity by Doppler.
 const TRACKER_WORDS: usize = 4 + 2 * 9 + 8 + 12 + 21 + 2 * 21;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, displacement by the search,
 /// corners of both levels.
