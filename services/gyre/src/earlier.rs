@@ -27,7 +27,7 @@ use gyre_stage::Generation;
 use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_terminal::{Failure, print};
 
-pub use replaced::settle;
+pub use replaced::{is_untouched, settle};
 
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];

@@ -226,8 +226,9 @@ fn play(
     progress.finish();
     notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
+        let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
-        return start_over(resumed);
+        return start_over(resumed, begins_anew);
     }
     let session = Session {
         scans: checked.scans.count,
@@ -409,13 +410,14 @@ fn has_started_over_at(poses: usize) -> bool {
 }
 
 /// Executes the same command again. The transport hung on the remains of a dead process, which are
-/// removed now: it cannot be used again in this process. The run resumes from the journal.
-fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
+/// removed now: it cannot be used again in this process. The run resumes from the journal; if it
+/// was replacing a complete run and has computed nothing, it begins again as requested.
+fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over",
     );
     // Computed poses are not discarded.
-    let arguments = env::args_os().filter(|argument| argument != "--fresh");
+    let arguments = env::args_os().filter(|argument| begins_anew || argument != "--fresh");
     let failed = execute_again(arguments, STARTED_OVER, &resumed.to_string());
     Err(format!("cannot start over: {failed}").into())
 }

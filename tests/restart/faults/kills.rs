@@ -55,8 +55,8 @@ pub fn at_the_start(scene: &mut Scene) -> Option<()> {
 }
 
 /// Waits until a file has been written, or a file in a folder been made, so often that it shows.
-/// `None` without so many writes within `limit`.
-fn await_writes(path: &Path, writes: u64, limit: Duration) -> Option<()> {
+/// `None` without so many writes within `limit`, or before the run is over.
+fn await_writes(running: &mut Running, path: &Path, writes: u64, limit: Duration) -> Option<()> {
     let state = || {
         let file = fs::metadata(path).ok()?;
         Some((file.len(), file.modified().ok()?))
@@ -64,7 +64,7 @@ fn await_writes(path: &Path, writes: u64, limit: Duration) -> Option<()> {
     let (since, mut seen) = (Instant::now(), state()?);
     for _ in 0..writes {
         while state()? == seen {
-            (since.elapsed() < limit).then_some(())?;
+            (since.elapsed() < limit && !running.is_over()).then_some(())?;
         }
         seen = state()?;
     }
@@ -89,7 +89,7 @@ pub fn at_a_write(scene: &mut Scene) -> Option<()> {
     let pid = *running.stages().get(*stage)?;
     let writes = scene.rng.random_range(1..=4);
     // No process waits longer between its writes.
-    await_writes(file, writes, Duration::from_secs(2 * writes))?;
+    await_writes(&mut running, file, writes, Duration::from_secs(2 * writes))?;
     send(pid, Signal::KILL);
     scene.finished(&run, &running.finish());
     Some(())
@@ -164,7 +164,7 @@ pub fn at_the_results(scene: &mut Scene) -> Option<()> {
     let mut running = run.start();
     running.await_poses_or_end(1);
     let writes = scene.rng.random_range(1..=20);
-    await_writes(run.out(), writes, Duration::from_secs(60))?;
+    await_writes(&mut running, run.out(), writes, Duration::from_secs(60))?;
     running.kill_supervisor();
     scene.resumed(&run);
     Some(())

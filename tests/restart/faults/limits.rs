@@ -74,7 +74,7 @@ fn limited(
     };
     // A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack
     // cannot grow (SIGSEGV). For the supervisor that is as good as a kill.
-    if ended.code().is_none() {
+    if resource == "as" && ended.code().is_none() {
         scene.resumed(run);
     } else {
         assert_nothing_left(run.out());

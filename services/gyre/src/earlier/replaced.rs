@@ -53,8 +53,9 @@ fn is_whole(out: &Out) -> bool {
     !is_complete(out.path()) && out.join(ASIDE).join(mark()).exists()
 }
 
-/// Returns whether the run that is to replace a complete one has computed nothing.
-fn is_untouched(out: &Out) -> Result<bool, Failure> {
+/// Returns whether the run that is to replace a complete one has computed nothing: that is given
+/// back.
+pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
     }

@@ -22,6 +22,9 @@ const REQUESTS: [Request; 3] = [
     Request::StartFft,
     Request::StartHealth,
 ];
+/// Bytes of other messages, more than wait for a stage that was held up, after which a radar that
+/// sends no azimuths is left although it never falls silent.
+const OTHER_BYTES: usize = 16 << 20;
 /// Buffer for datagrams that are not read yet, as far as the system allows: one scan.
 const RECEIVE_BYTES: usize = 4 << 20;
 
@@ -42,6 +45,8 @@ pub struct Connection {
     socket: Option<RadarSocket>,
     /// The time of the last azimuth, or of the opening.
     last_azimuth: Instant,
+    /// Bytes received since then.
+    without_azimuth: usize,
     /// True from the first azimuth after the opening on.
     pub receives_azimuths: bool,
     retry_at: Instant,
@@ -64,6 +69,7 @@ impl Connection {
             silence: settings.silence,
             socket: None,
             last_azimuth: now,
+            without_azimuth: 0,
             receives_azimuths: false,
             retry_at: now,
             pause: RETRY_PAUSES[0],
@@ -89,14 +95,19 @@ impl Connection {
                 self.from = from;
                 if !self.is_foreign() {
                     messages.filled(count);
+                    self.without_azimuth += count;
                 }
-                ReadResult::Bytes
+                let floods = self.without_azimuth > OTHER_BYTES;
+                match floods && self.last_azimuth.elapsed() > self.silence {
+                    true => self.close_deaf(),
+                    false => ReadResult::Bytes,
+                }
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => ReadResult::Bytes,
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
                 match self.silence.checked_sub(self.last_azimuth.elapsed()) {
                     Some(left) if !left.is_zero() => ReadResult::Nothing(left),
-                    _ => self.close(format!("it sent no azimuth for {:?}", self.silence)),
+                    _ => self.close_deaf(),
                 }
             }
             Err(error) => self.close(error),
@@ -107,6 +118,7 @@ impl Connection {
     /// without powers.
     pub fn note_azimuth(&mut self) {
         self.last_azimuth = Instant::now();
+        self.without_azimuth = 0;
         self.receives_azimuths = true;
         self.pause = RETRY_PAUSES[0];
     }
@@ -156,12 +168,18 @@ impl Connection {
                 tracing::info!(address = %self.address, "connected to the radar");
                 self.socket = Some(socket);
                 self.last_azimuth = Instant::now();
+                self.without_azimuth = 0;
                 self.receives_azimuths = false;
                 self.opened += 1;
                 ReadResult::Opened
             }
             Err(error) => self.close(error),
         }
+    }
+
+    fn close_deaf(&mut self) -> ReadResult {
+        let silence = self.silence;
+        self.close(format_args!("it sent no azimuth for {silence:?}"))
     }
 
     /// Closes the connection, to be opened again after a pause.

@@ -27,6 +27,8 @@ fn an_unknown_key_names_itself_and_the_nearest_right_one() {
     ] {
         assert_eq!(from(text).unwrap_err().to_string(), section);
     }
+    let error = from("masking = 3").unwrap_err().to_string();
+    assert!(error.contains("masking"), "{error}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! A run as data: the sections of its configuration that its processes read, and its report at the
-//! end. It needs neither the mathematics nor the transport.
+//! end. It needs no transport.
 
 mod budget;
 pub mod latency;

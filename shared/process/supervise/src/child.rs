@@ -126,7 +126,8 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Or to `begun`, the program of the run's begin, if a file of the one before has changed.
+    /// Goes back to the program before, or to `begun`, that of the run's begin, if a file of the
+    /// one before has changed.
     pub fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();

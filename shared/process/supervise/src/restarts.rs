@@ -27,7 +27,8 @@ impl Supervisor<'_> {
         self.restart(&restarted, died_ns)
     }
 
-    /// The messages of a program on trial may be why another stage fails. Returns them.
+    /// Goes back from programs on trial, whose messages may be why another stage fails; returns
+    /// these processes.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();

@@ -2,13 +2,13 @@
 //! waiting for a slow client.
 
 use std::{
-    io::{self, BufRead, BufReader, Read, Write},
+    io::{self, Read, Write},
     os::{
         fd::{AsFd, BorrowedFd},
         unix::net::{UnixListener, UnixStream},
     },
     path::Path,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use gyre_stage::{
@@ -21,7 +21,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 /// meanwhile, and clients of this user send it at once.
 const LIMIT: Duration = Duration::from_millis(100);
 /// Size of the longest request, bytes.
-const MAX: u64 = 64 << 10;
+const MAX: usize = 64 << 10;
 
 /// The socket, open to this user alone since it lies in the run's root.
 pub(crate) struct ControlSocket(UnixListener);
@@ -70,16 +70,26 @@ pub(crate) struct Client(UnixStream);
 impl Client {
     fn of(stream: UnixStream) -> io::Result<Self> {
         stream.set_nonblocking(false)?;
-        stream.set_read_timeout(Some(LIMIT))?;
         stream.set_write_timeout(Some(LIMIT))?;
         Ok(Self(stream))
     }
 
-    /// Reads the request, a line.
+    /// Reads the request, a line. The limit holds for all of it, however slowly it comes.
     fn request(&self) -> io::Result<Request> {
-        let mut line = String::new();
-        BufReader::new(&self.0).take(MAX).read_line(&mut line)?;
-        Ok(serde_json::from_str(&line)?)
+        let deadline = Instant::now() + LIMIT;
+        let (mut line, mut buffer) = (Vec::new(), [0; 4096]);
+        while line.last() != Some(&b'\n') && line.len() < MAX {
+            let rest = deadline.saturating_duration_since(Instant::now());
+            if rest.is_zero() {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            self.0.set_read_timeout(Some(rest))?;
+            match (&self.0).read(&mut buffer)? {
+                0 => break,
+                length => line.extend_from_slice(&buffer[..length]),
+            }
+        }
+        Ok(serde_json::from_slice(&line)?)
     }
 
     /// Returns whether nobody waits for the answer any more.

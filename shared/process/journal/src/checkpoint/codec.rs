@@ -2,7 +2,9 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{Anchor, Heading, Keyframe, TrackerState, Verdict, WheelState};
+use gyre_scan_matching::{
+    Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState,
+};
 use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, UnitComplex};
 
@@ -10,8 +12,8 @@ use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, Unit
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the velocity
-/// by Doppler.
+/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the
+/// velocity by Doppler.
 const TRACKER_WORDS: usize = 4 + 2 * 9 + 8 + 12 + 21 + 2 * 21;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, displacement by the search,
 /// corners of both levels.
@@ -161,26 +163,46 @@ impl<F: FnMut(&mut u64)> Words<F> {
         });
     }
 
+    /// Names all fields, so that the compiler finds a forgotten one.
     fn tracker(&mut self, state: &mut TrackerState) {
-        self.pose(&mut state.pose);
-        for anchor in &mut state.anchors {
-            self.anchor(anchor);
+        let TrackerState {
+            pose,
+            anchors,
+            mean_overlap,
+            mean_weight,
+            doubtful,
+            unmatched,
+            along_walls,
+            sliding,
+            ahead_m,
+            standstill,
+            heading,
+            wheels,
+            doppler,
+        } = state;
+        let Standstill {
+            reported,
+            anchor,
+            scans,
+            time_s,
+            jitter,
+            jitter_scans,
+        } = standstill;
+        self.pose(pose);
+        anchors.iter_mut().for_each(|it| self.anchor(it));
+        self.reals([mean_overlap, mean_weight]);
+        for count in [doubtful, unmatched, along_walls, sliding] {
+            self.count(count);
         }
-        self.reals([&mut state.mean_overlap, &mut state.mean_weight]);
-        self.count(&mut state.doubtful);
-        self.count(&mut state.unmatched);
-        self.count(&mut state.along_walls);
-        self.count(&mut state.sliding);
-        self.reals(state.ahead_m.iter_mut());
-        let standstill = &mut state.standstill;
-        self.pose(&mut standstill.reported);
-        self.pose(&mut standstill.anchor);
-        self.count(&mut standstill.scans);
-        self.reals([&mut standstill.time_s, &mut standstill.jitter]);
-        self.count(&mut standstill.jitter_scans);
-        self.heading(&mut state.heading);
-        self.wheels(&mut state.wheels);
-        self.wheels(&mut state.doppler);
+        self.reals(ahead_m.iter_mut());
+        self.pose(reported);
+        self.pose(anchor);
+        self.count(scans);
+        self.reals([time_s, jitter]);
+        self.count(jitter_scans);
+        self.heading(heading);
+        self.wheels(wheels);
+        self.wheels(doppler);
     }
 }
 
