@@ -3,7 +3,6 @@
 
 use std::{
     fs::File,
-    io,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
 };
@@ -38,14 +37,11 @@ impl<const N: usize> Numbers<N> {
         if self.written == Some(numbers) {
             return Ok(());
         }
-        self.put(numbers).map_err(StageError::file(&self.path))?;
+        let bytes = numbers.map(u64::to_le_bytes);
+        let written = self.file.write_all_at(bytes.as_flattened(), self.at);
+        written.map_err(StageError::file(&self.path))?;
         self.written = Some(numbers);
         Ok(())
-    }
-
-    pub fn put(&self, numbers: [u64; N]) -> io::Result<()> {
-        let bytes = numbers.map(u64::to_le_bytes);
-        self.file.write_all_at(bytes.as_flattened(), self.at)
     }
 }
 
