@@ -7,9 +7,9 @@ use gyre_storage::Draft;
 
 use crate::error::SimulatorError;
 
-/// Encodes the 8-bit grey PNG of `path` to `into`, whose content is replaced. Fast rather than small: the
-/// difference to the neighbour in range compresses better than PNG's other filters and needs no
-/// trial for each row (4 ms for an Oxford scan, which halves in size).
+/// Encodes the 8-bit grey PNG of `path` to `into`, whose content is replaced. Fast rather than
+/// small: the difference to the neighbour in range compresses better than PNG's other filters and
+/// needs no trial for each row (4 ms for an Oxford scan, which halves in size).
 pub(crate) fn encode(
     path: &Path,
     size: ImageSize,

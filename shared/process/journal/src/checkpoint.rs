@@ -248,8 +248,8 @@ impl Checkpoint {
         empty.or(oldest).unwrap_or(0)
     }
 
-    /// Reads the state after `item` with the checksum of its motion, and the names of its keyframes;
-    /// `None` if the file does not have it whole.
+    /// Reads the state after `item` with the checksum of its motion, and the names of its
+    /// keyframes; `None` if the file does not have it whole.
     fn read_state(&mut self, item: u64) -> Result<Option<(u64, TrackerState)>, StorageError> {
         let states = &self.layout.states;
         let whole = self.file.read(states, slot_of(item), &mut self.found)?;

@@ -103,8 +103,8 @@ pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
     Ok(missing.unwrap_or(poses))
 }
 
-/// Returns the last one of `keyframes` keyframes that is among the first `poses` poses, and how many
-/// there are up to it.
+/// Returns the last one of `keyframes` keyframes that is among the first `poses` poses, and how
+/// many there are up to it.
 fn newest(
     keyframes: usize,
     poses: u64,

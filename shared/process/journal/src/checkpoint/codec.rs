@@ -10,8 +10,8 @@ use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, Unit
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the velocity
-/// by Doppler.
+/// The pose, two anchors, means and counts, the standstill, the heading; the wheels and the
+/// velocity by Doppler.
 const TRACKER_WORDS: usize = 4 + 2 * 9 + 8 + 12 + 21 + 2 * 21;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, displacement by the search,
 /// corners of both levels.
@@ -206,8 +206,8 @@ pub(super) fn encode_state(
     Checksum::First.seal(slot);
 }
 
-/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
-/// first.
+/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong.
+/// Its keyframes are put into `keyframes`, oldest first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,
