@@ -5,8 +5,8 @@
 //! cargo run --release -p gyre-odometry --example own_search
 //! ```
 //!
-//! Here both sensors are simulated. Yours come from drivers: `GyroscopeSearch` stays. A mask of your
-//! own is passed in the same way, as the part `masker`.
+//! Here both sensors are simulated. Yours come from drivers: `GyroscopeSearch` stays. A mask of
+//! your own is passed in the same way, as the part `masker`.
 
 use std::error::Error;
 

@@ -39,7 +39,7 @@ impl Model {
             model: Some(card.clone()),
             ..MaskingConfig::default()
         };
-        let trained = Card::read(&masking).map_err(|error| error.to_string())?;
+        let trained = Card::read(&masking)?;
         let cell_m = cell_m.unwrap_or(trained.raster.cell_m);
         let raster = RasterConfig {
             n,

@@ -20,10 +20,10 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
         return record(file, radar, arguments);
     }
-    if let [data] = arguments.inputs.what.as_slice()
-        && let Some(capture) = Capture::open(data)?
-    {
-        return play(data, capture, arguments);
+    for word in &arguments.inputs.what {
+        if let Some(capture) = Capture::open(word)? {
+            return play(word, capture, arguments);
+        }
     }
     let mut configuration = played(&arguments.inputs)?;
     // The angles of an encoder are sent as it counts them: who receives them corrects its

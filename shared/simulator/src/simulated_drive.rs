@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_radar::{OwnedScan, ScanSlot};
-use gyre_samples::Sample;
+use gyre_samples::{RawFix, Sample};
 
 use crate::cars;
 use crate::config::SimulationConfig;
@@ -115,13 +115,20 @@ impl SimulatedDrive {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(&self.simulator)
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        log::samples(&config.gyro, config.seed, path, self.simulator.span())
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        wheels::samples(&self.simulator)
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
+    }
+
+    fn fixes(&self) -> Option<Vec<RawFix>> {
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
     }
 
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
@@ -142,7 +149,7 @@ impl SimulatedDrive {
                 wheels::FILE,
                 self.wheel_samples().map(|it| wheels::csv(&it)),
             ),
-            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
+            (gnss::FILE, self.fixes().map(|it| gnss::csv(&it))),
         ];
         files.extend(
             logs.into_iter()

@@ -132,11 +132,8 @@ fn registered(drive: &SimulatedDrive) -> Outcome<Vec<Keyframe>> {
 /// frame.
 fn placed([first, second]: [Vec<Keyframe>; 2]) -> Outcome<[Vec<Keyframe>; 2]> {
     let config = OdometryConfig::default();
-    let mut localiser = Localiser::new(
-        Map::new(first)?,
-        &config.refinement,
-        config.points.capacity,
-    )?;
+    let mut localiser =
+        Localiser::new(Map::new(first)?, &config.refinement, config.points.capacity)?;
     let mut search = DriveSearch::default();
     for keyframe in &second {
         search.add(&mut localiser, keyframe);

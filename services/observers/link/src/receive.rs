@@ -20,7 +20,7 @@ use zenoh::{Session, Wait};
 use crate::{
     LinkError, Network,
     request::Question,
-    send::{OfferedTopic, RunOffer, offer_key},
+    send::{OfferedTopic, RunOffer, began_ns, offer_key},
     waker::Waker,
 };
 
@@ -157,10 +157,4 @@ fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, Lin
             out.display()
         ))),
     }
-}
-
-/// Returns the time of the first pose in a folder, ns since 1970.
-pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
-    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
-    Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }

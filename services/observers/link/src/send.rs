@@ -9,12 +9,12 @@
 use std::{
     collections::BTreeMap,
     fmt, fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
 };
 
-use gyre_journal::loops::LoggedLoops;
+use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
@@ -28,7 +28,6 @@ use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
     LinkError, Network,
-    receive::began_ns,
     replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
     serve::{Offer, Server},
@@ -106,6 +105,12 @@ pub(crate) fn prefix(name: &str, sender: &str) -> String {
 
 pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
+}
+
+/// Returns the time of the first pose in a folder, ns since 1970.
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
+    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
+    Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }
 
 /// Sends the topics of a run until all receivers have everything, or a signal requests a stop.

@@ -2,7 +2,7 @@
 
 use std::{
     env,
-    io::{self, IsTerminal},
+    io::{self, IsTerminal, Write as _},
     path::{Path, PathBuf},
 };
 
@@ -69,7 +69,10 @@ fn confirm(out: &Path, started_in: &Path, what: &str) -> Result<(), Failure> {
         )
         .into());
     }
-    eprint!("gyre: the only run writes to {out} and was started from {started_in}: {what}? [y/N] ");
+    write!(
+        io::stderr(),
+        "gyre: the only run writes to {out} and was started from {started_in}: {what}? [y/N] "
+    )?;
     let mut answer = String::new();
     io::stdin().read_line(&mut answer)?;
     match agrees(&answer) {

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// A payload that does not fit its message, or a datagram that is no part of an azimuth: a sentence.
+/// A payload that does not fit its message, or a datagram that is no part of an azimuth: a
+/// sentence.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct Malformed(String);

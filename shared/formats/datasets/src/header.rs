@@ -209,8 +209,8 @@ pub(crate) fn endings<T: Copy>(units: &[(&'static str, T)]) -> Vec<(&'static str
     units.iter().flat_map(of_unit).collect()
 }
 
-/// Returns the unit of a column that has one of these names with the ending of a unit; `Some(None)`:
-/// without one; `None`: it has another name.
+/// Returns the unit of a column that has one of these names with the ending of a unit;
+/// `Some(None)`: without one; `None`: it has another name.
 pub(crate) fn unit_of<T: Copy>(
     name: &str,
     names: &str,

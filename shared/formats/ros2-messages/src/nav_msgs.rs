@@ -10,8 +10,8 @@ use crate::{
 };
 
 package! { nav_msgs:
-    /// The pose of the vehicle's frame `child_frame_id` in the frame of the header, and its velocity
-    /// in its own frame.
+    /// The pose of the vehicle's frame `child_frame_id` in the frame of the header, and its
+    /// velocity in its own frame.
     struct Odometry {
         header: Header = "std_msgs/Header header",
         child_frame_id: String = "string child_frame_id",

@@ -79,7 +79,8 @@ pub(crate) fn correct(
 }
 
 /// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows,
-/// one column for each fact. `time_s` is the time of its row, `chirp` the sign of its Doppler shift.
+/// one column for each fact. `time_s` is the time of its row, `chirp` the sign of its Doppler
+/// shift.
 pub(crate) fn displacements(
     seen: Vector2<f64>,
     time_s: f64,

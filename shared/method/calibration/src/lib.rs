@@ -1,9 +1,9 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
 //! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
-//! So two scans of one place from different poses cannot coincide: the slope of their overlap by each
-//! constant, at the relative pose that is best for it, shows the direction of the right one. Wrong
-//! constants also make the track drift. [`calibrate`] solves both; [`calibrate_gyro`] and
+//! So two scans of one place from different poses cannot coincide: the slope of their overlap by
+//! each constant, at the relative pose that is best for it, shows the direction of the right one.
+//! Wrong constants also make the track drift. [`calibrate`] solves both; [`calibrate_gyro`] and
 //! [`calibrate_wheels`] find the clocks of the other sensors by the same track.
 
 mod calibrate;
@@ -95,8 +95,8 @@ impl Estimate {
 /// Blocks of the drive for the jackknife.
 pub(crate) const BLOCKS: usize = 12;
 
-/// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block of
-/// the drive.
+/// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block
+/// of the drive.
 pub(crate) fn jackknife<const N: usize>(
     solve: impl Fn(Option<usize>) -> Option<SVector<f64, N>>,
 ) -> Option<[Estimate; N]> {

@@ -14,12 +14,12 @@ use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict
 const LINEARISATIONS: usize = 3;
 
 /// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
-/// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number
-/// of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long trajectories.
-/// The paper's filter keeps the covariance of x, y and yaw of each pose, this filter the covariance
-/// of a small motion of the world that takes the estimated pose to the true one: to first order the
-/// same. An error of yaw moves the poses after it around an arc instead of along its tangent, and
-/// the Jacobians of Eqs. 2 and 3 are simpler.
+/// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the
+/// number of keyframes, a loop to its square: use [`PoseGraph`](crate::PoseGraph) for long
+/// trajectories. The paper's filter keeps the covariance of x, y and yaw of each pose, this filter
+/// the covariance of a small motion of the world that takes the estimated pose to the true one: to
+/// first order the same. An error of yaw moves the poses after it around an arc instead of along
+/// its tangent, and the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
     max_keyframes: usize,

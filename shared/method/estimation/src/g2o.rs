@@ -1,8 +1,9 @@
 //! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2` and `FIX` of the first vertex.
 //!
-//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an information
-//! matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance. The first edge
-//! from each keyframe to the next one is read as odometry, all others as independent loops.
+//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an
+//! information matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance.
+//! The first edge from each keyframe to the next one is read as odometry, all others as independent
+//! loops.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -23,7 +24,7 @@ pub struct G2o {
     pub constraints: Vec<Constraint>,
 }
 
-/// What is wrong with a text, and in which line, counted from 1.
+/// The reason why a text is refused, with its line, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct G2oError(String);

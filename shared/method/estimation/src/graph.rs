@@ -48,8 +48,8 @@ impl Default for GraphOptions {
 }
 
 /// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least
-/// squares. Each loop is tested against the odometry alone when it comes, and all loops against each
-/// other by the kernel when the graph is solved.
+/// squares. Each loop is tested against the odometry alone when it comes, and all loops against
+/// each other by the kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     state: State,

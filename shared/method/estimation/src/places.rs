@@ -12,9 +12,9 @@
 //! - The sieve: amplitudes of the first 16 harmonics, which no rotation changes. The 32 nearest are
 //!   ranked by the whole descriptor.
 //! - The verification: at both angles the translation within 25 m, the alignment of both keyframes'
-//!   own points, and the masked correlation there, which must be high and clearly above every other.
-//!   0.65 lies between right loops (0.71 and more) and wrong ones (0.61 and less) of simulated drives
-//!   of Oxford and Boreas and of one of RADIATE, by `gyre-lab places`.
+//!   own points, and the masked correlation there, which must be high and clearly above every
+//!   other. 0.65 lies between right loops (0.71 and more) and wrong ones (0.61 and less) of
+//!   simulated drives of Oxford and Boreas and of one of RADIATE, by `gyre-lab places`.
 
 mod descriptor;
 mod file;

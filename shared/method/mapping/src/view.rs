@@ -18,8 +18,8 @@ const FULL_CELL_M: f64 = 0.2;
 /// A return is spread along its arc over so many standard deviations to either side.
 const SPREAD_SIGMAS: f64 = 2.0;
 
-/// The free space and the returns of a keyframe, in its own frame. Where nothing returns power it may
-/// have looked at open ground or at nothing, so a sector counts as far as its farthest return.
+/// The free space and the returns of a keyframe, in its own frame. Where nothing returns power it
+/// may have looked at open ground or at nothing, so a sector counts as far as its farthest return.
 pub struct View {
     options: MapOptions,
     points: Submap,

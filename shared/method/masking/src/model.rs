@@ -10,7 +10,7 @@ use gyre_storage::quoted;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use crate::{MaskingConfig, external::external_file, network::NetworkError};
+use crate::{MaskingConfig, external::external_file};
 
 /// The size limit of models: hundreds of times a mask's.
 const MAX_BYTES: u64 = 1 << 30;
@@ -63,8 +63,8 @@ pub struct Model {
 
 impl Card {
     /// Reads the card that `masking.model` names.
-    pub fn read(config: &MaskingConfig) -> Result<Self, NetworkError> {
-        let (_, card) = Self::named(config).map_err(NetworkError::Model)?;
+    pub fn read(config: &MaskingConfig) -> Result<Self, String> {
+        let (_, card) = Self::named(config)?;
         Ok(card)
     }
 
@@ -179,11 +179,7 @@ fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T)
 
 impl Model {
     /// Reads the model that `masking.model` names and checks that it fits these rasters.
-    pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
-        Self::fitting(config, raster).map_err(NetworkError::Model)
-    }
-
-    fn fitting(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, String> {
+    pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, String> {
         let (path, card) = Card::named(config)?;
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);

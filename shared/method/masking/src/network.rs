@@ -61,7 +61,7 @@ enum Engine {
 impl Network {
     /// Loads the configured model and checks that it fits these rasters.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
-        let model = Model::read(config, raster)?;
+        let model = Model::read(config, raster).map_err(NetworkError::Model)?;
         let (mut engine, inputs, outputs) = match Library::find(config)? {
             Library::OnnxRuntime(path) => {
                 let engine = OnnxRuntime::load(&path, &model, config)?;

@@ -10,7 +10,8 @@ impl MaskingConfig {
     /// model, and the backend.
     pub fn resolve(&mut self) -> Result<(), NetworkError> {
         if self.kind == MaskKind::Learned {
-            self.sha256 = Some(Card::read(self)?.model.sha256);
+            let card = Card::read(self).map_err(NetworkError::Model)?;
+            self.sha256 = Some(card.model.sha256);
             self.resolve_library()?;
             self.model = self
                 .model

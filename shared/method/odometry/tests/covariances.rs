@@ -16,7 +16,7 @@ const SCANS: usize = 60;
 const FIRST: usize = 8;
 const SEEDS: [u64; 2] = [4, 5];
 
-/// Whether the `[earlier, later]` scan of a motion has lost azimuths, the motion's squared error over
+/// For a motion: whether its scans `[earlier, later]` have lost azimuths, its squared error over
 /// its covariance, and its stated variance of the yaw, rad².
 type Motion = ([bool; 2], f64, f64);
 

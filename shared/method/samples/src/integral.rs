@@ -20,7 +20,8 @@ pub struct Integrator<C> {
     later: Option<Sweep>,
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
-    /// From the stamp of the scan before to the stamp of the scan; `None` where samples are missing.
+    /// From the stamp of the scan before to the stamp of the scan; `None` where samples are
+    /// missing.
     pub(crate) integral: Option<Integral>,
 }
 

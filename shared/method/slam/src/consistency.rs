@@ -1,5 +1,6 @@
-//! Consistency of loops with each other. Odometry over a long path is so uncertain that a wrong loop
-//! can pass its gate; but two loops and the mostly short odometry between their ends make a cycle.
+//! Consistency of loops with each other. Odometry over a long path is so uncertain that a wrong
+//! loop can pass its gate; but two loops and the mostly short odometry between their ends make a
+//! cycle.
 
 use std::cmp::Reverse;
 

@@ -2,8 +2,8 @@
 
 use gyre_geometry::{Pose, interpolate};
 
-/// Corrects the poses of all scans like the keyframes around them: a scan continues by odometry from
-/// the keyframe before it, and evenly leads to the keyframe after it.
+/// Corrects the poses of all scans like the keyframes around them: a scan continues by odometry
+/// from the keyframe before it, and evenly leads to the keyframe after it.
 #[derive(Clone, Debug, Default)]
 pub struct Correction {
     keyframes: Vec<Anchor>,

@@ -1,5 +1,6 @@
 //! Localisation in a map of keyframes: a single scan, scan after scan ([`Localiser`]), or a whole
-//! drive ([`DriveSearch`]). Poses are in the map's frame, covariances of (x, y, yaw) along its axes.
+//! drive ([`DriveSearch`]). Poses are in the map's frame, covariances of (x, y, yaw) along its
+//! axes.
 //!
 //! A scan is described and compared with the submaps of all keyframes of the map, each at several
 //! headings; around the most similar ones the translation is searched, and the best poses are

@@ -1,6 +1,6 @@
-//! The files of keyframes, of places and of queries, for resuming SLAM. A keyframe is appended before
-//! its pose is journalled. Missing places and queries are computed again, and those beyond the last
-//! keyframe are cut off. The end of the stream is a record without bytes.
+//! The files of keyframes, of places and of queries, for resuming SLAM. A keyframe is appended
+//! before its pose is journalled. Missing places and queries are computed again, and those beyond
+//! the last keyframe are cut off. The end of the stream is a record without bytes.
 
 use std::{
     marker::PhantomData,

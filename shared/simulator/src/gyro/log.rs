@@ -4,21 +4,25 @@ use std::fmt::Write as _;
 
 use gyre_samples::{Sample, SampleKind};
 
+use super::SimulatedGyroConfig;
 use super::attitude::MeanMotion;
 use super::clock::Clock;
 use super::errors::Errors;
-use crate::simulator::Simulator;
+use crate::path::Path;
 
 pub(crate) const FILE: &str = "imu.csv";
 /// The first row of the file, as in the log of RADIATE.
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
-/// The samples during a drive, by their stamps: rates and accelerations in the gyro's own axes.
-/// `None` without a gyro.
-pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
-    let (config, seed) = (&simulator.config().gyro, simulator.config().seed);
-    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
+/// The samples during a drive along a path, which starts at a time and lasts for a duration, by
+/// their stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
+pub(crate) fn samples(
+    config: &SimulatedGyroConfig,
+    seed: u64,
+    path: &dyn Path,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<Sample>> {
     let figures = config.profile.figures()?;
     let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);

@@ -25,7 +25,8 @@ struct Node {
 }
 
 /// Laps around a rectangular block, counter-clockwise, slower in the rounded corners. The world's
-/// origin is its centre; the path starts in the middle of the side at negative y, towards positive x.
+/// origin is its centre; the path starts in the middle of the side at negative y, towards positive
+/// x.
 #[derive(Clone, Debug)]
 pub struct BlockLoop {
     nodes: Vec<Node>,

@@ -6,13 +6,13 @@ use gyre_stage::{observer::Sequence, source::RecordedMessage, wake::MAX_WAIT};
 use gyre_supervise::rig::{Feed, Recorded, Rig};
 use zenoh::{Session, qos::Priority};
 
-use super::{ASK_FOR_RUN, Received, ReceivedCount, began_ns, require_same};
+use super::{ASK_FOR_RUN, Received, ReceivedCount, require_same};
 use crate::{
     LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     request::Answers,
-    send::{OfferedTopic, RunOffer, offer_key, prefix},
+    send::{OfferedTopic, RunOffer, began_ns, offer_key, prefix},
     waker::Waker,
 };
 

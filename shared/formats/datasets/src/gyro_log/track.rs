@@ -99,7 +99,8 @@ mod tests {
         ]
     }
 
-    /// Whatever axis points up, the third rate is the rate about it, and the axes stay right-handed.
+    /// Whatever axis points up, the third rate is the rate about it, and the axes stay
+    /// right-handed.
     #[test]
     fn the_axes_are_right_handed() {
         for up in AXES {

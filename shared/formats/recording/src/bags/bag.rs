@@ -156,8 +156,8 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Describes the radar by its first configuration, or else by its azimuths and the options. Also
-    /// returns where the description is from, to follow the topic in a sentence.
+    /// Describes the radar by its first configuration, or else by its azimuths and the options.
+    /// Also returns where the description is from, to follow the topic in a sentence.
     pub fn describe(
         &mut self,
         topics: &Topics,

@@ -34,8 +34,8 @@ pub(super) enum Weights {
 impl PoseGraph {
     /// Moves all poses to where they fit the constraints best, from where they are. New loops start
     /// with the weight of their test against the odometry; then the kernel decides. The result can
-    /// depend on the order of arrival; [`PoseGraph::solve_anew`] does not. On an error the poses are
-    /// unchanged.
+    /// depend on the order of arrival; [`PoseGraph::solve_anew`] does not. On an error the poses
+    /// are unchanged.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.state.clone();
         self.place_frame();

@@ -47,8 +47,8 @@ impl KeyframeSelector {
 }
 
 /// Returns the keyframes of the submap around keyframe `middle`: those within `reach_m` along the
-/// path, at most [`MAX_NEIGHBOURS`] to each side. The submap is complete once a keyframe behind these
-/// is known.
+/// path, at most [`MAX_NEIGHBOURS`] to each side. The submap is complete once a keyframe behind
+/// these is known.
 pub fn neighbours(path_m: &[f64], middle: usize, reach_m: f64) -> Range<usize> {
     let Some(&here) = path_m.get(middle) else {
         return 0..0;

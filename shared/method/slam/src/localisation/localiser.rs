@@ -29,7 +29,8 @@ const MIN_CORRELATION: f64 = 0.4;
 const MIN_MARGIN: f64 = 0.125;
 /// Smallest correlation of a tracked scan with the map.
 const TRACKED_CORRELATION: f64 = 0.35;
-/// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 99.9 % pass.
+/// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 99.9 %
+/// pass.
 const GATE: f64 = 16.27;
 /// Distance from the nearest keyframe of the map beyond which there is no fix, m.
 const REACH_M: f64 = 15.0;
