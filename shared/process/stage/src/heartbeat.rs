@@ -73,8 +73,8 @@ impl Heartbeat {
     }
 }
 
-/// Writes beats through a mapping of the file: the beat at the end of a wait is part of the latency,
-/// and a system call would take longer.
+/// Writes beats through a mapping of the file: the beat at the end of a wait is part of the
+/// latency, and a system call would take longer.
 #[derive(Debug)]
 pub(crate) struct HeartbeatWriter(MmapRaw);
 
