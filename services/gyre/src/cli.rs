@@ -18,7 +18,6 @@ use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
 use gyre_terminal::Failure;
 use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
-use gyre_tools::doctor::DoctorArguments;
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_tools::masks::MasksArguments;
@@ -132,7 +131,7 @@ pub enum Command {
         end: LinkEnd,
     },
     /// Report what this machine lacks for a run.
-    Doctor(DoctorArguments),
+    Doctor,
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).
     #[command(hide = true)]
     Guard,

@@ -5,7 +5,7 @@ use gyre_terminal::{WIDTH, wrap};
 
 use super::Gyre;
 
-/// The groups of commands in the order of the help, with two examples of each command.
+/// The groups of commands in the order of the help, with examples of each command.
 const GROUPS: &str = "\
 Start:
 gyre demo
@@ -17,7 +17,6 @@ gyre inspect drive.mcap --json
 gyre config
 gyre config oxford > robot.toml
 gyre doctor
-gyre doctor --out /data/out
 
 See the results:
 gyre report out/demo --open
