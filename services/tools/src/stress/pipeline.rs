@@ -115,14 +115,8 @@ pub fn measure(
     drop(poses);
     drop(observed);
     let died = has_ended.then(|| run.last_words());
-    let summary = run.end();
-    let stages = summary["stages"].as_object().into_iter().flatten();
-    // Wake-ups that the transport lost and that were caught late.
-    let late = stages.filter_map(|(stage, counters)| {
-        let late = counters["wakes_caught_late"].as_u64()?;
-        (late > 0).then(|| (stage.clone(), late))
-    });
-    let wakes_caught_late = late.collect();
+    // It writes its results, with the figures of its stages.
+    drop(run);
     let ended_load =
         ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
@@ -136,8 +130,6 @@ pub fn measure(
             faults,
             witness_faults,
             motions,
-            restarts: serde_json::from_value(summary["restarts"].clone()).unwrap_or_default(),
-            wakes_caught_late,
             processes,
             shared_bytes,
             taken,
@@ -252,7 +244,7 @@ impl Session {
 
     fn poll(&mut self) {
         if let Some(faults) = &mut self.faults {
-            faults.act(&mut self.processes);
+            faults.act(&self.processes);
         }
         if self.sampled.elapsed() >= SAMPLE_EVERY && clock::now_ns() < self.ends_ns {
             self.processes.sample();

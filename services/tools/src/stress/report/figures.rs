@@ -1,7 +1,5 @@
 //! The figures of a run.
 
-use std::collections::BTreeMap;
-
 use gyre_messages::WitnessCounts;
 use serde::Serialize;
 
@@ -23,9 +21,6 @@ pub struct Figures {
     pub witness_faults: Vec<WitnessFault>,
     /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
-    pub restarts: BTreeMap<String, usize>,
-    /// Lost wake-ups by stage, each found after up to 200 ms.
-    pub wakes_caught_late: BTreeMap<String, u64>,
     pub processes: Vec<Cost>,
     pub shared_bytes: u64,
     /// Memory that a load has taken beside it.
@@ -64,7 +59,7 @@ impl Figures {
         let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
         let Counts { due, dropped, .. } = self.latency.counts;
         let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
-        let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
+        let p99 = ms(latency.p99_ms) + &latency.p99_mark();
         let faults = match self.faults.len() + self.witness_faults.len() {
             0 => String::new(),
             1 => "; 1 fault".to_owned(),
