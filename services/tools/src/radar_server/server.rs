@@ -21,7 +21,7 @@ use crate::radar_server::RadarServerArguments;
 pub use clients::Clients;
 pub use faults::Faults;
 use faults::{is_nth, uniform};
-pub(crate) use output::sleep_until;
+use output::sleep_until;
 pub use output::{Group, Output};
 
 /// Encoder counts in a turn, unless a recording contains them.

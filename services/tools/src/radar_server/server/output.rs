@@ -86,7 +86,7 @@ impl Output {
 
 /// Sleeps until a time; false on a request to stop. Before a short sleep `stop` is not called: it
 /// would take longer than the time between two azimuths.
-pub(crate) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
+pub(super) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
     loop {
         let left = due.saturating_duration_since(Instant::now());
         if left.is_zero() {
