@@ -1,38 +1,16 @@
 //! The arguments of the commands that operate running runs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use gyre_terminal::print;
 
 /// The run that a command is about.
 #[derive(Debug, Args)]
 pub struct RunChoice {
     /// The run: the folder of its results. Default: the only run there is; a command that changes a
-    /// run asks first if that was not started from the current folder.
+    /// run takes only one that was started from the current folder.
     #[arg(value_name = "RUN")]
     pub run: Option<PathBuf>,
-    /// The old way to name it.
-    #[arg(long, hide = true, value_name = "RUN", conflicts_with = "run")]
-    pub out: Option<PathBuf>,
-}
-
-impl RunChoice {
-    /// Returns the choice of this run; without one, of the only run there is.
-    pub fn named_by(run: Option<PathBuf>) -> Self {
-        Self { run, out: None }
-    }
-
-    /// Returns the folder that is named. An old way to name it gets a hint.
-    pub fn named(&self) -> Option<&Path> {
-        if let Some(out) = &self.out {
-            let out = out.display();
-            print::note(format_args!(
-                "gyre: a run is now named without --out, as its last argument: {out}"
-            ));
-        }
-        self.run.as_deref().or(self.out.as_deref())
-    }
 }
 
 /// The arguments of `gyre ps`.

@@ -116,7 +116,7 @@ fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<
 
 /// Ends a run as an interrupt does, and waits until its results are written.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
-    let run = chosen_to_change(choice, "end it")?;
+    let run = chosen_to_change(choice)?;
     let status = run.status()?;
     let signals = Signals::install()?;
     let before = version_of_results(&status.out);

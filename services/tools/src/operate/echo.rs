@@ -72,8 +72,8 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
             return Err(format!("{usage}: {names}").into());
         }
     };
-    let run = RunChoice::named_by(runs.first().copied().cloned());
-    let printed = echo(&run.folder()?);
+    let run = runs.first().copied().cloned();
+    let printed = echo(&RunChoice { run }.folder()?);
     match printed.map_err(|error| error.downcast::<io::Error>()) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         // Nobody reads it any more, as after `gyre echo OUT | head`.

@@ -17,7 +17,7 @@ const NO_RUN: &str = "no run is running";
 /// Lists the runs of this user.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
-    let runs = match arguments.run.named() {
+    let runs = match &arguments.run.run {
         Some(out) => vec![Control::of(out)?],
         None => Control::of_all(),
     };

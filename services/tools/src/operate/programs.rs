@@ -14,8 +14,7 @@ use crate::operate::{
 
 /// Starts a process of a running run again.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
-    let what = format!("restart its {}", arguments.process);
-    let run = chosen_to_change(&arguments.run, &what)?;
+    let run = chosen_to_change(&arguments.run)?;
     run.restart(&arguments.process)?;
     print::line(format_args!("{} is started again", arguments.process))?;
     Ok(ExitCode::SUCCESS)
@@ -48,8 +47,7 @@ const UNTRIED: u8 = 2;
 /// Replaces the program of a stage. If the new program fails to take over, the previous program
 /// continues.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
-    let what = format!("swap its {}", arguments.process);
-    let run = chosen_to_change(&arguments.run, &what)?;
+    let run = chosen_to_change(&arguments.run)?;
     let process = &arguments.process;
     let mut command = arguments.command.as_deref().map(words).transpose()?;
     // Found as in this terminal: the supervisor may have been started with another PATH.
