@@ -11,11 +11,12 @@ use std::{
 
 use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
 use gyre_stage::control::Control;
+use gyre_supervise::{Usage, memory::Room};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, folder, gyre, recording, send};
+use crate::common::{Ended, assert_nothing_left, folder, gyre, recording, send};
 
 /// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;
@@ -338,21 +339,26 @@ fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
 
 /// The helper is asked for so little that other programs do not notice.
 #[test]
-fn the_memory_that_is_taken_is_reported() {
-    let mut helper = gyre()
-        .arg("stress-helper")
-        .arg(std::process::id().to_string())
-        .args([r#"{"memory":0.01}"#])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let lines = BufReader::new(helper.stdout.take().unwrap()).lines();
-    let said: Vec<_> = lines.take(2).map(Result::unwrap).collect();
-    helper.kill().unwrap();
-    helper.wait().unwrap();
-    assert_eq!(said[0], "ready");
-    let taken: Value = serde_json::from_str(&said[1]).unwrap();
-    let (taken_mb, available_mb) = (number(&taken["taken_mb"]), number(&taken["available_mb"]));
-    let most_mb = 0.02 * available_mb + 34.0;
-    assert!(available_mb > 0.0 && taken_mb <= most_mb, "{taken}");
+fn a_load_takes_no_more_memory_than_it_is_asked_for_and_is_none_without_any() {
+    let helper = |work: &str| {
+        let mut command = gyre();
+        command
+            .arg("stress-helper")
+            .arg(std::process::id().to_string());
+        command.arg(work);
+        command
+    };
+    let mut load = helper(r#"{"memory":0.01}"#);
+    let mut load = load.stdout(Stdio::piped()).spawn().unwrap();
+    let mut said = String::new();
+    let mut output = BufReader::new(load.stdout.take().unwrap());
+    output.read_line(&mut said).unwrap();
+    let taken = Usage::of(load.id()).unwrap().own_bytes;
+    load.kill().unwrap();
+    load.wait().unwrap();
+    assert_eq!(said, "ready\n");
+    let most = Room::now().least().unwrap() / 50 + (100 << 20);
+    assert!(taken <= most, "{taken} bytes of {most}");
+    let nothing = helper(r#"{"memory":0.0}"#);
+    Ended::of(nothing).failed_with(&["no memory was taken", "are always left"]);
 }

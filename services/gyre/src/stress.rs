@@ -155,17 +155,13 @@ fn provenance(
     arguments: &StressArguments,
     configuration: &Configuration,
 ) -> Result<Provenance, Failure> {
-    let uname = rustix::system::uname();
-    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let file = arguments.inputs.given()?.configuration;
     Ok(Provenance {
         date: today(),
         machine: Machine::this().to_string(),
-        kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
         build: program::digest(&own())?,
         configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
-        load_before: load.split(' ').next().and_then(|load| load.parse().ok()),
     })
 }

@@ -91,12 +91,9 @@ pub fn measure(
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let (mut loads, mut taken) = (Vec::new(), None);
-    for work in &setup.loads {
-        let mut helper = Helper::start(&tested.program, work.clone())?;
-        taken = helper.taken()?.or(taken);
-        loads.push(helper);
-    }
+    let loads = setup.loads.iter();
+    let loads = loads.map(|work| Helper::start(&tested.program, work.clone()));
+    let mut loads: Vec<Helper> = loads.collect::<Result<_, _>>()?;
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;
     let mut session = Session::begin((tested, setup), run.pid(), &run.out, &newest);
@@ -122,7 +119,6 @@ pub fn measure(
     Ok(Measured {
         omitted: omitted
             .or(unplayed)
-            .or_else(|| taken?.omitted())
             .or(ended_load)
             .or_else(|| latency.counts.omitted()),
         figures: Figures {
@@ -132,7 +128,6 @@ pub fn measure(
             motions,
             processes,
             shared_bytes,
-            taken,
         },
         died,
     })

@@ -22,15 +22,12 @@ pub struct Provenance {
     pub date: String,
     /// The processor and the number of its cores.
     pub machine: String,
-    pub kernel: String,
     pub gyre: String,
     /// BLAKE3 digest of the program.
     pub build: String,
     /// The file of the configuration; the resolved one lies beside the report.
     pub configuration: String,
     pub source: String,
-    /// Load of the machine before the first scenario, in processes: the mean of a minute.
-    pub load_before: Option<f64>,
 }
 
 /// All outcomes, in the order of their execution.

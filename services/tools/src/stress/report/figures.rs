@@ -5,7 +5,6 @@ use serde::Serialize;
 
 use crate::stress::{
     fault::Fault,
-    load::Taken,
     processes::Cost,
     record::{Counts, RunLatency},
     witness_fault::WitnessFault,
@@ -23,9 +22,6 @@ pub struct Figures {
     pub motions: WitnessCounts,
     pub processes: Vec<Cost>,
     pub shared_bytes: u64,
-    /// Memory that a load has taken beside it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub taken: Option<Taken>,
 }
 
 impl Figures {
