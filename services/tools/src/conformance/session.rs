@@ -150,46 +150,32 @@ impl<'a> Session<'a> {
     ) -> Result<Waited, Failure> {
         self.progress = Instant::now();
         loop {
-            self.exchange()?;
+            self.notified.extend(self.harness.answer_handshakes()?);
+            self.receive()?;
             self.admit()?;
             if done(self) {
                 return Ok(Waited::Done);
             }
             if let Some(death) = self.harness.death() {
                 self.receive()?;
-                let is_done = done(self);
-                return Ok(if is_done {
-                    Waited::Done
-                } else {
-                    Waited::Died(death)
+                return Ok(match done(self) {
+                    true => Waited::Done,
+                    false => Waited::Died(death),
                 });
             }
             if self.progress.elapsed() > limit {
                 return Ok(Waited::TimedOut);
             }
-            self.sleep()?;
+            if self.harness.sleep(POLL_PERIOD)? {
+                return Err(Interrupted.into());
+            }
         }
     }
 
     /// Waits for a time while the run continues around the process; returns whether the process is
     /// still alive.
     pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, Failure> {
-        let since = Instant::now();
-        let ended = self.wait(time, |_| since.elapsed() >= time)?;
-        Ok(!matches!(ended, Waited::Died(_)))
-    }
-
-    fn sleep(&self) -> Result<(), Failure> {
-        match self.harness.sleep(POLL_PERIOD)? {
-            true => Err(Interrupted.into()),
-            false => Ok(()),
-        }
-    }
-
-    /// Answers handshakes and receives.
-    fn exchange(&mut self) -> Result<(), StageError> {
-        self.notified.extend(self.harness.answer_handshakes()?);
-        self.receive()
+        Ok(self.ended_within(time)?.is_none())
     }
 
     /// Receives the messages of the process, and examines them.
@@ -276,17 +262,10 @@ impl<'a> Session<'a> {
     /// Waits for the end of the process; `None` if it does not end in time.
     pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, Failure> {
         let since = Instant::now();
-        loop {
-            self.exchange()?;
-            if let Some(death) = self.harness.death() {
-                self.receive()?;
-                return Ok(Some(death));
-            }
-            if since.elapsed() > limit {
-                return Ok(None);
-            }
-            self.sleep()?;
-        }
+        Ok(match self.wait(limit, |_| since.elapsed() >= limit)? {
+            Waited::Died(death) => Some(death),
+            Waited::Done | Waited::TimedOut => None,
+        })
     }
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
