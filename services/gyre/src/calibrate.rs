@@ -116,7 +116,6 @@ impl Section {
     }
 }
 
-/// Reads the drive and the others of the same radar.
 fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let mut drives = vec![Recorded::read(configuration, arguments)?];
@@ -129,7 +128,6 @@ fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure>
     Ok(drives)
 }
 
-/// Finds the constants by each drive, and by all together; draws a picture of each.
 fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
     let studies = drives.into_iter().enumerate().map(|(k, drive)| match k {
         0 => drive.study(&out.join(PICTURE)),
@@ -207,7 +205,6 @@ impl Recorded {
         }
     }
 
-    /// Finds the constants, prints them, and draws the drive.
     fn study(self, picture: &Path) -> Result<Study, Failure> {
         print::note(format_args!("comparing {}, 1 s a scan", self.name));
         let study = Study::new(self.drive, &self.configured)?;

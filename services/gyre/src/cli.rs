@@ -45,7 +45,6 @@ pub use watch::WatchArguments;
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Gyre {
-    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -177,7 +176,6 @@ pub enum Command {
     },
 }
 
-/// The arguments of `gyre run`.
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
     #[command(flatten)]
@@ -197,7 +195,6 @@ pub struct RunArguments {
     pub options: RunOptions,
 }
 
-/// The results of a run and its pace.
 #[derive(Default, Debug, Args)]
 pub struct RunOptions {
     /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without
@@ -223,7 +220,6 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// Returns the form of the figures at the end.
     pub fn form(&self) -> Form {
         match (self.json, self.verbose || !std::io::stdout().is_terminal()) {
             (true, _) => Form::Json,
@@ -234,7 +230,6 @@ impl RunOptions {
 }
 
 impl RunArguments {
-    /// Returns the inputs to run.
     pub fn given(&self) -> Result<Given, Failure> {
         let given = self.inputs.given()?;
         let has_source = given.data.is_some() || given.radar.is_some();

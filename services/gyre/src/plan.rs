@@ -8,7 +8,6 @@ use gyre_run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
-/// Returns the processes to start: `gyre stage NAME`, or their replacements.
 pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan> {
     let live = configuration.run.mode == Mode::Live;
     let plan = |name: &str| {
@@ -63,7 +62,6 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
         .collect()
 }
 
-/// Returns the process that records the run that writes to `out`.
 pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StagePlan> {
     if !record.is_on() {
         return None;

@@ -24,7 +24,6 @@ use crate::{
 
 /// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
-/// Duration of a scenario with `--quick`, s.
 const QUICK_S: f64 = 10.0;
 /// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is
 /// played again and again.
@@ -116,7 +115,6 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());

@@ -10,7 +10,6 @@ use clap::{Args, Subcommand, builder::PossibleValuesParser};
 use gyre_run::StageConfig;
 use gyre_terminal::{Failure, print};
 
-/// The arguments of `gyre new`.
 #[derive(Debug, Args)]
 pub struct NewArguments {
     /// The kind of project.
@@ -25,7 +24,6 @@ pub enum New {
     Stage(StageArguments),
 }
 
-/// The arguments of `gyre new stage`.
 #[derive(Debug, Args)]
 pub struct StageArguments {
     /// The stage that it takes the place of.
@@ -78,7 +76,6 @@ macro_rules! template {
     };
 }
 
-/// Returns the files of a project: their names and texts.
 fn files(stage: &str, is_rust: bool) -> Vec<(&'static str, &'static str)> {
     if is_rust {
         let text = match stage {
@@ -105,7 +102,6 @@ fn files(stage: &str, is_rust: bool) -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-/// Returns the whole path of a checkout of Gyre.
 fn checkout(folder: &Path) -> Result<PathBuf, Failure> {
     let is_one = folder.join("shared/process/stage/Cargo.toml").is_file();
     match folder.canonicalize() {

@@ -13,14 +13,12 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// Defines a sensor: its log, its configuration, and how it is calibrated.
 macro_rules! sensor {
     (
         $sensor:ident: $title:literal, $is:literal, $section:ident, $calibrate:ident,
         $log:ty, $config:ty, $of_log:path, $found:ty,
         beside: $beside:expr, read: $read:expr, mean: $mean:expr, toml: $toml:expr
     ) => {
-        /// A log and the configuration of its sensor.
         pub(super) struct $sensor {
             log: $log,
             configured: $config,
@@ -69,7 +67,6 @@ macro_rules! sensor {
                 Ok(found)
             }
 
-            /// Calibrates by the drives that have a log, and prints the findings.
             pub(super) fn section(logs: &[(&Self, &Drive)]) -> Result<Section, Failure> {
                 let Some((first, _)) = logs.first() else {
                     return Ok(Section::default());

@@ -104,10 +104,8 @@ fn commands(group: &'static str) -> Vec<(&'static str, Vec<&'static str>)> {
         .collect()
 }
 
-/// The exit codes of all commands.
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 wrong arguments, 130 interrupted.";
 
-/// Columns of the names of commands.
 const NAMES: usize = 16;
 
 /// Returns the command line of `gyre`, with groups and examples in its help.

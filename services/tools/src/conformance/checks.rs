@@ -25,14 +25,12 @@ use crate::conformance::{
 /// Items between two observers.
 const BETWEEN: u64 = 3;
 
-/// A part of the test.
 type Scenario<'a> = fn(&mut Examination<'a>) -> Result<(), Failure>;
 
 pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
     findings: Findings,
-    /// The messages of the first scenario.
     outputs: Vec<Recorded>,
 }
 
@@ -257,7 +255,6 @@ impl<'a> Examination<'a> {
     }
 }
 
-/// Returns the times of a stage's work on items by its own stamps, ns.
 fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
     let items = outputs.iter().map(Recorded::item);
     let worked_on = items.filter(|it| !it.is(flag::END) && !it.is(flag::BASE));

@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use crate::conformance::rule::{Rule, Verdict};
 
-/// The result of the test of a program.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,

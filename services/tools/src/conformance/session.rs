@@ -35,7 +35,6 @@ pub(crate) enum Pace {
     Hold,
 }
 
-/// A process under test, and this program in place of the rest of the run.
 pub(crate) struct Session<'a> {
     pub harness: Harness<'a>,
     pub test: &'a Test,
@@ -178,7 +177,6 @@ impl<'a> Session<'a> {
         Ok(self.ended_within(time)?.is_none())
     }
 
-    /// Receives the messages of the process, and examines them.
     fn receive(&mut self) -> Result<(), StageError> {
         while let Some(sent) = self.harness.receive()? {
             match sent {
@@ -204,7 +202,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Examines one item that the process has sent, alone and after the one before.
     fn examine(&mut self, item: &Item, read_ns: i64) {
         let seq = item.seq;
         self.findings.checked(Rule::OneForOne);
@@ -245,7 +242,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Kills the process and removes its leftovers.
     pub(crate) fn kill(&mut self) -> Result<(), Failure> {
         self.harness.kill()?;
         self.receive()?;
@@ -281,13 +277,11 @@ impl<'a> Session<'a> {
             .collect()
     }
 
-    /// Returns whether the process has opened a topic.
     pub(crate) fn has_joined(&self) -> bool {
         let mut feeds = self.harness.feeds.values();
         feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
     }
 
-    /// Returns the inputs that the process has not subscribed to.
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
         let feeds = &self.harness.feeds;
         let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
@@ -300,7 +294,6 @@ impl<'a> Session<'a> {
         items.filter(move |it| it.item().seq == seq && !it.item().is(flag::BASE))
     }
 
-    /// Returns whether it has sent something about an item.
     pub(crate) fn has(&self, seq: u64) -> bool {
         self.about(seq).next().is_some()
     }
@@ -312,7 +305,6 @@ impl<'a> Session<'a> {
         Some(answer.received_ns.saturating_sub(*sent_ns))
     }
 
-    /// Returns the result bytes of the first message about each item.
     pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, StageError> {
         let mut results = BTreeMap::new();
         for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {

@@ -28,7 +28,6 @@ const OPTIONS: &str = "dataset.toml";
 /// The ends of the names of lists that lie beside the images.
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
-/// Writes the scans that a run has played to a new folder.
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     let Some((_, configuration)) = source.run() else {
         return Err(
@@ -96,7 +95,6 @@ struct Writer {
     dataset: Box<dyn Dataset>,
     scan: OwnedScan,
     found: Lost,
-    /// The folder of the images that are written.
     out: PathBuf,
     counts: Counts,
 }
@@ -189,7 +187,6 @@ fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
 struct Counts {
     scans: usize,
     repaired: usize,
-    /// Azimuths that were put back.
     azimuths: usize,
     /// Scans whose lost azimuths have unknown places.
     anywhere: usize,

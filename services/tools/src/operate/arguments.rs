@@ -13,7 +13,6 @@ pub struct RunChoice {
     pub run: Option<PathBuf>,
 }
 
-/// The arguments of `gyre ps`.
 #[derive(Debug, Args)]
 pub struct PsArguments {
     /// The run to list. Default: all runs of this user.
@@ -28,7 +27,6 @@ pub struct PsArguments {
     pub check: bool,
 }
 
-/// The arguments of `gyre logs`.
 #[derive(Debug, Args)]
 pub struct LogsArguments {
     /// The process, as masking. Default: all.
@@ -44,7 +42,6 @@ pub struct LogsArguments {
     pub lines: usize,
 }
 
-/// The arguments of `gyre restart`.
 #[derive(Debug, Args)]
 pub struct RestartArguments {
     /// The process, as masking.
@@ -54,7 +51,6 @@ pub struct RestartArguments {
     pub run: RunChoice,
 }
 
-/// The arguments of `gyre swap`.
 #[derive(Debug, Args)]
 pub struct SwapArguments {
     /// The process whose place is taken, as masking.
@@ -75,7 +71,6 @@ pub struct SwapArguments {
     pub cold: bool,
 }
 
-/// The arguments of `gyre top`.
 #[derive(Debug, Args)]
 pub struct TopArguments {
     /// The run.

@@ -21,7 +21,6 @@ use gyre_terminal::Failure;
 
 use crate::operate::arguments::RunChoice;
 
-/// The arguments of `gyre echo`.
 #[derive(Debug, Args)]
 pub struct EchoArguments {
     /// The run and the topic, in any order. Default: the only run there is, and pose.
@@ -29,7 +28,6 @@ pub struct EchoArguments {
     pub words: Vec<PathBuf>,
 }
 
-/// Prints the messages of a topic of the run that writes to a folder.
 type Echo = fn(&Path) -> Result<(), Failure>;
 
 /// The topics of a run, in the order of the stream.

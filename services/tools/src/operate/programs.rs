@@ -12,7 +12,6 @@ use crate::operate::{
     choice::chosen_to_change,
 };
 
-/// Starts a process of a running run again.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     let run = chosen_to_change(&arguments.run)?;
     run.restart(&arguments.process)?;
@@ -20,7 +19,6 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER_S: f64 = 5.0;
 
 /// Explains the wait of a swap, its duration, and the remedy.

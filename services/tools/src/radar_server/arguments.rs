@@ -8,7 +8,6 @@ use gyre_terminal::inputs::Inputs;
 
 use crate::radar_server::server::Faults;
 
-/// The arguments of `gyre radar-server`.
 #[derive(Debug, Args)]
 pub struct RadarServerArguments {
     /// The scans; of the configuration the sections `[simulation]`, `[source]` and `[dataset]`.

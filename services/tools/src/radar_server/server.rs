@@ -32,7 +32,6 @@ const MAX_WAIT: Duration = Duration::from_secs(2);
 const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
 
-/// Returns the sentence about a network that cannot be used.
 pub(crate) fn unserved(error: io::Error) -> String {
     format!("cannot serve as a radar: {error}")
 }
@@ -40,15 +39,12 @@ pub(crate) fn unserved(error: io::Error) -> String {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     pub scans: u64,
-    /// Azimuths that were left out.
     pub lost_azimuths: u64,
-    /// Datagrams that were left out.
     pub lost_datagrams: u64,
     pub resets: u64,
     pub stalls: u64,
 }
 
-/// Plays a recording until it has ended or `stop` returns true.
 pub fn serve(
     mut output: Output,
     dataset: &mut dyn Dataset,
@@ -104,7 +100,6 @@ pub fn serve(
     }
 }
 
-/// Returns the radar's description of itself.
 fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, Failure> {
     let geometry = scan.geometry;
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);

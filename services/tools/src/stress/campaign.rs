@@ -34,7 +34,6 @@ const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
-/// The scenarios to carry out, and their options.
 #[derive(Clone, Debug)]
 pub struct Options {
     pub scenarios: Vec<Scenario>,
@@ -223,7 +222,6 @@ impl Campaign<'_> {
         Ok(self.found(&found, f64::from, steps, ("radars", self.limits.radars)))
     }
 
-    /// Returns the outcome of a search, whose levels stand for these loads.
     fn found(
         &self,
         found: &Found,
@@ -243,7 +241,6 @@ impl Campaign<'_> {
         .judged()
     }
 
-    /// Returns the reason why so many runs do not fit into shared memory.
     fn lacks_memory(&self, runs: u32) -> Option<String> {
         let needed = self.tested.shared_bytes * u64::from(runs);
         let free = free_shared_memory().ok().flatten()?;
@@ -253,7 +250,6 @@ impl Campaign<'_> {
         })
     }
 
-    /// Measures so many pipelines at once at a rate: a step of this level.
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, Failure> {
         let duration = step_duration(self.options.duration, rate_hz);
         let setups = (0..pipelines).map(|number| Setup {

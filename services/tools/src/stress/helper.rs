@@ -26,7 +26,6 @@ pub const COMMAND: &str = "stress-helper";
 pub enum Work {
     /// Becomes `gyre` with these arguments, and ends its stages first.
     Run(Vec<String>),
-    /// Computes without end.
     Spin,
     /// Takes this share of the available memory, and churns it.
     Memory(f64),
@@ -34,7 +33,6 @@ pub enum Work {
     Observe(PathBuf),
 }
 
-/// Does the work of a helper: its arguments are the process that has started it, and the work.
 pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     let usage = || format!("`gyre {COMMAND}` is what `gyre stress` starts");
     let [parent, work] = arguments else {
@@ -61,7 +59,6 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// Starts a helper whose output goes to `output` and `errors`.
 pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
     let spawned = Command::new(program)
         .arg(COMMAND)

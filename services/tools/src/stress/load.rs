@@ -22,7 +22,6 @@ use gyre_terminal::Failure;
 pub(super) const READY: &str = "ready";
 /// Memory that is always left, whatever the share: room for other programs that start meanwhile.
 const LEFT: u64 = 1 << 30;
-/// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
 /// The time for allocating memory before the measurement. On a large machine all of it would take
@@ -32,7 +31,6 @@ const TAKING: Duration = Duration::from_secs(20);
 const PAUSE: Duration = Duration::from_millis(20);
 const CACHE_LINE: usize = 64;
 
-/// Computes without end.
 pub(super) fn spin() -> ! {
     say(READY);
     let mut number = 1_u64;
@@ -79,7 +77,6 @@ pub(super) fn churn(share: f64) -> Result<(), Failure> {
     }
 }
 
-/// A piece of memory, each page of it written.
 fn piece() -> Vec<u8> {
     let mut piece = vec![0; PIECE];
     piece.iter_mut().step_by(PAGE).for_each(|byte| *byte = 1);

@@ -35,7 +35,6 @@ const GRACE: Duration = Duration::from_secs(10);
 const TICK: Duration = Duration::from_millis(20);
 const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 
-/// A run with its load and faults.
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub scenario: Scenario,
@@ -53,7 +52,6 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns a run without load and faults.
     pub fn undisturbed(scenario: Scenario, rate_hz: f64, duration: Duration) -> Self {
         Self {
             scenario,
@@ -133,7 +131,6 @@ pub fn measure(
     })
 }
 
-/// Waits for the other pipelines. The poses that come meanwhile are of the warm-up.
 fn await_others(
     held: &Weak<()>,
     poses: &mut Observer<'_, Pose>,
@@ -178,7 +175,6 @@ struct Session {
 }
 
 impl Session {
-    /// Begins now; `newest` is the last pose of the warm-up.
     fn begin(
         (tested, setup): (&TestedPipeline, &Setup),
         supervisor: u32,

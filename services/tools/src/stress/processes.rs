@@ -28,7 +28,6 @@ pub struct Cost {
     pub processes: usize,
 }
 
-/// Samples the processes of a run.
 #[derive(Debug)]
 pub struct Sampler {
     supervisor: u32,
@@ -57,7 +56,6 @@ impl Sampler {
         sampler
     }
 
-    /// Reads the usage of all processes.
     pub fn sample(&mut self) {
         let leaders = self.leaders();
         let mut own_bytes: BTreeMap<&str, u64> = BTreeMap::new();
@@ -119,12 +117,10 @@ impl Sampler {
     }
 }
 
-/// Returns the processes of the machine that have not ended.
 fn living() -> impl Iterator<Item = ProcessStat> {
     ProcessStat::all().filter(|it| !it.has_ended)
 }
 
-/// The place of a name in the report.
 fn rank(name: &str) -> usize {
     let stages = StageId::ALL.iter().map(|stage| stage.name());
     let names = ["supervisor"].into_iter().chain(stages);

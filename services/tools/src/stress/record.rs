@@ -17,7 +17,6 @@ pub use distribution::Distribution;
 /// The largest number of dropped scans between two poses that are recorded one by one.
 const MAX_GAP: u64 = 1 << 20;
 
-/// Counts of scans within the time that is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     pub due: u64,
@@ -51,7 +50,6 @@ pub struct RunLatency {
     pub closed_loop: Distribution,
 }
 
-/// Records poses whose scans were due within a time.
 #[derive(Debug, Default)]
 pub struct Recorder {
     /// `CLOCK_MONOTONIC`, ns.

@@ -15,7 +15,6 @@ pub use outcome::{Check, ScenarioOutcome, Verdict};
 /// added does not.
 const VERSION: u32 = 3;
 
-/// The origin of a report: computer, program, recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
     /// The date, UTC.
@@ -30,7 +29,6 @@ pub struct Provenance {
     pub source: String,
 }
 
-/// All outcomes, in the order of their execution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     version: u32,

@@ -88,7 +88,6 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// A step of a search for the largest load.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
     /// Scans a second, or radars.

@@ -14,7 +14,6 @@ use ratatui::{
 use super::snapshot::{Snapshot, Use};
 use crate::operate::processes::{duration, lacks, summary};
 
-/// The columns of the table: title and width.
 const COLUMNS: [(&str, u16); 12] = [
     ("process", 19),
     ("pid", 8),
@@ -114,7 +113,6 @@ fn rows(snapshot: &Snapshot, width: u16) -> Vec<(String, Style)> {
     rows
 }
 
-/// Returns the lines above the table, wrapped to this width.
 fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let status = &snapshot.status;
     let in_flight = snapshot.in_flight.map(|count| count.to_string());
@@ -175,7 +173,6 @@ fn cells(snapshot: &Snapshot, process: &ProcessStatus, used: &Use) -> [String; C
     ]
 }
 
-/// Returns microseconds in three digits or so.
 fn us(us: f64) -> String {
     match us {
         us if us < 999.5 => format!("{us:.0} us"),

@@ -63,7 +63,6 @@ impl Clients {
         Ok(())
     }
 
-    /// Returns whether a client has asked for azimuths.
     pub fn any_started(&self) -> bool {
         lock(&self.all).iter().any(|client| client.started)
     }
@@ -140,7 +139,6 @@ fn admit(
     Ok(())
 }
 
-/// Follows the requests of a client until it leaves.
 fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
     let mut parser = Parser::default();
     while let Ok(count @ 1..) = stream.read(parser.space(256)) {

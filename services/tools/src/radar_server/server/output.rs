@@ -20,7 +20,6 @@ const POLL: Duration = Duration::from_millis(5);
 /// Time between two descriptions of a radar that sends no powers yet.
 const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// The receivers that a recording is played to.
 pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
     Clients(Clients),
@@ -99,7 +98,6 @@ pub(super) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
     }
 }
 
-/// The socket and the destination of datagrams.
 pub struct Group {
     socket: UdpSocket,
     to: SocketAddrV4,
@@ -107,7 +105,6 @@ pub struct Group {
     number: u32,
     /// A datagram that is sent after the next one.
     held: Option<Vec<u8>>,
-    /// Datagrams that were not sent.
     pub lost: u64,
 }
 

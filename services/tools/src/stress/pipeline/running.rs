@@ -98,7 +98,6 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Waits until the run can be observed.
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
         // A supervisor of the same results may still be there, if an earlier run was killed.
         while !self.is_supervised_by_its_process() {
@@ -178,7 +177,6 @@ impl Drop for Running<'_> {
     }
 }
 
-/// Returns the arguments of `gyre` for the run.
 fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     // Relative to the sensor's own pace.
     let rate = tested.relative_rate(setup.rate_hz);

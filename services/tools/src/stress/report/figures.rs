@@ -66,12 +66,10 @@ impl Figures {
         )
     }
 
-    /// Returns the processor time of all processes, % of one processor.
     pub fn cpu_percent(&self) -> f64 {
         self.processes.iter().map(|cost| cost.cpu_percent).sum()
     }
 
-    /// Returns own memory of all processes and shared memory, MB.
     pub fn memory_mb(&self) -> f64 {
         let own: f64 = self.processes.iter().map(|cost| cost.own_mb).sum();
         own + self.shared_bytes as f64 * 1e-6

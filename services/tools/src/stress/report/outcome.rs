@@ -8,10 +8,8 @@ use serde::Serialize;
 use super::Figures;
 use crate::stress::search::Step;
 
-/// One figure beside its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
-    /// The key of `[budget]`.
     pub key: &'static str,
     /// The measured figure; `None`: there is no figure, which misses the limit.
     pub measured: Option<f64>,
@@ -92,7 +90,6 @@ pub struct ScenarioOutcome {
 }
 
 impl ScenarioOutcome {
-    /// An outcome without any figure.
     pub fn new(scenario: Scenario, duration: Duration) -> Self {
         Self {
             scenario,
