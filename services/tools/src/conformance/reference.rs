@@ -268,6 +268,6 @@ impl<'a> OwnPipeline<'a> {
     }
 }
 
-pub(crate) fn own_ended(stage: &str, reason: &str) -> Failure {
+fn own_ended(stage: &str, reason: &str) -> Failure {
     format!("cannot compute the inputs: our own {stage} ended: {reason}").into()
 }
