@@ -21,7 +21,7 @@ use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_tools::masks::MasksArguments;
-use gyre_tools::new::NewArguments;
+use gyre_tools::new::New;
 use gyre_tools::operate::{
     EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
     TopArguments,
@@ -92,7 +92,10 @@ pub enum Command {
     /// inputs. Its results are never used.
     Shadow(ShadowArguments),
     /// Begin a project: a stage of your own, with its test.
-    New(NewArguments),
+    New {
+        #[command(subcommand)]
+        what: New,
+    },
     /// Run one process of a run (what `gyre run` starts).
     Stage {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or

@@ -43,7 +43,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         gyre_stage::run::keep_files_private();
     }
     match command {
-        Command::New(arguments) => gyre_tools::new::new(&arguments),
+        Command::New { what } => gyre_tools::new::new(&what),
         Command::Stage { name, python } => Ok(stage::run(&name, python)),
         Command::Guard => {
             let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);

@@ -10,13 +10,6 @@ use clap::{Args, Subcommand, builder::PossibleValuesParser};
 use gyre_run::StageConfig;
 use gyre_terminal::{Failure, print};
 
-#[derive(Debug, Args)]
-pub struct NewArguments {
-    /// The kind of project.
-    #[command(subcommand)]
-    pub what: New,
-}
-
 /// A kind of project.
 #[derive(Debug, Subcommand)]
 pub enum New {
@@ -42,8 +35,8 @@ pub struct StageArguments {
     pub gyre: Option<PathBuf>,
 }
 
-pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
-    let New::Stage(arguments) = &arguments.what;
+pub fn new(what: &New) -> Result<ExitCode, Failure> {
+    let New::Stage(arguments) = what;
     let stage = arguments.stage.as_str();
     let default = || PathBuf::from(format!("my-{stage}"));
     let folder = arguments.folder.clone().unwrap_or_else(default);

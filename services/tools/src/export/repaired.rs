@@ -20,7 +20,10 @@ use gyre_radar::{
 use gyre_storage::{StorageError, create_folder, write as write_file};
 use gyre_terminal::{Failure, print};
 
-use crate::export::source::{Lost, Source};
+use crate::{
+    export::source::{Lost, Source},
+    masks::picture::write_grey,
+};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
@@ -130,11 +133,11 @@ impl Writer {
                 return Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into());
             }
         };
-        Ok(write_file(&to, self.image(&places)?)?)
+        self.repair(&places, &to)
     }
 
-    /// Returns the repaired scan as a file, laid out as the one that it is from.
-    fn image(&self, places: &LostAzimuths) -> Result<Vec<u8>, Failure> {
+    /// Writes the repaired scan, laid out as the file that it is from.
+    fn repair(&self, places: &LostAzimuths, to: &Path) -> Result<(), Failure> {
         let scan = self.scan.view();
         let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
         let mut powers = vec![0; azimuths * bins];
@@ -143,15 +146,7 @@ impl Writer {
             let by_range = (0..bins).flat_map(|bin| powers.iter().skip(bin).step_by(bins));
             powers = by_range.copied().collect();
         }
-        let size = self.dataset.image_size();
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&powers)?;
-        writer.finish()?;
-        Ok(bytes)
+        write_grey(to, self.dataset.image_size().width, &powers)
     }
 }
 
@@ -179,8 +174,8 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
-    let bytes = fs::read(from).map_err(StorageError::at("read", from))?;
-    Ok(write_file(to, bytes)?)
+    fs::copy(from, to).map_err(StorageError::at("copy", from))?;
+    Ok(())
 }
 
 #[derive(Debug, Default)]

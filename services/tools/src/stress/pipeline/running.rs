@@ -99,13 +99,11 @@ impl<'a> Running<'a> {
     }
 
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
-        // A supervisor of the same results may still be there, if an earlier run was killed.
-        while !self.is_supervised_by_its_process() {
-            self.require_life()?;
-            thread::sleep(POLL_PERIOD);
-        }
         loop {
-            if let Ok(run) = ObservedRun::writing_to(&self.out) {
+            // A supervisor of the same results may still be there, if an earlier run was killed.
+            if self.is_supervised_by_its_process()
+                && let Ok(run) = ObservedRun::writing_to(&self.out)
+            {
                 match run.observe::<Pose>().map(drop) {
                     Ok(()) => return Ok(run),
                     Err(StageError::NoPlace { observers: 0, .. }) => {

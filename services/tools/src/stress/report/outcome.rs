@@ -70,7 +70,6 @@ impl Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenarioOutcome {
     pub scenario: Scenario,
-    pub line: &'static str,
     pub verdict: Verdict,
     pub checks: Vec<Check>,
     /// A failure that does not depend on the latency.
@@ -93,7 +92,6 @@ impl ScenarioOutcome {
     pub fn new(scenario: Scenario, duration: Duration) -> Self {
         Self {
             scenario,
-            line: scenario.line(),
             verdict: Verdict::NotJudged,
             checks: Vec::new(),
             problem: None,
