@@ -243,18 +243,6 @@ fn stages_that_are_slow_are_not_judged_without_a_limit() {
     assert_eq!(run.matches("delay_ms = 300").count(), 2, "{run}");
 }
 
-#[test]
-fn a_run_that_ends_while_it_is_measured_has_failed() {
-    let stress = Stress::new();
-    let words = ["--scenario", "steady", "--duration", "60"];
-    let measured = stress.start(&[&words[..], &["--set", "budget.max_ms=60000"]].concat());
-    let out = stress.run_out("steady");
-    await_measurement(&out);
-    Control::of(&out).unwrap().stop().unwrap();
-    let said = failed(finish(measured));
-    assert!(said.contains("steady: FAILED; the run has ended"), "{said}");
-}
-
 /// Waits until a run has more poses than the warm-up takes.
 fn await_measurement(out: &Path) {
     let poses = || Some(Control::of(out).ok()?.status().ok()?.poses);
