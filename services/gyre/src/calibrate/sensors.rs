@@ -79,7 +79,13 @@ macro_rules! sensor {
                     }
                 }
                 let Some((one, others)) = told.split_first() else {
-                    return Ok(Section::refused($is, refused, first.is_named));
+                    let reason = refused.as_ref();
+                    let text = reason.map(|it| format!("\n# The {} not calibrated: {it}\n", $is));
+                    return Ok(Section {
+                        text: text.unwrap_or_default(),
+                        is_told: false,
+                        refused: refused.filter(|_| first.is_named).map(Into::into),
+                    });
                 };
                 let (mean, toml) = ($mean, $toml);
                 let found: $found = mean(one, others)?;
@@ -90,8 +96,11 @@ macro_rules! sensor {
                 // A relative path is one of the file's folder.
                 let file = first.is_named.then(|| absolute(&first.log.path));
                 let file = file.transpose()?;
-                let text = toml(&found, file.as_deref(), &first.configured);
-                Ok(Section::told(text))
+                Ok(Section {
+                    text: toml(&found, file.as_deref(), &first.configured),
+                    is_told: true,
+                    refused: None,
+                })
             }
         }
     };
