@@ -85,7 +85,7 @@ impl Sampler {
         groups.find(|group| leaders.get(group).is_some_and(|name| name == stage))
     }
 
-    /// Returns the names of the process groups of the run, as the supervisor tells them; none while
+    /// Returns the names of the process groups of the run, as the supervisor reports them; none while
     /// it ends.
     fn leaders(&self) -> BTreeMap<u32, String> {
         let status = Control::of(&self.out).and_then(|run| run.status());
