@@ -14,15 +14,14 @@ use std::{
 use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, scan::flag};
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 
 use crate::radar_server::RadarServerArguments;
 
-pub use clients::Clients;
 pub use faults::Faults;
+
 use faults::{is_nth, uniform};
-use output::sleep_until;
-pub use output::{Group, Output};
+use output::{Output, sleep_until};
 
 /// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
@@ -45,8 +44,9 @@ pub struct Played {
     pub stalls: u64,
 }
 
+/// Plays these scans, `what`, from the announcement of their address on.
 pub fn serve(
-    mut output: Output,
+    what: &str,
     dataset: &mut dyn Dataset,
     scans: Range<usize>,
     arguments: &RadarServerArguments,
@@ -56,7 +56,13 @@ pub fn serve(
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    output.begin(&radar)?;
+    let (output, address, is_public) = Output::open(arguments, &radar)?;
+    print::note(format_args!("gyre: playing {what} as a radar at {address}"));
+    if is_public {
+        print::note(
+            "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
+        );
+    }
     let mut player = Player {
         output,
         radar,
