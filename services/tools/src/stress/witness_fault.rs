@@ -97,13 +97,7 @@ impl WitnessFault {
     }
 
     pub fn problem(&self) -> Option<String> {
-        let (for_s, motions) = (self.for_s, self.motions);
-        let name = match self.kind {
-            PlayedFaultKind::GyroOut => "gyro out",
-            PlayedFaultKind::WheelsSlip => "wheels slip",
-            PlayedFaultKind::ClockJump => "clock jumps",
-            PlayedFaultKind::RadarBlind => "radar blind",
-        };
+        let (name, for_s, motions) = (self.kind.name(), self.for_s, self.motions);
         match self.recovery_ms {
             _ if self.noticed == 0 => Some(format!(
                 "nothing has noticed the fault ({name}, {for_s} s) in {motions} motions"
