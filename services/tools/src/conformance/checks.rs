@@ -30,6 +30,7 @@ pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
     findings: Findings,
+    /// The messages of the first scenario.
     outputs: Vec<Recorded>,
 }
 
