@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod bags;
-mod captures;
 mod files;
 mod keyframes;
 mod messages;

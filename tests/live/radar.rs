@@ -210,30 +210,6 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
 }
 
 #[test]
-fn a_capture_of_a_radar_is_played_as_that_radar() {
-    let scans = recording::SCANS / 2;
-    let whole = whole(scans);
-    let radar = Radar::playing(whole.path(), &["--rate", "8"]);
-    let file = whole.path().join("radar.capture");
-    let capture = |address: &str| {
-        let mut command = gyre();
-        command.args(["radar-server", "--radar", address, "--capture"]);
-        command.arg(&file);
-        Ended::of(command)
-    };
-    capture(&radar.address).succeeded();
-    let played = Radar::playing(&file, &["--rate", "0.2"]);
-    let live = played.run(scans).complete();
-    assert_eq!(live, Run::small().data(whole.path()).complete());
-    // It is not overwritten, and is no datagrams.
-    capture(&played.address).failed_with(&["File exists"]);
-    let mut datagrams = gyre();
-    datagrams.args(["radar-server", "--udp", "239.192.43.9:4378"]);
-    datagrams.arg(&file);
-    Ended::of(datagrams).failed_with(&["was captured by TCP", "leave out --udp"]);
-}
-
-#[test]
 fn a_radar_that_is_not_there_yet_is_waited_for_and_a_signal_ends_the_wait() {
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr();
     let free = free.unwrap().to_string();

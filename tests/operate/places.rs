@@ -25,7 +25,6 @@ fn commands(run: &Run, files: &Path) -> Vec<String> {
         "shadow masking --command true --report".to_owned(),
         format!("export {run} --scans none --mcap"),
         format!("run {played} --fresh --out {files}/recorded --record"),
-        "radar-server --radar 127.0.0.1:1 --capture".to_owned(),
         "new stage masking --python".to_owned(),
     ]
 }

@@ -11,11 +11,12 @@ use std::{
 
 use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
 use gyre_stage::control::Control;
+use gyre_supervise::{Usage, memory::Room};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, folder, gyre, recording, send};
+use crate::common::{Ended, assert_nothing_left, folder, gyre, recording, send};
 
 /// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;
@@ -164,7 +165,9 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let words = [&words[..], &["--duration", "6"]].concat();
     assert_eq!(stress.run(&words).status.code(), Some(0));
     let figures = &stress.outcome()["figures"];
-    assert_eq!(figures["restarts"]["radar-replay"], 1);
+    let summary = fs::read_to_string(stress.run_out("kills").join("summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["restarts"]["radar-replay"], 1);
     assert!(number(&figures["faults"][0]["recovery_ms"]) > 0.0);
     // 6 s of 4 scans/s: also those of the time without a source.
     assert_eq!(figures["counts"]["due"], 24);
@@ -238,18 +241,6 @@ fn stages_that_are_slow_are_not_judged_without_a_limit() {
     assert_eq!(stress.outcome()["verdict"], "not-judged");
     let run = fs::read_to_string(stress.run_out("slow-stage").join("config.toml")).unwrap();
     assert_eq!(run.matches("delay_ms = 300").count(), 2, "{run}");
-}
-
-#[test]
-fn a_run_that_ends_while_it_is_measured_has_failed() {
-    let stress = Stress::new();
-    let words = ["--scenario", "steady", "--duration", "60"];
-    let measured = stress.start(&[&words[..], &["--set", "budget.max_ms=60000"]].concat());
-    let out = stress.run_out("steady");
-    await_measurement(&out);
-    Control::of(&out).unwrap().stop().unwrap();
-    let said = failed(finish(measured));
-    assert!(said.contains("steady: FAILED; the run has ended"), "{said}");
 }
 
 /// Waits until a run has more poses than the warm-up takes.
@@ -336,21 +327,26 @@ fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
 
 /// The helper is asked for so little that other programs do not notice.
 #[test]
-fn the_memory_that_is_taken_is_reported() {
-    let mut helper = gyre()
-        .arg("stress-helper")
-        .arg(std::process::id().to_string())
-        .args([r#"{"memory":0.01}"#])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let lines = BufReader::new(helper.stdout.take().unwrap()).lines();
-    let said: Vec<_> = lines.take(2).map(Result::unwrap).collect();
-    helper.kill().unwrap();
-    helper.wait().unwrap();
-    assert_eq!(said[0], "ready");
-    let taken: Value = serde_json::from_str(&said[1]).unwrap();
-    let (taken_mb, available_mb) = (number(&taken["taken_mb"]), number(&taken["available_mb"]));
-    let most_mb = 0.02 * available_mb + 34.0;
-    assert!(available_mb > 0.0 && taken_mb <= most_mb, "{taken}");
+fn a_load_takes_no_more_memory_than_it_is_asked_for_and_is_none_without_any() {
+    let helper = |work: &str| {
+        let mut command = gyre();
+        command
+            .arg("stress-helper")
+            .arg(std::process::id().to_string());
+        command.arg(work);
+        command
+    };
+    let mut load = helper(r#"{"memory":0.01}"#);
+    let mut load = load.stdout(Stdio::piped()).spawn().unwrap();
+    let mut said = String::new();
+    let mut output = BufReader::new(load.stdout.take().unwrap());
+    output.read_line(&mut said).unwrap();
+    let taken = Usage::of(load.id()).unwrap().own_bytes;
+    load.kill().unwrap();
+    load.wait().unwrap();
+    assert_eq!(said, "ready\n");
+    let most = Room::now().least().unwrap() / 50 + (100 << 20);
+    assert!(taken <= most, "{taken} bytes of {most}");
+    let nothing = helper(r#"{"memory":0.0}"#);
+    Ended::of(nothing).failed_with(&["no memory was taken", "are always left"]);
 }

@@ -117,8 +117,6 @@ fn a_stage_without_results_conforms_but_for_the_results() {
     let stands_by = judged(&report, "stands-by");
     assert_eq!(stands_by["verdict"], "does-not-apply", "{stands_by}");
     assert!(why(&report, "stands-by").contains("--cold"), "{stands_by}");
-    let own_ms = report["own_work"]["p50_ms"].as_f64();
-    assert!(own_ms > Some(0.0), "{report:#}");
 }
 
 /// A stage, its breach, the rule that names it, and words of the sentence.

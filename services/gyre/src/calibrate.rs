@@ -59,21 +59,12 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         Err(_) => return radar.map(|_| ExitCode::SUCCESS),
     };
     storage::write(&file, text + &gyro.text + &wheels.text)?;
-    print::line(format_args!(
-        "{:.0} s; {} {}{}",
-        started.elapsed().as_secs_f64(),
-        file.display(),
-        if is_worse {
-            "is NOT recommended"
-        } else {
-            "for `gyre run --calibration`"
-        },
-        if radar.is_ok() {
-            format!(", {PICTURE} beside it")
-        } else {
-            String::new()
-        }
-    ))?;
+    let (seconds, file) = (started.elapsed().as_secs_f64(), file.display());
+    let advice = match is_worse {
+        true => "is NOT recommended",
+        false => "for `gyre run --calibration`",
+    };
+    print::line(format_args!("{seconds:.0} s; {file} {advice}"))?;
     if let Ok(found) = radar {
         print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
@@ -91,32 +82,6 @@ struct Section {
     refused: Option<Failure>,
 }
 
-impl Section {
-    fn told(text: String) -> Self {
-        Self {
-            text,
-            is_told: true,
-            refused: None,
-        }
-    }
-
-    /// The refusal for a sensor, as `gyro is`, that no drive determines.
-    fn refused<E>(sensor: &str, error: Option<E>, is_named: bool) -> Self
-    where
-        E: std::fmt::Display + Into<Failure>,
-    {
-        let text = error
-            .as_ref()
-            .map(|error| format!("\n# The {sensor} not calibrated: {error}\n"));
-        Self {
-            text: text.unwrap_or_default(),
-            is_told: false,
-            refused: error.filter(|_| is_named).map(Into::into),
-        }
-    }
-}
-
-/// Reads the drive and the others of the same radar.
 fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let mut drives = vec![Recorded::read(configuration, arguments)?];
@@ -129,7 +94,6 @@ fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure>
     Ok(drives)
 }
 
-/// Finds the constants by each drive, and by all together; draws a picture of each.
 fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
     let studies = drives.into_iter().enumerate().map(|(k, drive)| match k {
         0 => drive.study(&out.join(PICTURE)),
@@ -207,7 +171,6 @@ impl Recorded {
         }
     }
 
-    /// Finds the constants, prints them, and draws the drive.
     fn study(self, picture: &Path) -> Result<Study, Failure> {
         print::note(format_args!("comparing {}, 1 s a scan", self.name));
         let study = Study::new(self.drive, &self.configured)?;

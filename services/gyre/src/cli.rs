@@ -18,11 +18,10 @@ use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
 use gyre_terminal::Failure;
 use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
-use gyre_tools::doctor::DoctorArguments;
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_tools::masks::MasksArguments;
-use gyre_tools::new::NewArguments;
+use gyre_tools::new::New;
 use gyre_tools::operate::{
     EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
     TopArguments,
@@ -46,7 +45,6 @@ pub use watch::WatchArguments;
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Gyre {
-    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -94,7 +92,10 @@ pub enum Command {
     /// inputs. Its results are never used.
     Shadow(ShadowArguments),
     /// Begin a project: a stage of your own, with its test.
-    New(NewArguments),
+    New {
+        #[command(subcommand)]
+        what: New,
+    },
     /// Run one process of a run (what `gyre run` starts).
     Stage {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or
@@ -132,7 +133,7 @@ pub enum Command {
         end: LinkEnd,
     },
     /// Report what this machine lacks for a run.
-    Doctor(DoctorArguments),
+    Doctor,
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).
     #[command(hide = true)]
     Guard,
@@ -178,7 +179,6 @@ pub enum Command {
     },
 }
 
-/// The arguments of `gyre run`.
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
     #[command(flatten)]
@@ -198,7 +198,6 @@ pub struct RunArguments {
     pub options: RunOptions,
 }
 
-/// The results of a run and its pace.
 #[derive(Default, Debug, Args)]
 pub struct RunOptions {
     /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without
@@ -224,7 +223,6 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// Returns the form of the figures at the end.
     pub fn form(&self) -> Form {
         match (self.json, self.verbose || !std::io::stdout().is_terminal()) {
             (true, _) => Form::Json,
@@ -235,7 +233,6 @@ impl RunOptions {
 }
 
 impl RunArguments {
-    /// Returns the inputs to run.
     pub fn given(&self) -> Result<Given, Failure> {
         let given = self.inputs.given()?;
         let has_source = given.data.is_some() || given.radar.is_some();

@@ -74,19 +74,16 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         }),
         demands,
     };
-    match run_test(&test, scans, arguments.json) {
+    let signals = Signals::install()?;
+    let mut observe = |what: &str| {
+        if !arguments.json {
+            print::note(format_args!("gyre: testing {what}"));
+        }
+    };
+    match check(&test, scans, &signals, &mut observe) {
         Err(error) if error.is::<Interrupted>() => Ok(None),
         report => report.map(Some),
     }
-}
-
-fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, Failure> {
-    let signals = Signals::install()?;
-    check(test, scans, &signals, &mut |what| {
-        if !quietly {
-            print::note(format_args!("gyre: testing {what}"));
-        }
-    })
 }
 
 fn print(report: &Report, as_json: bool) -> Result<ExitCode, Failure> {

@@ -49,7 +49,6 @@ pub enum Earlier {
 
 #[derive(Debug)]
 pub struct Begun {
-    /// Poses in its journal to continue from.
     pub poses: u64,
     /// Records behind them, which a power failure has left in part: they are to be cut off.
     pub lost: u64,
@@ -124,7 +123,6 @@ impl Earlier {
 }
 
 impl Earlier {
-    /// The run that is resumed.
     pub fn unfinished(&self) -> Option<&Begun> {
         match self {
             Self::Unfinished(begun) => Some(begun),
@@ -198,7 +196,6 @@ fn require_no_results(out: &Out) -> Result<(), Failure> {
     }
 }
 
-/// Returns whether the run that wrote its results to `out` has reached its end.
 pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
@@ -288,7 +285,6 @@ fn known_poses(
     }
 }
 
-/// Returns whether a run that the new one cannot continue is closed.
 pub fn is_closed(configuration: &Configuration) -> bool {
     // A recording that was simulated lies in the folder, and is played from there.
     configuration.stored().is_none()

@@ -32,7 +32,6 @@ use std::{path::PathBuf, process::ExitCode};
 
 use gyre_configuration::{Configuration, schema};
 use gyre_terminal::{Failure, inputs::Inputs, print};
-use gyre_tools::doctor::DoctorArguments;
 
 use cli::{Command, RunArguments};
 #[cfg(not(feature = "link"))]
@@ -44,7 +43,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         gyre_stage::run::keep_files_private();
     }
     match command {
-        Command::New(arguments) => gyre_tools::new::new(&arguments),
+        Command::New { what } => gyre_tools::new::new(&what),
         Command::Stage { name, python } => Ok(stage::run(&name, python)),
         Command::Guard => {
             let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);
@@ -77,7 +76,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::StressHelper { words } => stress::help(&words),
         Command::Record(arguments) => record::record(&arguments),
         Command::Link { end } => link::link(&end),
-        Command::Doctor(arguments) => doctor(&arguments),
+        Command::Doctor => doctor(),
         Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Report(arguments) => gyre_tools::report::report(&arguments),
@@ -113,10 +112,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 
 /// Checks this machine for missing requirements of a run of the default configuration, whose scans
 /// are as large as Oxford's.
-fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
+fn doctor() -> Result<ExitCode, Failure> {
     let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
     let checked = preflight::check(&simulated, &mut preflight::ask)?;
-    gyre_tools::doctor::doctor(arguments, &checked.footprint, checked.window.observers)
+    gyre_tools::doctor::doctor(&checked.footprint)
 }
 
 /// Returns whether the files of a command are its user's alone: all but a simulated recording. The

@@ -63,7 +63,6 @@ impl Notifier {
         self.tell(&[NotifyState::Ready, NotifyState::Status(reason)]);
     }
 
-    /// Reports that this process lives, as often as systemd requires it.
     pub fn keep_alive(&mut self) {
         let is_due = self.every.is_some_and(|it| self.kept_alive.elapsed() >= it);
         if self.is_ready && is_due {

@@ -8,7 +8,6 @@ use gyre_run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
-/// Returns the processes to start: `gyre stage NAME`, or their replacements.
 pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan> {
     let live = configuration.run.mode == Mode::Live;
     let plan = |name: &str| {
@@ -63,7 +62,6 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
         .collect()
 }
 
-/// Returns the process that records the run that writes to `out`.
 pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StagePlan> {
     if !record.is_on() {
         return None;
@@ -89,43 +87,5 @@ pub fn require_recordable(record: &RecordConfig, out: &Path, goes_on: bool) -> R
         (true, true) => Ok(gyre_recorder::require_own(&record.file, out)?),
         (true, false) => Ok(gyre_recorder::require_new(&record.file)?),
         (false, _) => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    fn from(text: &str) -> Configuration {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("run.toml");
-        std::fs::write(&file, text).unwrap();
-        Configuration::read(&file, &[]).unwrap()
-    }
-
-    #[test]
-    fn one_line_chooses_the_search_and_another_the_refinement() {
-        let names = |text: &str| -> Vec<String> {
-            stage_plans(&from(text), Path::new("gyre"))
-                .into_iter()
-                .map(|plan| plan.name)
-                .collect()
-        };
-        for (text, expected) in [
-            ("", "rotation-search translation-search refinement"),
-            (
-                "[refinement]\nkind = 'none'",
-                "rotation-search translation-search",
-            ),
-            ("[search]\nkind = 'exhaustive'", "joint-search refinement"),
-            (
-                "[search]\nkind = 'exhaustive'\n[refinement]\nkind = 'none'",
-                "joint-search",
-            ),
-        ] {
-            let expected = format!("radar-replay masking {expected} pose-integration");
-            assert_eq!(names(text).join(" "), expected);
-        }
     }
 }

@@ -21,7 +21,6 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::{ros2, split};
 
-/// The limits of a run that follow from its dataset and configuration.
 pub struct Preflight {
     pub scans: Scans,
     pub window: Window,
@@ -30,7 +29,6 @@ pub struct Preflight {
 }
 
 impl Preflight {
-    /// Returns the manifest of a run, without its place in shared memory.
     pub fn manifest(&self, configuration: &Configuration, out: &Path, build: String) -> Manifest {
         Manifest {
             prefix: String::new(),
@@ -234,7 +232,6 @@ pub(crate) fn needs_all(dataset: &dyn Dataset) -> bool {
     matches!(dataset.format(), Format::Mcap | Format::Ros2Bag)
 }
 
-/// Checks that the fixes of GNSS can be used, or received.
 fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
     let config = &configuration.gnss;
     if !config.is_live() {

@@ -15,7 +15,6 @@ use gyre_terminal::own;
 
 use crate::plan::stage_plans;
 
-/// Returns the BLAKE3 digest of a file.
 pub fn digest(path: &Path) -> io::Result<String> {
     let mut digest = Hasher::new();
     digest.update_reader(gyre_storage::open(path)?)?;

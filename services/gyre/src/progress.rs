@@ -105,7 +105,6 @@ impl Progress {
         }
     }
 
-    /// Reports how long the radar of a live run has been silent.
     fn silence(&mut self) {
         let Some((silence, manifest)) = &mut self.radar else {
             return;

@@ -39,7 +39,6 @@ use crate::{
 
 pub use resolve::resolve;
 
-/// The folder of a simulated recording that is stored.
 const RECORDING: &str = "recording";
 
 /// Runs the pipeline and writes its results, however it ended. An interrupted earlier run is
@@ -78,7 +77,6 @@ pub(crate) fn compute(
     }
 }
 
-/// Chooses the place of a simulation that is stored.
 pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
@@ -249,7 +247,6 @@ fn play(
     }
 }
 
-/// Writes the files that the stages expect in the folder of the results.
 fn prepare(
     configuration: &Configuration,
     ready: &Ready,

@@ -49,7 +49,6 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the options of the command line as overrides `section.key=value`.
 fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     let file = arguments.trajectory.as_deref().map(path_value);
     let options = [
@@ -82,7 +81,6 @@ pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result
     Ok(())
 }
 
-/// Writes a recording, with a progress bar on a terminal.
 fn write(
     threads: NonZeroUsize,
     simulation: &SimulationConfig,

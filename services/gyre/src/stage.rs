@@ -50,7 +50,6 @@ pub fn run(name: &str, python: Option<PathBuf>) -> ExitCode {
     })
 }
 
-/// Returns the work of a stage, which is a function of Python where a file of one is given.
 fn work_of_stage(stage: StageId, python: Option<PathBuf>) -> Work {
     if let Some(file) = python {
         return Box::new(move |it| match stage {

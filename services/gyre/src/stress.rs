@@ -24,7 +24,6 @@ use crate::{
 
 /// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
-/// Duration of a scenario with `--quick`, s.
 const QUICK_S: f64 = 10.0;
 /// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is
 /// played again and again.
@@ -116,7 +115,6 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());
@@ -155,17 +153,13 @@ fn provenance(
     arguments: &StressArguments,
     configuration: &Configuration,
 ) -> Result<Provenance, Failure> {
-    let uname = rustix::system::uname();
-    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let file = arguments.inputs.given()?.configuration;
     Ok(Provenance {
         date: today(),
         machine: Machine::this().to_string(),
-        kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
         build: program::digest(&own())?,
         configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
-        load_before: load.split(' ').next().and_then(|load| load.parse().ok()),
     })
 }

@@ -46,7 +46,6 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the token of the file, or a random one if other machines can connect.
 fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {
     let Some(path) = &arguments.token_file else {
         return match lets_others_in(arguments) {
@@ -59,7 +58,6 @@ fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {
     Ok(Some(token.map_err(failed)?))
 }
 
-/// Returns whether other machines can connect.
 fn lets_others_in(arguments: &WatchArguments) -> bool {
     let mut addresses = [arguments.listen].into_iter().chain(arguments.foxglove);
     addresses.any(|address| !address.ip().is_loopback())

@@ -18,9 +18,10 @@ use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};
-pub use connection::{RadarParser, RadarSocket};
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
+
+use connection::RadarParser;
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {

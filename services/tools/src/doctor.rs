@@ -1,121 +1,121 @@
 //! `gyre doctor`: what this machine lacks for a run, each with its remedy.
 
-mod memory;
-mod system;
+use std::{collections::BTreeSet, fs, process::ExitCode};
 
-use std::{fmt, path::PathBuf, process::ExitCode};
-
-use clap::Args;
+use gyre_masking::networks::runtime::{self, RuntimeError};
 use gyre_messages::Footprint;
+use gyre_stage::{
+    python_function::Interpreter,
+    run::{SHARED_MEMORY, free_shared_memory},
+};
 use gyre_terminal::{Failure, print};
 
-/// The arguments of `gyre doctor`.
-#[derive(Debug, Args)]
-pub struct DoctorArguments {
-    /// The folder of the results of the run to come.
-    #[arg(long, default_value = "out")]
-    pub out: PathBuf,
+const GOVERNORS: &str = "/sys/devices/system/cpu/cpufreq";
+
+/// A check of the machine: the finding, and the remedy if there is something to do.
+type Finding = (String, Option<String>);
+
+/// Prints the findings, and fails if a run cannot work here. Other limits are named by the run that
+/// they stop.
+pub fn doctor(footprint: &Footprint) -> Result<ExitCode, Failure> {
+    let lacks_memory = shared_memory(footprint);
+    let works = lacks_memory.1.is_none();
+    for (subject, lack, (found, remedy)) in [
+        ("shared memory", "FAILS", lacks_memory),
+        ("cpu governor", "note", governor()),
+        ("ONNX Runtime", "note", onnx_runtime()),
+        ("Python", "note", python()),
+    ] {
+        let state = if remedy.is_some() { lack } else { "ok" };
+        let remedy = remedy.map(|remedy| format!("\n{:21}-> {remedy}", ""));
+        let remedy = remedy.unwrap_or_default();
+        print::values(format_args!("{state:<6}{subject:<15}{found}{remedy}"))?;
+    }
+    print::line(match works {
+        true => "a run works here; `gyre demo` tries it",
+        false => "no run works here while this fails: shared memory",
+    })?;
+    Ok(match works {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
 }
 
-/// Prints the findings, and fails if a run cannot work here.
-pub fn doctor(
-    arguments: &DoctorArguments,
-    footprint: &Footprint,
-    observers: usize,
-) -> Result<ExitCode, Failure> {
-    let findings = [
-        system::kernel(),
-        system::processors(),
-        system::vector_units(),
-        system::governor(),
-        system::clock(),
-        memory::main_memory(footprint),
-        memory::shared_memory(footprint),
-        system::open_files(observers),
-        system::processes(),
-        system::core_files(),
-        memory::results(&arguments.out),
-        system::onnx_runtime(),
-        system::python(),
-    ];
-    findings.iter().try_for_each(print::values)?;
-    let bad = findings.iter().filter(|found| found.state == State::Bad);
-    let (sentence, code) = match bad.count() {
-        0 => (
-            "a run works here; `gyre demo` tries it".to_owned(),
-            ExitCode::SUCCESS,
-        ),
-        1 => (
-            "no run works here while this fails: 1".to_owned(),
-            ExitCode::FAILURE,
-        ),
-        count => (
-            format!("no run works here while these fail: {count}"),
-            ExitCode::FAILURE,
-        ),
+fn shared_memory(footprint: &Footprint) -> Finding {
+    let needed = footprint.total() as u64;
+    let free = match free_shared_memory() {
+        Ok(free) => free,
+        Err(error) => {
+            let remedy = format!("mount a tmpfs at {SHARED_MEMORY}");
+            return (format!("{SHARED_MEMORY}: {error}"), Some(remedy));
+        }
     };
-    print::line(sentence)?;
-    Ok(code)
+    let mb = |bytes: u64| bytes as f64 * 1e-6;
+    let room = free.map_or("no limit".to_owned(), |free| {
+        format!("{:.1} MB free", mb(free))
+    });
+    let found = format!(
+        "{SHARED_MEMORY}: {room}; a run with default settings needs {:.1} MB",
+        mb(needed)
+    );
+    let remedy = format!(
+        "enlarge it (`mount -o remount,size=1G {SHARED_MEMORY}`, containers: --shm-size 1g), or lower run.observers, \
+         run.window or raster.n"
+    );
+    let is_small = free.is_some_and(|free| free < needed);
+    (found, is_small.then_some(remedy))
 }
 
-/// A check of the machine.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    subject: &'static str,
-    state: State,
-    /// The finding, a sentence.
-    found: String,
-    /// The remedy; empty if there is nothing to do.
-    remedy: String,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    Good,
-    /// A run works, but more slowly, or without a part of it.
-    Limited,
-    /// A run cannot work.
-    Bad,
-}
-
-impl Finding {
-    fn good(subject: &'static str, found: impl Into<String>) -> Self {
-        Self {
-            subject,
-            state: State::Good,
-            found: found.into(),
-            remedy: String::new(),
-        }
-    }
-
-    fn limited(self, remedy: impl Into<String>) -> Self {
-        Self {
-            state: State::Limited,
-            remedy: remedy.into(),
-            ..self
-        }
-    }
-
-    fn bad(self, remedy: impl Into<String>) -> Self {
-        Self {
-            state: State::Bad,
-            remedy: remedy.into(),
-            ..self
-        }
+fn governor() -> Finding {
+    let policies = fs::read_dir(GOVERNORS).into_iter().flatten().flatten();
+    let governors: BTreeSet<String> = policies
+        .filter_map(|policy| fs::read_to_string(policy.path().join("scaling_governor")).ok())
+        .map(|governor| governor.trim().to_owned())
+        .collect();
+    let names = governors.into_iter().collect::<Vec<_>>().join(", ");
+    let remedy = "latencies vary with the clock rate: `cpupower frequency-set -g performance`";
+    match names.as_str() {
+        "" => ("not visible, as on most virtual machines".to_owned(), None),
+        "performance" => (names, None),
+        _ => (names, Some(remedy.to_owned())),
     }
 }
 
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let state = match self.state {
-            State::Good => "ok",
-            State::Limited => "note",
-            State::Bad => "FAILS",
-        };
-        write!(f, "{state:<6}{:<15}{}", self.subject, self.found)?;
-        if !self.remedy.is_empty() {
-            write!(f, "\n{:21}-> {}", "", self.remedy)?;
+fn onnx_runtime() -> Finding {
+    let opened = runtime::find(None).and_then(|path| {
+        runtime::open(&path)?;
+        Ok(path)
+    });
+    let error = match opened {
+        Ok(path) => return (path.display().to_string(), None),
+        Err(error) => error,
+    };
+    let found = match error {
+        RuntimeError::Missing => {
+            "none: rten computes learned masks and moving objects, which takes longer"
         }
-        Ok(())
+        _ => {
+            "cannot be used: no learned masks and moving objects, unless masking.backend is `rten`"
+        }
+    };
+    (found.to_owned(), Some(error.to_string()))
+}
+
+/// The interpreter of stages that are functions of Python.
+fn python() -> Finding {
+    let without = "no stage can be a function of Python";
+    let found = match Interpreter::find() {
+        Ok(found) => found,
+        Err(error) => return (format!("none: {without}"), Some(error)),
+    };
+    let ([major, minor, micro], executable) = (found.version, &found.executable);
+    let python = format!("{executable}, {major}.{minor}.{micro}");
+    let remedy = format!(
+        "install it there: `{executable} -m pip install numpy`, or python3-numpy for the \
+         system's own; or name another Python with GYRE_PYTHON"
+    );
+    match found.numpy {
+        Some(numpy) => (format!("{python}, with numpy {numpy}"), None),
+        None => (format!("{python}, without numpy: {without}"), Some(remedy)),
     }
 }

@@ -25,7 +25,6 @@ pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
 use scans::ScanWriter;
 use source::{Place, Source};
 
-/// Writes the bag or the dataset.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     let mut source = Source::open(&arguments.source)?;
     match (&arguments.mcap, &arguments.out) {

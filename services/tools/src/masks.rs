@@ -17,10 +17,8 @@ use inspector::MaskInspector;
 
 /// Number of scans that are drawn by default, and maximum on the overview.
 const FEW: usize = 8;
-/// The picture of several scans.
 const OVERVIEW: &str = "masks.png";
 
-/// The arguments of `gyre masks`.
 #[derive(Debug, Args)]
 pub struct MasksArguments {
     /// The scans, and the configuration: its raster, masking and search.
@@ -40,7 +38,6 @@ pub struct MasksArguments {
     pub json: bool,
 }
 
-/// Draws the chosen scans, and prints a line on each.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let played = gyre_configuration::open(&configuration)?;
@@ -87,7 +84,6 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the numbers of the scans to draw, in order, each once.
 fn choose(
     arguments: &MasksArguments,
     played: Range<usize>,

@@ -10,14 +10,6 @@ use clap::{Args, Subcommand, builder::PossibleValuesParser};
 use gyre_run::StageConfig;
 use gyre_terminal::{Failure, print};
 
-/// The arguments of `gyre new`.
-#[derive(Debug, Args)]
-pub struct NewArguments {
-    /// The kind of project.
-    #[command(subcommand)]
-    pub what: New,
-}
-
 /// A kind of project.
 #[derive(Debug, Subcommand)]
 pub enum New {
@@ -25,7 +17,6 @@ pub enum New {
     Stage(StageArguments),
 }
 
-/// The arguments of `gyre new stage`.
 #[derive(Debug, Args)]
 pub struct StageArguments {
     /// The stage that it takes the place of.
@@ -44,8 +35,8 @@ pub struct StageArguments {
     pub gyre: Option<PathBuf>,
 }
 
-pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
-    let New::Stage(arguments) = &arguments.what;
+pub fn new(what: &New) -> Result<ExitCode, Failure> {
+    let New::Stage(arguments) = what;
     let stage = arguments.stage.as_str();
     let default = || PathBuf::from(format!("my-{stage}"));
     let folder = arguments.folder.clone().unwrap_or_else(default);
@@ -78,7 +69,6 @@ macro_rules! template {
     };
 }
 
-/// Returns the files of a project: their names and texts.
 fn files(stage: &str, is_rust: bool) -> Vec<(&'static str, &'static str)> {
     if is_rust {
         let text = match stage {
@@ -105,7 +95,6 @@ fn files(stage: &str, is_rust: bool) -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-/// Returns the whole path of a checkout of Gyre.
 fn checkout(folder: &Path) -> Result<PathBuf, Failure> {
     let is_one = folder.join("shared/process/stage/Cargo.toml").is_file();
     match folder.canonicalize() {

@@ -18,7 +18,6 @@ use gyre_terminal::{Failure, print};
 use page::page;
 use subject::Subject;
 
-/// The arguments of `gyre report`.
 #[derive(Debug, Args)]
 pub struct ReportArguments {
     /// Runs, by the folders of their results, and trajectories of other programs (TUM, KITTI or a
@@ -37,7 +36,6 @@ pub struct ReportArguments {
     pub open: bool,
 }
 
-/// Writes the page and prints its path.
 pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let truth = match &arguments.ground_truth {
         Some(truth) => Some(truth.clone()),
@@ -66,7 +64,6 @@ fn with_corrected(subjects: &[PathBuf]) -> Vec<PathBuf> {
     subjects.iter().flat_map(both).flatten().collect()
 }
 
-/// Returns the ground truth of the first run that has one.
 fn truth_of(subjects: &[PathBuf]) -> Option<PathBuf> {
     let runs = subjects.iter().filter(|path| path.is_dir());
     let mut truths = runs.filter_map(|run| truth_of_run(run).ok());
@@ -82,7 +79,6 @@ fn default_page(subjects: &[PathBuf]) -> PathBuf {
     first.map_or_else(|| name.into(), |run| run.join(name))
 }
 
-/// Opens a file with the program that the desktop has for it.
 fn open(page: &Path) -> Result<(), Failure> {
     let mut command = Command::new("xdg-open");
     command

@@ -85,7 +85,6 @@ fn locked(path: &Path) -> Result<Out, OutError> {
     }
 }
 
-/// Returns whether a run was begun with this configuration from these scans.
 fn is_same(begun: &Identity, configuration: &Configuration) -> Result<bool, Failure> {
     let replaced = program::replaced(configuration)?;
     begun.has_inputs_of(configuration, &replaced)

@@ -13,14 +13,12 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// Defines a sensor: its log, its configuration, and how it is calibrated.
 macro_rules! sensor {
     (
         $sensor:ident: $title:literal, $is:literal, $section:ident, $calibrate:ident,
         $log:ty, $config:ty, $of_log:path, $found:ty,
         beside: $beside:expr, read: $read:expr, mean: $mean:expr, toml: $toml:expr
     ) => {
-        /// A log and the configuration of its sensor.
         pub(super) struct $sensor {
             log: $log,
             configured: $config,
@@ -69,7 +67,6 @@ macro_rules! sensor {
                 Ok(found)
             }
 
-            /// Calibrates by the drives that have a log, and prints the findings.
             pub(super) fn section(logs: &[(&Self, &Drive)]) -> Result<Section, Failure> {
                 let Some((first, _)) = logs.first() else {
                     return Ok(Section::default());
@@ -82,7 +79,13 @@ macro_rules! sensor {
                     }
                 }
                 let Some((one, others)) = told.split_first() else {
-                    return Ok(Section::refused($is, refused, first.is_named));
+                    let reason = refused.as_ref();
+                    let text = reason.map(|it| format!("\n# The {} not calibrated: {it}\n", $is));
+                    return Ok(Section {
+                        text: text.unwrap_or_default(),
+                        is_told: false,
+                        refused: refused.filter(|_| first.is_named).map(Into::into),
+                    });
                 };
                 let (mean, toml) = ($mean, $toml);
                 let found: $found = mean(one, others)?;
@@ -93,8 +96,11 @@ macro_rules! sensor {
                 // A relative path is one of the file's folder.
                 let file = first.is_named.then(|| absolute(&first.log.path));
                 let file = file.transpose()?;
-                let text = toml(&found, file.as_deref(), &first.configured);
-                Ok(Section::told(text))
+                Ok(Section {
+                    text: toml(&found, file.as_deref(), &first.configured),
+                    is_told: true,
+                    refused: None,
+                })
             }
         }
     };

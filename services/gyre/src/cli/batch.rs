@@ -4,7 +4,6 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-/// The arguments of `gyre batch`.
 #[derive(Debug, Args)]
 pub struct BatchArguments {
     /// The drives: a text file with the path of a recording in each line, a CSV file with the

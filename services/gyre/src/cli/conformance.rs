@@ -6,7 +6,6 @@ use clap::{Args, builder::PossibleValuesParser};
 use gyre_messages::StageId;
 use gyre_terminal::inputs::Inputs;
 
-/// The arguments of `gyre conformance`.
 #[derive(Debug, Args)]
 pub struct ConformanceArguments {
     /// The stage that the program replaces.

@@ -5,7 +5,7 @@ use gyre_terminal::{WIDTH, wrap};
 
 use super::Gyre;
 
-/// The groups of commands in the order of the help, with two examples of each command.
+/// The groups of commands in the order of the help, with examples of each command.
 const GROUPS: &str = "\
 Start:
 gyre demo
@@ -17,7 +17,6 @@ gyre inspect drive.mcap --json
 gyre config
 gyre config oxford > robot.toml
 gyre doctor
-gyre doctor --out /data/out
 
 See the results:
 gyre report out/demo --open
@@ -105,10 +104,8 @@ fn commands(group: &'static str) -> Vec<(&'static str, Vec<&'static str>)> {
         .collect()
 }
 
-/// The exit codes of all commands.
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 wrong arguments, 130 interrupted.";
 
-/// Columns of the names of commands.
 const NAMES: usize = 16;
 
 /// Returns the command line of `gyre`, with groups and examples in its help.

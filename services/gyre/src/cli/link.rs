@@ -14,7 +14,6 @@ pub enum LinkEnd {
     Receive(ReceiveArguments),
 }
 
-/// The arguments of `gyre link send`.
 #[derive(Debug, Args)]
 pub struct SendArguments {
     /// The folder of the run's results, its --out.
@@ -30,7 +29,6 @@ pub struct SendArguments {
     pub network: NetworkArguments,
 }
 
-/// The arguments of `gyre link receive`.
 #[derive(Debug, Args)]
 pub struct ReceiveArguments {
     /// The folder of the run that is made of it.
@@ -42,7 +40,6 @@ pub struct ReceiveArguments {
     pub network: NetworkArguments,
 }
 
-/// The endpoints and certificates of the other machine.
 #[derive(Debug, Args)]
 pub struct NetworkArguments {
     /// Wait for the other end here, as in tls/0.0.0.0:7447; tcp/ is for loopback addresses.

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use gyre_tools::operate::RunChoice;
 
-/// The arguments of `gyre record`.
 #[derive(Debug, Args)]
 pub struct RecordArguments {
     #[command(flatten)]

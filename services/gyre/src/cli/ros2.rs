@@ -4,7 +4,6 @@ use clap::Args;
 use gyre_tools::export::FrameArguments;
 use gyre_tools::operate::RunChoice;
 
-/// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
 pub struct Ros2Arguments {
     #[command(flatten)]

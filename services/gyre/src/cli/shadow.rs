@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use gyre_tools::operate::RunChoice;
 
-/// The arguments of `gyre shadow`.
 #[derive(Debug, Args)]
 pub struct ShadowArguments {
     /// The stage: masking, rotation-search, translation-search, joint-search or refinement.

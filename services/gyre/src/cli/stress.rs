@@ -7,7 +7,6 @@ use gyre_messages::StageId;
 use gyre_run::Scenario;
 use gyre_terminal::inputs::Inputs;
 
-/// The arguments of `gyre stress`.
 #[derive(Debug, Args)]
 pub struct StressArguments {
     /// The configuration, whose section `[budget]` is the verdict, and the recording. Default: the

@@ -5,7 +5,6 @@ use std::{net::SocketAddr, path::PathBuf};
 use clap::Args;
 use gyre_tools::operate::RunChoice;
 
-/// The arguments of `gyre watch`.
 #[derive(Debug, Args)]
 pub struct WatchArguments {
     #[command(flatten)]

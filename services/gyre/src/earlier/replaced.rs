@@ -24,7 +24,6 @@ pub(super) fn is_kept(out: &Out) -> bool {
     out.join(ASIDE).exists()
 }
 
-/// Puts the journal of a complete run aside, if the folder has one.
 pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
     let aside = out.join(ASIDE);
     if !is_complete(out.path()) || !storage::rename(&out.join(JOURNAL), &aside)? {
@@ -80,7 +79,6 @@ pub(super) fn invalidate(out: &Out) -> Result<(), StorageError> {
     }
 }
 
-/// Removes a complete run that has no results left.
 pub(super) fn remove(out: &Out) -> Result<(), StorageError> {
     match is_kept(out) {
         true => empty(&out.join(ASIDE), &out.join(JOURNAL)),
@@ -107,7 +105,6 @@ pub(super) fn give_back(out: &Out) -> Result<(), StorageError> {
     Ok(())
 }
 
-/// The file that marks a journal as belonging to a complete run.
 fn mark() -> &'static OsStr {
     Path::new(COMPLETE).file_name().unwrap_or_default()
 }

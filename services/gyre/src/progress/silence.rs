@@ -24,7 +24,6 @@ pub struct Report {
 }
 
 impl Silence {
-    /// Begins with a run, at `now_ns` by `CLOCK_MONOTONIC`.
     pub fn new(radar: String, now_ns: i64) -> Self {
         Self {
             radar,

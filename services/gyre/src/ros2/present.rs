@@ -17,7 +17,6 @@ use gyre_terminal::{Failure, print};
 
 use crate::cli::Ros2Arguments;
 
-/// Publishes the runs of a folder until a signal arrives.
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
@@ -51,7 +50,6 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns how the map of the run that writes to `out` is drawn.
 fn map_settings(out: &Path) -> Result<MapSettings, String> {
     let configuration = Configuration::read(&out.join("config.toml"), &[]);
     let configuration = configuration.map_err(|error| error.to_string())?;
@@ -62,7 +60,6 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
     })
 }
 
-/// Asks the driver of a source for the sizes of its radar's scans.
 pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
     let settings = source::Settings::of(source, options)?;
     source::ask(&settings).map_err(|error: AskError| error.into())

@@ -11,7 +11,6 @@ use gyre_terminal::{Failure, print};
 use super::results_folder;
 use crate::cli::RunArguments;
 
-/// Reads the configuration and resolves its open settings.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
     if arguments.from.is_some() && given.data.is_none() {

@@ -319,10 +319,6 @@ impl RadarParser {
         }
     }
 
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "a message borrows the parser"
-    )]
     pub fn next(&mut self) -> Option<Event<'_>> {
         match self {
             Self::Stream(parser) => parser.next(),

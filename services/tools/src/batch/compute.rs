@@ -93,7 +93,6 @@ pub fn compute(
 }
 
 impl Ended {
-    /// Writes the row of a drive and counts it. Returns a line about it.
     fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
         let Batch { settings, out, .. } = batch;
         let (mut row, mut note) = (Row::read(out, drive, settings)?, String::new());
@@ -175,7 +174,6 @@ impl<'a> Child<'a> {
         }
     }
 
-    /// Returns the end of the output of this process.
     fn printed(&self) -> io::Result<String> {
         let (mut file, mut bytes) = (&self.output, Vec::new());
         let tail = file.metadata()?.len().saturating_sub(TAIL);
@@ -192,7 +190,6 @@ impl Drop for Child<'_> {
     }
 }
 
-/// The words of a drive's command: the parent process, then the words of `gyre run`.
 fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
     let mut out = OsString::from("--out=");
     out.push(Row::results(&batch.out, drive));

@@ -61,7 +61,6 @@ pub(crate) const TIMES: [Column; 9] = [
 /// Digits of a build that distinguish it.
 const BUILD_DIGITS: usize = 12;
 
-/// Reads the values of all columns from the results of a complete run.
 pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
     let path = out.join("summary.json");
     let text = read_text(&path, SETTINGS)
@@ -104,7 +103,6 @@ pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
     Ok(values)
 }
 
-/// Returns the time and the length of a trajectory, s and m.
 fn driven(path: &Path) -> Result<(f64, f64), Failure> {
     let trajectory = read_trajectory(path).map_err(|error| unknown(path, error))?;
     match trajectory.span_ns() {

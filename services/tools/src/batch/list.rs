@@ -91,7 +91,6 @@ impl List {
         Ok(drives.cloned().collect())
     }
 
-    /// Returns the absolute form of a path of this list.
     pub fn resolve(&self, path: &str) -> PathBuf {
         self.folder.join(path)
     }
@@ -134,7 +133,6 @@ fn lines(text: &str) -> Lines {
     }
 }
 
-/// A line of a CSV file with a header.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct Line {
@@ -144,7 +142,6 @@ struct Line {
     set: String,
 }
 
-/// Returns the drives of a CSV file with a header.
 fn table(text: &str) -> Lines {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))

@@ -98,7 +98,6 @@ pub struct Settings {
     pub set: Vec<String>,
 }
 
-/// The outcome of a drive, and its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {

@@ -8,16 +8,15 @@ mod stream;
 use std::time::{Duration, Instant};
 
 use gyre_messages::{StageId, flag};
-use gyre_stage::StageError;
 use gyre_supervise::{Scheduling, rig::Recorded};
 use gyre_terminal::Failure;
 
 use crate::conformance::{
     Interrupted,
     item::work_ns,
-    reference::{Context, POLL_PERIOD, own_ended},
+    reference::{Context, POLL_PERIOD},
     report::{Report, Work},
-    result::{Differences, result_bytes},
+    result::result_bytes,
     rule::{Findings, Rule},
     session::{Pace, Session},
 };
@@ -25,7 +24,6 @@ use crate::conformance::{
 /// Items between two observers.
 const BETWEEN: u64 = 3;
 
-/// A part of the test.
 type Scenario<'a> = fn(&mut Examination<'a>) -> Result<(), Failure>;
 
 pub(crate) struct Examination<'a> {
@@ -68,7 +66,7 @@ impl<'a> Examination<'a> {
         self.start_without_topics()?;
         (self.observe)("a whole stream");
         if !self.stream()? {
-            return self.report(None, None);
+            return self.report(None);
         }
         let is_masking = self.stage() == StageId::Masking;
         let is_source = self.stage() == StageId::RadarReplay;
@@ -89,8 +87,7 @@ impl<'a> Examination<'a> {
             (self.observe)("the time of its answers");
             answers = self.timing()?;
         }
-        let own_work = self.own_work()?;
-        self.report(answers, own_work)
+        self.report(answers)
     }
 
     fn note_inapplicable_rules(&mut self) {
@@ -192,34 +189,14 @@ impl<'a> Examination<'a> {
         Ok(Work::of((0..end).filter_map(|seq| session.answer_ns(seq))))
     }
 
-    /// Measures Gyre's own stage on the same inputs, unless it is the program.
-    fn own_work(&mut self) -> Result<Option<Work>, Failure> {
-        let (stage, candidate) = (self.stage(), &self.context.test.candidate);
-        let own = candidate.own_command(stage);
-        if candidate.command == own {
-            return Ok(None);
-        }
-        (self.observe)("our own stage on the same inputs");
-        let mut scratch = Findings::default();
-        let mut session = Session::open(self.context, "measured", &mut scratch)?;
-        session.start(&own)?;
-        let waited = session.reach(self.context.reference.end())?;
-        match waited.is_done() {
-            true => Ok(Work::of(work_on(stage, &session.outputs))),
-            false => Err(own_ended(stage.name(), &waited.to_string())),
-        }
-    }
-
-    fn report(mut self, answers: Option<Work>, own_work: Option<Work>) -> Result<Report, Failure> {
+    fn report(mut self, answers: Option<Work>) -> Result<Report, Failure> {
         let Context {
             test, reference, ..
         } = self.context;
         let (stage, topic) = (self.stage(), test.candidate.topics().output);
         let work = Work::of(work_on(stage, &self.outputs));
-        let own = reference.topic(topic);
-        let has_outputs = !self.outputs.is_empty();
-        if test.demands.same_as_own && has_outputs {
-            for own in own {
+        if test.demands.same_as_own && !self.outputs.is_empty() {
+            for own in reference.topic(topic) {
                 let seq = own.item().seq;
                 let bytes = result_bytes(topic, own)?;
                 let same = self.findings.first_results.get(&seq) == Some(&bytes);
@@ -232,7 +209,6 @@ impl<'a> Examination<'a> {
             self.judge_times("by its own stamps", work, budget);
             self.judge_times("by our clock, until its answer,", answers, budget);
         }
-        let deviation = has_outputs.then(|| deviation(topic, own, &self.outputs));
         Ok(Report {
             stage: stage.name(),
             command: test.candidate.command.clone(),
@@ -240,8 +216,6 @@ impl<'a> Examination<'a> {
             rules: self.findings.judged(),
             work,
             answers,
-            own_work,
-            deviation: deviation.transpose()?,
         })
     }
 
@@ -257,32 +231,8 @@ impl<'a> Examination<'a> {
     }
 }
 
-/// Returns the times of a stage's work on items by its own stamps, ns.
 fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
     let items = outputs.iter().map(Recorded::item);
     let worked_on = items.filter(|it| !it.is(flag::END) && !it.is(flag::BASE));
     worked_on.map(move |it| work_ns(stage, &it))
-}
-
-/// Returns a sentence with the difference between results and the results of Gyre's own stage.
-/// Items that one of them lacks are left out.
-fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String, StageError> {
-    let (mut items, mut equal, mut differences) = (0, 0, Differences::default());
-    for own in own.iter().filter(|own| !own.item().is(flag::END)) {
-        let seq = own.item().seq;
-        let is_same = |it: &&Recorded| it.item().seq == seq && !it.item().is(flag::BASE);
-        let Some(other) = other.iter().find(is_same) else {
-            continue;
-        };
-        items += 1;
-        match result_bytes(topic, own)? == result_bytes(topic, other)? {
-            true => equal += 1,
-            false => {
-                differences.add(topic, own, other)?;
-            }
-        }
-    }
-    let same = format!("{equal} of {items} items are the same bytes");
-    let rows = differences.spreads().rows();
-    Ok([vec![same], rows].concat().join("\n                 "))
 }

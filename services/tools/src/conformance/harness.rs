@@ -12,7 +12,6 @@ use gyre_supervise::{
 
 use crate::conformance::{at, topics::StageTopics};
 
-/// A program that stands in for a stage, and the run that it sees.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     pub stage: StageId,
@@ -64,7 +63,6 @@ impl Candidate {
 pub(crate) struct Harness<'a> {
     // Dropped in this order: process, ports, run.
     process: Option<Process>,
-    /// The publishers of the inputs by topic.
     pub feeds: BTreeMap<&'static str, Box<dyn Feed>>,
     pub output: Box<dyn Tap>,
     pub rig: Rig<'a>,
@@ -80,7 +78,6 @@ pub(crate) enum Sent {
 }
 
 impl<'a> Harness<'a> {
-    /// Opens the topics of a stage. No process is started.
     pub(crate) fn open(rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
         let topics = StageTopics::of(stage, rig.manifest());
         let mut harness = Self {
@@ -129,7 +126,6 @@ impl<'a> Harness<'a> {
         self.feeds.values().try_for_each(|feed| feed.connect())
     }
 
-    /// Returns whether the process has opened the topic that it publishes.
     pub(crate) fn has_publisher(&self) -> bool {
         self.rig.has_publisher(self.stage)
     }

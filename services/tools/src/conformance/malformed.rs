@@ -53,7 +53,6 @@ pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>,
     Ok(all)
 }
 
-/// A fault of a header, and a function that makes it.
 type Change<'a, M> = (&'static str, &'a dyn Fn(&mut <M as Message>::Header));
 
 fn changes<M: Message<Header: Copy>>(

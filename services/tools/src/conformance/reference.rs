@@ -46,7 +46,6 @@ impl Reference {
         self.topic(Pose::TOPIC).len().saturating_sub(1) as u64
     }
 
-    /// Reads the scans and lets Gyre's own stages process them.
     pub(crate) fn compute(
         test: &Test,
         scans: &mut InputScans,
@@ -66,7 +65,6 @@ impl Reference {
     }
 }
 
-/// The test with its inputs, as all checks need it.
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub test: &'a Test,
@@ -111,7 +109,6 @@ fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, Failure> {
     Ok(read)
 }
 
-/// A pipeline of Gyre's own stages whose source and sink are here.
 struct OwnPipeline<'a> {
     // Dropped in this order: processes, ports, run.
     processes: Vec<(StageId, Process)>,
@@ -181,7 +178,6 @@ impl<'a> OwnPipeline<'a> {
         Ok(self.reference)
     }
 
-    /// Returns whether all have sent the end of the stream.
     fn has_ended(&self) -> bool {
         let has_end = |topic| {
             let last = self.reference.topic(topic).last();
@@ -272,7 +268,6 @@ impl<'a> OwnPipeline<'a> {
     }
 }
 
-/// The end of a stage of Gyre that the test needs.
-pub(crate) fn own_ended(stage: &str, reason: &str) -> Failure {
+fn own_ended(stage: &str, reason: &str) -> Failure {
     format!("cannot compute the inputs: our own {stage} ended: {reason}").into()
 }

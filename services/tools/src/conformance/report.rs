@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use crate::conformance::rule::{Rule, Verdict};
 
-/// The result of the test of a program.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,
@@ -21,10 +20,6 @@ pub struct Report {
     /// The time from sending it an item to reading its answer, one item at a time; `None` unless
     /// there is a budget.
     pub answers: Option<Work>,
-    /// The work of Gyre's own stage on the same inputs, directly after.
-    pub own_work: Option<Work>,
-    /// The difference between its results and the results of Gyre's own stage.
-    pub deviation: Option<String>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -125,15 +120,8 @@ impl fmt::Display for Report {
         for (name, work) in [
             ("work on an item ", self.work),
             ("until the answer", self.answers),
-            ("our own stage   ", self.own_work),
         ] {
             work.map_or(Ok(()), |work| writeln!(f, "{name} {work}"))?;
-        }
-        if let (Some(own), Some(work)) = (self.own_work, self.work) {
-            writeln!(f, "ratio            {:.2} of p50", work.p50_ms / own.p50_ms)?;
-        }
-        if let Some(deviation) = &self.deviation {
-            writeln!(f, "results          {deviation}")?;
         }
         let stage = self.stage;
         match (self.conforms(), self.broken()) {
@@ -175,8 +163,6 @@ mod tests {
             rules: findings.judged(),
             work: None,
             answers: None,
-            own_work: None,
-            deviation: None,
         };
         let not_reached = report(Findings::default());
         assert!(!not_reached.conforms() && not_reached.broken() == 0);

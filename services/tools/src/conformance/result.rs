@@ -60,12 +60,10 @@ fn masked(message: &Recorded) -> Result<Vec<u8>, StageError> {
     Ok(bytes)
 }
 
-/// Returns the values of a payload, which need not be aligned.
 pub(crate) fn floats(payload: &[u8]) -> Vec<f32> {
     payload.chunks_exact(4).map(pod_read_unaligned).collect()
 }
 
-/// Returns the cells of the rasters, row after row.
 fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
     let pair = header.pair(values, Some((header, values)));
     let Some(pair) = pair else {
@@ -76,7 +74,6 @@ fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
     views.map(|view| view.iter().copied().collect()).collect()
 }
 
-/// The differences of results that have other bytes.
 #[derive(Debug, Default)]
 pub(crate) struct Differences {
     /// Mean absolute differences of the cells of the rasters; lengths of the differences of the
@@ -173,7 +170,6 @@ impl Spreads {
         rows.into_iter().filter_map(row).chain(level).collect()
     }
 
-    /// Returns whether nothing that is measured differs.
     pub(crate) fn are_zero(&self) -> bool {
         let all = [self.mask, self.translation_m, self.rotation_deg];
         all.into_iter().flatten().all(|spread| spread.max == 0.0)

@@ -23,7 +23,6 @@ macro_rules! rules {
         impl Rule {
             pub const ALL: [Self; [$($says,)+].len()] = [$(Self::$rule,)+];
 
-            /// Returns the conduct of a program that keeps it.
             pub fn says(self) -> &'static str {
                 match self {
                     $(Self::$rule => $says,)+
@@ -108,7 +107,6 @@ impl Findings {
         }
     }
 
-    /// Notes a breach unless `holds`.
     pub(crate) fn require(&mut self, rule: Rule, holds: bool, sentence: impl FnOnce() -> String) {
         self.checked(rule);
         if !holds {
@@ -116,7 +114,6 @@ impl Findings {
         }
     }
 
-    /// Returns the verdicts on all rules, in their order.
     pub(crate) fn judged(mut self) -> Vec<Judged> {
         let of = |rule: Rule| Judged {
             rule,

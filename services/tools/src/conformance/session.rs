@@ -35,7 +35,6 @@ pub(crate) enum Pace {
     Hold,
 }
 
-/// A process under test, and this program in place of the rest of the run.
 pub(crate) struct Session<'a> {
     pub harness: Harness<'a>,
     pub test: &'a Test,
@@ -150,49 +149,34 @@ impl<'a> Session<'a> {
     ) -> Result<Waited, Failure> {
         self.progress = Instant::now();
         loop {
-            self.exchange()?;
+            self.notified.extend(self.harness.answer_handshakes()?);
+            self.receive()?;
             self.admit()?;
             if done(self) {
                 return Ok(Waited::Done);
             }
             if let Some(death) = self.harness.death() {
                 self.receive()?;
-                let is_done = done(self);
-                return Ok(if is_done {
-                    Waited::Done
-                } else {
-                    Waited::Died(death)
+                return Ok(match done(self) {
+                    true => Waited::Done,
+                    false => Waited::Died(death),
                 });
             }
             if self.progress.elapsed() > limit {
                 return Ok(Waited::TimedOut);
             }
-            self.sleep()?;
+            if self.harness.sleep(POLL_PERIOD)? {
+                return Err(Interrupted.into());
+            }
         }
     }
 
     /// Waits for a time while the run continues around the process; returns whether the process is
     /// still alive.
     pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, Failure> {
-        let since = Instant::now();
-        let ended = self.wait(time, |_| since.elapsed() >= time)?;
-        Ok(!matches!(ended, Waited::Died(_)))
+        Ok(self.ended_within(time)?.is_none())
     }
 
-    fn sleep(&self) -> Result<(), Failure> {
-        match self.harness.sleep(POLL_PERIOD)? {
-            true => Err(Interrupted.into()),
-            false => Ok(()),
-        }
-    }
-
-    /// Answers handshakes and receives.
-    fn exchange(&mut self) -> Result<(), StageError> {
-        self.notified.extend(self.harness.answer_handshakes()?);
-        self.receive()
-    }
-
-    /// Receives the messages of the process, and examines them.
     fn receive(&mut self) -> Result<(), StageError> {
         while let Some(sent) = self.harness.receive()? {
             match sent {
@@ -218,7 +202,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Examines one item that the process has sent, alone and after the one before.
     fn examine(&mut self, item: &Item, read_ns: i64) {
         let seq = item.seq;
         self.findings.checked(Rule::OneForOne);
@@ -259,7 +242,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Kills the process and removes its leftovers.
     pub(crate) fn kill(&mut self) -> Result<(), Failure> {
         self.harness.kill()?;
         self.receive()?;
@@ -276,17 +258,10 @@ impl<'a> Session<'a> {
     /// Waits for the end of the process; `None` if it does not end in time.
     pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, Failure> {
         let since = Instant::now();
-        loop {
-            self.exchange()?;
-            if let Some(death) = self.harness.death() {
-                self.receive()?;
-                return Ok(Some(death));
-            }
-            if since.elapsed() > limit {
-                return Ok(None);
-            }
-            self.sleep()?;
-        }
+        Ok(match self.wait(limit, |_| since.elapsed() >= limit)? {
+            Waited::Died(death) => Some(death),
+            Waited::Done | Waited::TimedOut => None,
+        })
     }
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
@@ -302,13 +277,11 @@ impl<'a> Session<'a> {
             .collect()
     }
 
-    /// Returns whether the process has opened a topic.
     pub(crate) fn has_joined(&self) -> bool {
         let mut feeds = self.harness.feeds.values();
         feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
     }
 
-    /// Returns the inputs that the process has not subscribed to.
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
         let feeds = &self.harness.feeds;
         let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
@@ -321,7 +294,6 @@ impl<'a> Session<'a> {
         items.filter(move |it| it.item().seq == seq && !it.item().is(flag::BASE))
     }
 
-    /// Returns whether it has sent something about an item.
     pub(crate) fn has(&self, seq: u64) -> bool {
         self.about(seq).next().is_some()
     }
@@ -333,7 +305,6 @@ impl<'a> Session<'a> {
         Some(answer.received_ns.saturating_sub(*sent_ns))
     }
 
-    /// Returns the result bytes of the first message about each item.
     pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, StageError> {
         let mut results = BTreeMap::new();
         for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {

@@ -28,7 +28,6 @@ use life::ShadowProgram;
 use record::Record;
 use shadowing::Shadowing;
 
-/// The program, the stage that it shadows, and the limits of the comparison.
 #[derive(Clone, Debug)]
 pub struct Options {
     pub stage: StageId,

@@ -22,7 +22,6 @@ pub struct Test {
     pub demands: Demands,
 }
 
-/// Time limits of a program, and optional demands on it.
 #[derive(Clone, Debug)]
 pub struct Demands {
     pub start_timeout: Duration,
@@ -58,7 +57,6 @@ pub struct InputScans {
 }
 
 impl Test {
-    /// Creates a run of this name, with or without its services.
     pub(crate) fn rig<'a>(
         &self,
         name: &str,

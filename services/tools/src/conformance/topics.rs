@@ -49,7 +49,6 @@ impl StageTopics {
         }
     }
 
-    /// Returns all topics that it may subscribe to.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = &'static str> {
         self.forward.iter().chain(&self.feedback).copied()
     }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use gyre_ros2_messages::frames::Frames;
 
-/// The arguments of `gyre export`.
 #[derive(Debug, Args)]
 pub struct ExportArguments {
     /// The source: the folder of a run's results, a recording of a run, NAME.mcap, or a dataset.
@@ -24,12 +23,10 @@ pub struct ExportArguments {
     /// not.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "b-scan")]
     pub scans: Vec<ScanForm>,
-    /// The frames.
     #[command(flatten)]
     pub frames: FrameArguments,
 }
 
-/// The names of the frames, and where the radar is.
 #[derive(Debug, Args)]
 pub struct FrameArguments {
     /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.

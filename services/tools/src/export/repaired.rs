@@ -20,7 +20,10 @@ use gyre_radar::{
 use gyre_storage::{StorageError, create_folder, write as write_file};
 use gyre_terminal::{Failure, print};
 
-use crate::export::source::{Lost, Source};
+use crate::{
+    export::source::{Lost, Source},
+    masks::picture::write_grey,
+};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
@@ -28,7 +31,6 @@ const OPTIONS: &str = "dataset.toml";
 /// The ends of the names of lists that lie beside the images.
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
-/// Writes the scans that a run has played to a new folder.
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     let Some((_, configuration)) = source.run() else {
         return Err(
@@ -96,7 +98,6 @@ struct Writer {
     dataset: Box<dyn Dataset>,
     scan: OwnedScan,
     found: Lost,
-    /// The folder of the images that are written.
     out: PathBuf,
     counts: Counts,
 }
@@ -132,11 +133,11 @@ impl Writer {
                 return Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into());
             }
         };
-        Ok(write_file(&to, self.image(&places)?)?)
+        self.repair(&places, &to)
     }
 
-    /// Returns the repaired scan as a file, laid out as the one that it is from.
-    fn image(&self, places: &LostAzimuths) -> Result<Vec<u8>, Failure> {
+    /// Writes the repaired scan, laid out as the file that it is from.
+    fn repair(&self, places: &LostAzimuths, to: &Path) -> Result<(), Failure> {
         let scan = self.scan.view();
         let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
         let mut powers = vec![0; azimuths * bins];
@@ -145,15 +146,7 @@ impl Writer {
             let by_range = (0..bins).flat_map(|bin| powers.iter().skip(bin).step_by(bins));
             powers = by_range.copied().collect();
         }
-        let size = self.dataset.image_size();
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&powers)?;
-        writer.finish()?;
-        Ok(bytes)
+        write_grey(to, self.dataset.image_size().width, &powers)
     }
 }
 
@@ -181,15 +174,14 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
-    let bytes = fs::read(from).map_err(StorageError::at("read", from))?;
-    Ok(write_file(to, bytes)?)
+    fs::copy(from, to).map_err(StorageError::at("copy", from))?;
+    Ok(())
 }
 
 #[derive(Debug, Default)]
 struct Counts {
     scans: usize,
     repaired: usize,
-    /// Azimuths that were put back.
     azimuths: usize,
     /// Scans whose lost azimuths have unknown places.
     anywhere: usize,

@@ -17,7 +17,6 @@ use crate::export::{
     source::{Lost, Scans, Source},
 };
 
-/// The topics of Navtech's driver.
 const CONFIGURATION: &str = "/radar_data/configuration_data";
 const AZIMUTHS: &str = "/radar_data/fft_data";
 const B_SCANS: &str = "/radar_data/b_scan_msg";
@@ -35,7 +34,6 @@ pub struct ScanWriter {
     is_described: bool,
 }
 
-/// The data that is not in the bag as it is in the source.
 #[derive(Debug, Default)]
 struct Losses {
     unreadable: u64,
@@ -85,7 +83,6 @@ impl Losses {
         self.constants.retain(|(_, value)| *value != 0.0);
     }
 
-    /// Returns the radar's description of itself in these scans.
     fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
         let geometry = &scan.geometry;
         if geometry.sense != Sense::Clockwise {

@@ -87,7 +87,6 @@ impl Place {
     }
 }
 
-/// The poses of a run, in order.
 pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
 
 /// Where azimuths of scans were lost, by the number of the scan in its recording.
@@ -127,7 +126,6 @@ impl Source {
         }
     }
 
-    /// Returns the poses of a run; none of a dataset.
     pub fn places(&self) -> Result<Places, Failure> {
         match self.kind {
             Kind::Run(_) => {

@@ -219,16 +219,4 @@ mod tests {
             assert_eq!(content(&out, "map.png"), "a picture");
         }
     }
-
-    #[test]
-    fn a_map_that_was_not_written_to_its_end_is_removed_and_the_earlier_one_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path();
-        write_all(out, "earlier");
-        write_all(&out.join(NEXT), "half of");
-        fs::remove_file(out.join(NEXT).join("map.toml")).unwrap();
-        assert!(!is_interrupted(out));
-        finish(out).unwrap();
-        has(out, "earlier", 3);
-    }
 }

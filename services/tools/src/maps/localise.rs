@@ -29,7 +29,6 @@ use counts::Counts;
 
 pub use scans::{RegisteredScan, Scans};
 
-/// The table of all places.
 const FIXES: &str = "fixes.csv";
 /// The places of the scans that were found or tracked, in the frame of the map.
 const TUM: &str = "fixes.tum";
@@ -42,7 +41,6 @@ const PROBES: usize = 40;
 /// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// The arguments of `gyre localise`.
 #[derive(Debug, Args)]
 pub struct LocaliseArguments {
     /// The scans, and the configuration: its odometry.
@@ -64,7 +62,6 @@ pub struct LocaliseArguments {
 struct Figures<'a> {
     #[serde(flatten)]
     counts: &'a Counts,
-    /// Scans that could not be used.
     left_out: usize,
     ms_a_scan: f64,
     fixes: PathBuf,
@@ -116,7 +113,6 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// The scans with a fix, and the counts of all.
 #[derive(Default)]
 struct Found {
     counts: Counts,
@@ -202,7 +198,6 @@ fn write_row(scan: &RegisteredScan<'_>, found: &Localisation, map: &KeptMap, tex
     };
 }
 
-/// The word for a status.
 fn status_name(status: Status) -> &'static str {
     match status {
         Status::Lost => "lost",
@@ -212,7 +207,6 @@ fn status_name(status: Status) -> &'static str {
     }
 }
 
-/// Writes the fixes as TUM, and draws them over the map.
 fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
     let trajectory = Trajectory {

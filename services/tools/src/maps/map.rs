@@ -132,7 +132,6 @@ pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     Err(format!("{path} does not exist: a run keeps keyframes with --set slam.kind=graph").into())
 }
 
-/// The lines drawn over the keyframes, in the frame of the trajectory.
 #[derive(Default)]
 struct Lines {
     trajectory: Vec<Pose>,
@@ -174,7 +173,6 @@ fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
     poses.map(|(_, pose)| *pose).collect()
 }
 
-/// Writes the forms of a map but for its own folder.
 fn export(
     arguments: &MapArguments,
     origin: Option<Origin>,

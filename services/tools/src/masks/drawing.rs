@@ -54,7 +54,6 @@ impl Canvas {
         canvas
     }
 
-    /// Pictures of one width below each other.
     pub fn stack(pictures: &[Self]) -> Self {
         let pixels = pictures.iter().flat_map(|picture| &picture.pixels);
         Self {
@@ -88,7 +87,6 @@ fn place(corner: [usize; 2], cell: [usize; 2], scale: usize) -> [usize; 2] {
     [0, 1].map(|axis| corner[axis] + cell[axis] * scale)
 }
 
-/// The panels of a raster, without the points.
 fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
     let brightest = exceeded_by(BRIGHTEST, &raster.masked).max(f32::MIN_POSITIVE);
     [

@@ -6,14 +6,12 @@ use gyre_geometry::Twist;
 use ndarray::Array2;
 use serde::Serialize;
 
-/// The column heads of [`Figures`].
 pub const HEADER: &str = "  scan   power %   above floor %   cells %   points %      m/s    deg/s";
 
 /// Above this factor a cell or a point counts as kept.
 const KEPT: f32 = 0.5;
 
 pub struct Inspection {
-    /// The scan's place in the recording.
     pub number: usize,
     /// The raster of the scan; if the mask looks at two scans, then the raster of the scan before.
     pub rasters: Vec<MaskedRaster>,
@@ -49,7 +47,6 @@ pub struct Figures {
 }
 
 impl Inspection {
-    /// Returns the shares that the mask keeps.
     pub fn figures(&self) -> Figures {
         let raster = &self.rasters[0];
         let masked = sum(&raster.masked);

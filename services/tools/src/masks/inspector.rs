@@ -17,7 +17,6 @@ use crate::masks::inspection::{Inspection, MaskedRaster};
 /// motions, except for noise.
 const RUN_UP: usize = 8;
 
-/// Masks scans as a run does.
 pub struct MaskInspector {
     dataset: Box<dyn Dataset>,
     odometry: Odometry,

@@ -4,12 +4,10 @@ use std::{fs::File, io::BufWriter, path::Path};
 
 use gyre_terminal::Failure;
 
-/// Writes rows of grey values as PNG.
 pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), Failure> {
     encode(path, width, png::ColorType::Grayscale, pixels)
 }
 
-/// Writes rows of red, green and blue as PNG.
 pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), Failure> {
     encode(path, width, png::ColorType::Rgb, pixels.as_flattened())
 }

@@ -1,41 +1,18 @@
 //! The arguments of the commands that operate running runs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use gyre_terminal::print;
 
 /// The run that a command is about.
 #[derive(Debug, Args)]
 pub struct RunChoice {
     /// The run: the folder of its results. Default: the only run there is; a command that changes a
-    /// run asks first if that was not started from the current folder.
+    /// run takes only one that was started from the current folder.
     #[arg(value_name = "RUN")]
     pub run: Option<PathBuf>,
-    /// The old way to name it.
-    #[arg(long, hide = true, value_name = "RUN", conflicts_with = "run")]
-    pub out: Option<PathBuf>,
 }
 
-impl RunChoice {
-    /// Returns the choice of this run; without one, of the only run there is.
-    pub fn named_by(run: Option<PathBuf>) -> Self {
-        Self { run, out: None }
-    }
-
-    /// Returns the folder that is named. An old way to name it gets a hint.
-    pub fn named(&self) -> Option<&Path> {
-        if let Some(out) = &self.out {
-            let out = out.display();
-            print::note(format_args!(
-                "gyre: a run is now named without --out, as its last argument: {out}"
-            ));
-        }
-        self.run.as_deref().or(self.out.as_deref())
-    }
-}
-
-/// The arguments of `gyre ps`.
 #[derive(Debug, Args)]
 pub struct PsArguments {
     /// The run to list. Default: all runs of this user.
@@ -50,7 +27,6 @@ pub struct PsArguments {
     pub check: bool,
 }
 
-/// The arguments of `gyre logs`.
 #[derive(Debug, Args)]
 pub struct LogsArguments {
     /// The process, as masking. Default: all.
@@ -66,7 +42,6 @@ pub struct LogsArguments {
     pub lines: usize,
 }
 
-/// The arguments of `gyre restart`.
 #[derive(Debug, Args)]
 pub struct RestartArguments {
     /// The process, as masking.
@@ -76,7 +51,6 @@ pub struct RestartArguments {
     pub run: RunChoice,
 }
 
-/// The arguments of `gyre swap`.
 #[derive(Debug, Args)]
 pub struct SwapArguments {
     /// The process whose place is taken, as masking.
@@ -97,7 +71,6 @@ pub struct SwapArguments {
     pub cold: bool,
 }
 
-/// The arguments of `gyre top`.
 #[derive(Debug, Args)]
 pub struct TopArguments {
     /// The run.

@@ -26,9 +26,7 @@ use crate::operate::{arguments::RunChoice, choice::chosen_to_change};
 const DETACHED: &str = "GYRE_DETACHED";
 /// Where a run in the background prints, in the folder of the results.
 const LOG: &str = "log/gyre.txt";
-/// Time between two looks at a run that starts or ends.
 const PERIOD: Duration = Duration::from_millis(50);
-/// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER: Duration = Duration::from_secs(3);
 
 /// Leaves the session of the terminal if `gyre up` started this run: the run continues when the
@@ -76,7 +74,6 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Starts `gyre run` with the arguments of this process.
 fn start(output: &File) -> std::io::Result<Child> {
     let mut arguments: Vec<OsString> = env::args_os().skip(1).collect();
     if let Some(command) = arguments.iter_mut().find(|it| it.as_os_str() == "up") {
@@ -99,7 +96,6 @@ fn status_of(out: &Path, pid: u32) -> Option<Status> {
     (status.pid == pid && is_up).then_some(status)
 }
 
-/// Repeats the output of an ended run, and its exit code.
 fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<ExitCode, Failure> {
     let mut bytes = Vec::new();
     output.seek(SeekFrom::Start(begin))?;
@@ -116,7 +112,7 @@ fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<
 
 /// Ends a run as an interrupt does, and waits until its results are written.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
-    let run = chosen_to_change(choice, "end it")?;
+    let run = chosen_to_change(choice)?;
     let status = run.status()?;
     let signals = Signals::install()?;
     let before = version_of_results(&status.out);

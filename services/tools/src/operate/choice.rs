@@ -1,10 +1,6 @@
 //! The run that a command is for.
 
-use std::{
-    env,
-    io::{self, IsTerminal, Write as _},
-    path::{Path, PathBuf},
-};
+use std::{env, path::PathBuf};
 
 use gyre_stage::control::Control;
 use gyre_terminal::{Failure, print};
@@ -13,8 +9,8 @@ use crate::operate::arguments::RunChoice;
 
 impl RunChoice {
     pub fn folder(&self) -> Result<PathBuf, Failure> {
-        match self.named() {
-            Some(run) => Ok(run.to_owned()),
+        match &self.run {
+            Some(run) => Ok(run.clone()),
             None => Ok(chosen(self)?.out().to_owned()),
         }
     }
@@ -22,7 +18,7 @@ impl RunChoice {
 
 /// Returns the run that is meant: the one that is named, or the only one, which is named here.
 pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
-    if let Some(out) = choice.named() {
+    if let Some(out) = &choice.run {
         return Ok(Control::of(out)?);
     }
     let run = only_run()?;
@@ -31,18 +27,22 @@ pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
 }
 
 /// Returns the run that is meant by a command that changes it. Without a name that is one which was
-/// started from the current folder; for any other a person is asked, `what` being done to it.
-pub fn chosen_to_change(choice: &RunChoice, what: &str) -> Result<Control, Failure> {
-    if let Some(out) = choice.named() {
+/// started from the current folder.
+pub fn chosen_to_change(choice: &RunChoice) -> Result<Control, Failure> {
+    if let Some(out) = &choice.run {
         return Ok(Control::of(out)?);
     }
     let run = only_run()?;
     let started_in = run.status()?.started_in;
-    match env::current_dir().is_ok_and(|here| here == started_in) {
-        true => name(&run),
-        false => confirm(run.out(), &started_in, what)?,
+    if env::current_dir().is_ok_and(|here| here == started_in) {
+        name(&run);
+        return Ok(run);
     }
-    Ok(run)
+    let (out, started_in) = (run.out().display(), started_in.display());
+    Err(format!(
+        "the only run writes to {out} and was started from {started_in}, not from here: if it is meant, name it: {out}"
+    )
+    .into())
 }
 
 fn name(run: &Control) {
@@ -58,40 +58,4 @@ fn only_run() -> Result<Control, Failure> {
     }
     let none = "no run is running: `gyre up` or `gyre run` starts one";
     Ok(runs.pop().ok_or(none)?)
-}
-
-/// Asks on a terminal whether a run from elsewhere is meant.
-fn confirm(out: &Path, started_in: &Path, what: &str) -> Result<(), Failure> {
-    let (out, started_in) = (out.display(), started_in.display());
-    if !(io::stdin().is_terminal() && io::stderr().is_terminal()) {
-        return Err(format!(
-            "the only run writes to {out} and was started from {started_in}, not from here: if it is meant, name it: {out}"
-        )
-        .into());
-    }
-    write!(
-        io::stderr(),
-        "gyre: the only run writes to {out} and was started from {started_in}: {what}? [y/N] "
-    )?;
-    let mut answer = String::new();
-    io::stdin().read_line(&mut answer)?;
-    match agrees(&answer) {
-        true => Ok(()),
-        false => Err("nothing was done".into()),
-    }
-}
-
-fn agrees(answer: &str) -> bool {
-    matches!(answer.trim().to_lowercase().as_str(), "y" | "yes")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::agrees;
-
-    #[test]
-    fn nothing_but_a_yes_agrees() {
-        assert!(["y\n", "Y", " yes\n"].into_iter().all(agrees));
-        assert!(!["", "\n", "n", "no", "yesterday"].into_iter().any(agrees));
-    }
 }

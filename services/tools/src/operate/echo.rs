@@ -21,7 +21,6 @@ use gyre_terminal::Failure;
 
 use crate::operate::arguments::RunChoice;
 
-/// The arguments of `gyre echo`.
 #[derive(Debug, Args)]
 pub struct EchoArguments {
     /// The run and the topic, in any order. Default: the only run there is, and pose.
@@ -29,7 +28,6 @@ pub struct EchoArguments {
     pub words: Vec<PathBuf>,
 }
 
-/// Prints the messages of a topic of the run that writes to a folder.
 type Echo = fn(&Path) -> Result<(), Failure>;
 
 /// The topics of a run, in the order of the stream.
@@ -72,8 +70,8 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
             return Err(format!("{usage}: {names}").into());
         }
     };
-    let run = RunChoice::named_by(runs.first().copied().cloned());
-    let printed = echo(&run.folder()?);
+    let run = runs.first().copied().cloned();
+    let printed = echo(&RunChoice { run }.folder()?);
     match printed.map_err(|error| error.downcast::<io::Error>()) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         // Nobody reads it any more, as after `gyre echo OUT | head`.

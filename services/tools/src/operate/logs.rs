@@ -16,7 +16,6 @@ use serde_json::Value;
 
 use crate::operate::arguments::LogsArguments;
 
-/// Time between two looks at the files.
 const PERIOD: Duration = Duration::from_millis(200);
 
 /// Prints the newest lines of a run's logs, even after its end, and continues with new lines if

@@ -14,10 +14,9 @@ use crate::operate::arguments::PsArguments;
 
 const NO_RUN: &str = "no run is running";
 
-/// Lists the runs of this user.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
-    let runs = match arguments.run.named() {
+    let runs = match &arguments.run.run {
         Some(out) => vec![Control::of(out)?],
         None => Control::of_all(),
     };
@@ -68,7 +67,6 @@ fn listed(UsedRun { status, usage }: &UsedRun) -> String {
     table
 }
 
-/// Returns the faults of a run, a sentence each.
 fn ills(status: &Status) -> Vec<String> {
     let out = status.out.display();
     let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
@@ -89,7 +87,6 @@ fn ills(status: &Status) -> Vec<String> {
     all.chain(ill).chain(deaf).collect()
 }
 
-/// Returns the state of a run in a line.
 pub fn summary(status: &Status) -> String {
     let mode = if status.live { "live" } else { "lossless" };
     let (phase, uptime) = (status.phase.name(), duration(status.uptime_s));
@@ -105,7 +102,6 @@ pub fn summary(status: &Status) -> String {
     )
 }
 
-/// Returns the unusual facts about a process.
 fn remarks(process: &ProcessStatus) -> String {
     let mut remarks = String::new();
     if let Some(death) = &process.last_death {
@@ -123,7 +119,6 @@ fn remarks(process: &ProcessStatus) -> String {
     remarks
 }
 
-/// Returns the missing deliveries of a radar.
 pub fn lacks(received: &Received) -> String {
     let counts = [
         (received.scans_left_out, "scans left out"),
@@ -142,7 +137,6 @@ pub fn lacks(received: &Received) -> String {
     lacks
 }
 
-/// Returns a time in two or three digits.
 pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 0.9995 => format!("{:.0} ms", s * 1e3),

@@ -12,16 +12,13 @@ use crate::operate::{
     choice::chosen_to_change,
 };
 
-/// Starts a process of a running run again.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
-    let what = format!("restart its {}", arguments.process);
-    let run = chosen_to_change(&arguments.run, &what)?;
+    let run = chosen_to_change(&arguments.run)?;
     run.restart(&arguments.process)?;
     print::line(format_args!("{} is started again", arguments.process))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER_S: f64 = 5.0;
 
 /// Explains the wait of a swap, its duration, and the remedy.
@@ -48,8 +45,7 @@ const UNTRIED: u8 = 2;
 /// Replaces the program of a stage. If the new program fails to take over, the previous program
 /// continues.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
-    let what = format!("swap its {}", arguments.process);
-    let run = chosen_to_change(&arguments.run, &what)?;
+    let run = chosen_to_change(&arguments.run)?;
     let process = &arguments.process;
     let mut command = arguments.command.as_deref().map(words).transpose()?;
     // Found as in this terminal: the supervisor may have been started with another PATH.

@@ -25,7 +25,6 @@ use snapshot::{Snapshot, Snapshots};
 /// Time between two snapshots at the queue of poses, which has room for nine.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// Shows a run until it ends, or until `q` is pressed.
 pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     let every = Duration::try_from_secs_f64(arguments.every)
         .ok()

@@ -1,9 +1,6 @@
 //! The arguments of `gyre radar-server`.
 
-use std::{
-    net::{Ipv4Addr, SocketAddrV4},
-    path::PathBuf,
-};
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use clap::Args;
 use gyre_run::Rate;
@@ -11,21 +8,11 @@ use gyre_terminal::inputs::Inputs;
 
 use crate::radar_server::server::Faults;
 
-/// The arguments of `gyre radar-server`.
 #[derive(Debug, Args)]
 pub struct RadarServerArguments {
-    /// The scans, or a file that --capture has written; of the configuration the sections
-    /// `[simulation]`, `[source]` and `[dataset]`.
+    /// The scans; of the configuration the sections `[simulation]`, `[source]` and `[dataset]`.
     #[command(flatten)]
     pub inputs: Inputs,
-    /// Record the data of the radar at --radar, byte for byte, into this new file, instead of
-    /// playing; until the radar ends, or Ctrl-C.
-    #[arg(long, value_name = "FILE", requires = "radar", conflicts_with = "what")]
-    pub capture: Option<PathBuf>,
-    /// The radar to capture: HOST, HOST:PORT or udp://GROUP:PORT (--interface: this machine's
-    /// address on its network).
-    #[arg(long, value_name = "ADDRESS", requires = "capture")]
-    pub radar: Option<String>,
     /// The address to serve at. At another than the loopback's the whole network can read the
     /// scans: the protocol has no token.
     #[arg(long, default_value = "127.0.0.1:6317", value_name = "ADDRESS")]

@@ -14,15 +14,14 @@ use std::{
 use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, scan::flag};
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 
 use crate::radar_server::RadarServerArguments;
 
-pub use clients::Clients;
 pub use faults::Faults;
+
 use faults::{is_nth, uniform};
-pub(crate) use output::sleep_until;
-pub use output::{Group, Output};
+use output::{Output, sleep_until};
 
 /// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
@@ -32,7 +31,6 @@ const MAX_WAIT: Duration = Duration::from_secs(2);
 const GARBLED: usize = 100;
 const GARBAGE: &[u8] = b"not a message of a radar";
 
-/// Returns the sentence about a network that cannot be used.
 pub(crate) fn unserved(error: io::Error) -> String {
     format!("cannot serve as a radar: {error}")
 }
@@ -40,17 +38,15 @@ pub(crate) fn unserved(error: io::Error) -> String {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     pub scans: u64,
-    /// Azimuths that were left out.
     pub lost_azimuths: u64,
-    /// Datagrams that were left out.
     pub lost_datagrams: u64,
     pub resets: u64,
     pub stalls: u64,
 }
 
-/// Plays a recording until it has ended or `stop` returns true.
+/// Plays these scans, `what`, from the announcement of their address on.
 pub fn serve(
-    mut output: Output,
+    what: &str,
     dataset: &mut dyn Dataset,
     scans: Range<usize>,
     arguments: &RadarServerArguments,
@@ -60,7 +56,13 @@ pub fn serve(
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    output.begin(&radar)?;
+    let (output, address, is_public) = Output::open(arguments, &radar)?;
+    print::note(format_args!("gyre: playing {what} as a radar at {address}"));
+    if is_public {
+        print::note(
+            "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
+        );
+    }
     let mut player = Player {
         output,
         radar,
@@ -104,7 +106,6 @@ pub fn serve(
     }
 }
 
-/// Returns the radar's description of itself.
 fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, Failure> {
     let geometry = scan.geometry;
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);

@@ -28,7 +28,6 @@ const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
 const BAR: f64 = 160.0;
 
-/// Returns the page about these runs and trajectories.
 pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     let names: Vec<&str> = subjects.iter().map(|it| it.name.as_str()).collect();
     let title = names.join(" · ");
@@ -102,7 +101,6 @@ fn figure(figure: &Figure, subjects: &[Subject]) -> Option<String> {
     ))
 }
 
-/// Returns the names of the subjects as a row, where there are several.
 fn head<'a>(subjects: impl ExactSizeIterator<Item = &'a Subject>) -> String {
     if subjects.len() < 2 {
         return String::new();
@@ -126,7 +124,6 @@ fn title_of(subject: &Subject, subjects: &[Subject]) -> String {
     }
 }
 
-/// Draws all trajectories over the ground truth.
 fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     let truth = subjects.iter().find_map(|it| it.evaluation.as_ref());
     let truth = truth.map(|evaluation| evaluation.matched.truth());
@@ -136,7 +133,6 @@ fn trajectories(subjects: &[Subject]) -> Result<String, Failure> {
     Ok(svg(&drawn, "Trajectories seen from above"))
 }
 
-/// Returns a section with a picture of each run that has it.
 fn pictures(subjects: &[Subject], [title, name, caption]: [&str; 3]) -> String {
     let pictures = runs(subjects).filter_map(|(subject, run)| {
         let bytes = run.picture(name)?;
@@ -236,7 +232,6 @@ fn differences(runs: &[(&Subject, &Run)]) -> String {
     )
 }
 
-/// Returns the values of a configuration by their keys `section.key`.
 fn keys(configuration: &str) -> BTreeMap<String, String> {
     let table: Table = configuration.parse().unwrap_or_default();
     let mut found = BTreeMap::new();

@@ -31,7 +31,6 @@ pub struct Run {
 }
 
 impl Subject {
-    /// Reads a run or a trajectory, and evaluates it against a ground truth.
     pub fn read(path: &Path, truth: Option<&Trajectory>) -> Result<Self, Failure> {
         let run = path.is_dir().then(|| Run::read(path)).transpose()?;
         let file = match &run {
@@ -96,12 +95,10 @@ impl Run {
         })
     }
 
-    /// Returns a number of the summary by its path, as in `/motions/weak`.
     pub fn number(&self, path: &str) -> Option<f64> {
         self.summary.pointer(path)?.as_f64()
     }
 
-    /// Returns the content of a picture among the results, `None` without one.
     pub fn picture(&self, name: &str) -> Option<Vec<u8>> {
         fs::read(self.folder.join(name)).ok()
     }

@@ -34,7 +34,6 @@ const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
-/// The scenarios to carry out, and their options.
 #[derive(Clone, Debug)]
 pub struct Options {
     pub scenarios: Vec<Scenario>,
@@ -223,7 +222,6 @@ impl Campaign<'_> {
         Ok(self.found(&found, f64::from, steps, ("radars", self.limits.radars)))
     }
 
-    /// Returns the outcome of a search, whose levels stand for these loads.
     fn found(
         &self,
         found: &Found,
@@ -243,7 +241,6 @@ impl Campaign<'_> {
         .judged()
     }
 
-    /// Returns the reason why so many runs do not fit into shared memory.
     fn lacks_memory(&self, runs: u32) -> Option<String> {
         let needed = self.tested.shared_bytes * u64::from(runs);
         let free = free_shared_memory().ok().flatten()?;
@@ -253,7 +250,6 @@ impl Campaign<'_> {
         })
     }
 
-    /// Measures so many pipelines at once at a rate: a step of this level.
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, Failure> {
         let duration = step_duration(self.options.duration, rate_hz);
         let setups = (0..pipelines).map(|number| Setup {
@@ -313,30 +309,25 @@ fn problem(measured: &Measured) -> Option<String> {
 
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
     let latency = &figures.latency.sensor_to_pose;
-    let (drops, degraded) = (figures.drops_percent(), figures.motions.degraded_percent());
+    let degraded = figures.motions.degraded_percent();
     let (cpu, memory) = (Some(figures.cpu_percent()), Some(figures.memory_mb()));
-    let degraded_limit = limits.degraded_percent.filter(|_| degraded.is_some());
-    let recovery_limit = limits.recovery_ms.filter(|_| figures.had_faults());
-    let of_scans = [
-        ("p50_ms", latency.judged(latency.p50_ms), limits.p50_ms),
-        ("p99_ms", latency.judged(latency.p99_ms), limits.p99_ms),
-        ("max_ms", latency.max_ms, limits.max_ms),
-        ("drops_percent", drops, limits.drops_percent),
-    ];
-    let of_processes = [
-        ("cpu_percent", cpu, limits.cpu_percent),
-        ("memory_mb", memory, limits.memory_mb),
-    ];
-    let degraded = ("degraded_percent", degraded, degraded_limit);
-    let recovery = ("recovery_ms", figures.longest_recovery_ms(), recovery_limit);
+    let (drops, recovery) = (figures.drops_percent(), figures.longest_recovery_ms());
     // Without scans only the cost of the processes can be judged.
     let has_scans = figures.latency.counts.due > 0;
-    let of_scans = of_scans.into_iter().filter(|_| has_scans);
-    let degraded = Some(degraded).filter(|_| has_scans);
-    let all = of_scans
-        .chain(of_processes)
-        .chain(degraded)
-        .chain([recovery]);
-    all.filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
+    let has_motions = has_scans && degraded.is_some();
+    #[rustfmt::skip]
+    let all = [
+        (has_scans, "p50_ms", latency.judged(latency.p50_ms), limits.p50_ms),
+        (has_scans, "p99_ms", latency.judged(latency.p99_ms), limits.p99_ms),
+        (has_scans, "max_ms", latency.max_ms, limits.max_ms),
+        (has_scans, "drops_percent", drops, limits.drops_percent),
+        (true, "cpu_percent", cpu, limits.cpu_percent),
+        (true, "memory_mb", memory, limits.memory_mb),
+        (has_motions, "degraded_percent", degraded, limits.degraded_percent),
+        (figures.had_faults(), "recovery_ms", recovery, limits.recovery_ms),
+    ];
+    let judged = all.into_iter().filter(|it| it.0);
+    judged
+        .filter_map(|(_, key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
         .collect()
 }

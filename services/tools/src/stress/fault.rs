@@ -94,8 +94,7 @@ impl Faults {
         }
     }
 
-    /// Begins and ends faults that are due.
-    pub fn act(&mut self, processes: &mut Sampler) {
+    pub fn act(&mut self, processes: &Sampler) {
         let now_ns = clock::now_ns();
         let is_due = |(_, _, until_ns): &mut (Pid, (usize, StageId), i64)| now_ns >= *until_ns;
         if let Some((group, (fault, stage), _)) = self.stopped.take_if(is_due) {
@@ -178,7 +177,6 @@ impl Faults {
         });
     }
 
-    /// Returns whether a fault has no pose after it.
     pub fn are_open(&self) -> bool {
         self.stopped.is_some() || !self.open.is_empty()
     }

@@ -7,7 +7,7 @@ use std::{
     io::{BufRead, BufReader},
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
-    process::{Child, ChildStdout, Command, Stdio},
+    process::{Child, Command, Stdio},
 };
 
 use gyre_stage::run::end_with;
@@ -15,7 +15,7 @@ use gyre_terminal::Failure;
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 
-use crate::stress::load::{self, Taken};
+use crate::stress::load;
 
 /// The command of `gyre` that calls [`help`].
 pub const COMMAND: &str = "stress-helper";
@@ -26,7 +26,6 @@ pub const COMMAND: &str = "stress-helper";
 pub enum Work {
     /// Becomes `gyre` with these arguments, and ends its stages first.
     Run(Vec<String>),
-    /// Computes without end.
     Spin,
     /// Takes this share of the available memory, and churns it.
     Memory(f64),
@@ -34,7 +33,6 @@ pub enum Work {
     Observe(PathBuf),
 }
 
-/// Does the work of a helper: its arguments are the process that has started it, and the work.
 pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     let usage = || format!("`gyre {COMMAND}` is what `gyre stress` starts");
     let [parent, work] = arguments else {
@@ -61,7 +59,6 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// Starts a helper whose output goes to `output` and `errors`.
 pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
     let spawned = Command::new(program)
         .arg(COMMAND)
@@ -79,23 +76,25 @@ pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Resul
 pub struct Helper {
     work: Work,
     process: Child,
-    output: Option<BufReader<ChildStdout>>,
 }
 
 impl Helper {
     /// Starts a helper, and waits until it works.
     pub fn start(program: &Path, work: Work) -> Result<Self, Failure> {
         let mut process = spawn(program, &work, Stdio::piped(), Stdio::inherit())?;
+        let mut line = String::new();
         let output = process.stdout.take().map(BufReader::new);
-        let mut helper = Self {
-            output,
-            work,
-            process,
-        };
-        let line = helper.read_line()?;
-        match line == load::READY {
-            true => Ok(helper),
-            false => Err(helper.failed(&format!("says `{line}`, not `{}`", load::READY))),
+        let read = output.map(|mut output| output.read_line(&mut line));
+        let helper = Self { work, process };
+        match read {
+            Some(Ok(_)) if line.trim_end() == load::READY => Ok(helper),
+            _ => {
+                let work = &helper.work;
+                Err(
+                    format!("the helper process `{work:?}` has ended; what it printed says why")
+                        .into(),
+                )
+            }
         }
     }
 
@@ -103,29 +102,6 @@ impl Helper {
     pub fn has_died(&mut self) -> Option<String> {
         let status = self.process.try_wait().ok().flatten()?;
         Some(format!("`{:?}` has ended: {status}", self.work))
-    }
-
-    fn read_line(&mut self) -> Result<String, Failure> {
-        let mut line = String::new();
-        let output = self.output.as_mut();
-        match output.map(|output| output.read_line(&mut line)) {
-            Some(Ok(1..)) => Ok(line.trim_end().to_owned()),
-            _ => Err(self.failed("has ended; what it printed says why")),
-        }
-    }
-
-    /// Reads the memory that it has taken; `None` if its work is another one.
-    pub fn taken(&mut self) -> Result<Option<Taken>, Failure> {
-        if !matches!(self.work, Work::Memory(_)) {
-            return Ok(None);
-        }
-        let line = self.read_line()?;
-        let taken = serde_json::from_str(&line);
-        taken.map_err(|error| self.failed(&format!("says `{line}`: {error}")))
-    }
-
-    fn failed(&self, reason: &str) -> Failure {
-        format!("the helper process `{:?}` {reason}", self.work).into()
     }
 }
 

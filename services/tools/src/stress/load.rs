@@ -17,13 +17,11 @@ use gyre_stage::{
 };
 use gyre_supervise::memory::Room;
 use gyre_terminal::Failure;
-use serde::{Deserialize, Serialize};
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";
 /// Memory that is always left, whatever the share: room for other programs that start meanwhile.
 const LEFT: u64 = 1 << 30;
-/// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
 /// The time for allocating memory before the measurement. On a large machine all of it would take
@@ -33,26 +31,6 @@ const TAKING: Duration = Duration::from_secs(20);
 const PAUSE: Duration = Duration::from_millis(20);
 const CACHE_LINE: usize = 64;
 
-/// Memory that the helper `memory` has taken when the measurement begins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Taken {
-    pub taken_mb: f64,
-    pub available_mb: f64,
-}
-
-impl Taken {
-    /// Returns the reason why it is no load.
-    pub(crate) fn omitted(&self) -> Option<String> {
-        let (available_mb, left_mb) = (self.available_mb, LEFT as f64 * 1e-6);
-        (self.taken_mb == 0.0).then(|| {
-            format!(
-                "no memory was taken: {available_mb:.0} MB are available, and {left_mb:.0} MB are always left"
-            )
-        })
-    }
-}
-
-/// Computes without end.
 pub(super) fn spin() -> ! {
     say(READY);
     let mut number = 1_u64;
@@ -75,12 +53,11 @@ pub(super) fn churn(share: f64) -> Result<(), Failure> {
     while ((pieces.len() * PIECE) as u64) < most && has_room() && began.elapsed() < TAKING {
         pieces.push(piece());
     }
+    if pieces.is_empty() {
+        let (available_mb, left_mb) = (available as f64 * 1e-6, LEFT as f64 * 1e-6);
+        return Err(format!("no memory was taken: {available_mb:.0} MB are available, and {left_mb:.0} MB are always left").into());
+    }
     say(READY);
-    let taken = Taken {
-        taken_mb: (pieces.len() * PIECE) as f64 * 1e-6,
-        available_mb: available as f64 * 1e-6,
-    };
-    say(&serde_json::to_string(&taken)?);
     loop {
         for taken in &mut pieces {
             *taken = Vec::new();
@@ -100,7 +77,6 @@ pub(super) fn churn(share: f64) -> Result<(), Failure> {
     }
 }
 
-/// A piece of memory, each page of it written.
 fn piece() -> Vec<u8> {
     let mut piece = vec![0; PIECE];
     piece.iter_mut().step_by(PAGE).for_each(|byte| *byte = 1);
@@ -161,20 +137,4 @@ fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageErro
 fn say(line: &str) {
     let mut output = std::io::stdout();
     let _ = writeln!(output, "{line}").and_then(|()| output.flush());
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_load_that_has_taken_nothing_is_none() {
-        let taken = |taken_mb| Taken {
-            taken_mb,
-            available_mb: 900.0,
-        };
-        assert_eq!(taken(32.0).omitted(), None);
-        let reason = taken(0.0).omitted().unwrap_or_default();
-        assert!(reason.contains("900 MB are available"), "{reason}");
-    }
 }

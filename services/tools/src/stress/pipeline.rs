@@ -35,7 +35,6 @@ const GRACE: Duration = Duration::from_secs(10);
 const TICK: Duration = Duration::from_millis(20);
 const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 
-/// A run with its load and faults.
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub scenario: Scenario,
@@ -53,7 +52,6 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns a run without load and faults.
     pub fn undisturbed(scenario: Scenario, rate_hz: f64, duration: Duration) -> Self {
         Self {
             scenario,
@@ -91,12 +89,9 @@ pub fn measure(
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let (mut loads, mut taken) = (Vec::new(), None);
-    for work in &setup.loads {
-        let mut helper = Helper::start(&tested.program, work.clone())?;
-        taken = helper.taken()?.or(taken);
-        loads.push(helper);
-    }
+    let loads = setup.loads.iter();
+    let loads = loads.map(|work| Helper::start(&tested.program, work.clone()));
+    let mut loads: Vec<Helper> = loads.collect::<Result<_, _>>()?;
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;
     let mut session = Session::begin((tested, setup), run.pid(), &run.out, &newest);
@@ -115,20 +110,13 @@ pub fn measure(
     drop(poses);
     drop(observed);
     let died = has_ended.then(|| run.last_words());
-    let summary = run.end();
-    let stages = summary["stages"].as_object().into_iter().flatten();
-    // Wake-ups that the transport lost and that were caught late.
-    let late = stages.filter_map(|(stage, counters)| {
-        let late = counters["wakes_caught_late"].as_u64()?;
-        (late > 0).then(|| (stage.clone(), late))
-    });
-    let wakes_caught_late = late.collect();
+    // It writes its results, with the figures of its stages.
+    drop(run);
     let ended_load =
         ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
         omitted: omitted
             .or(unplayed)
-            .or_else(|| taken?.omitted())
             .or(ended_load)
             .or_else(|| latency.counts.omitted()),
         figures: Figures {
@@ -136,17 +124,13 @@ pub fn measure(
             faults,
             witness_faults,
             motions,
-            restarts: serde_json::from_value(summary["restarts"].clone()).unwrap_or_default(),
-            wakes_caught_late,
             processes,
             shared_bytes,
-            taken,
         },
         died,
     })
 }
 
-/// Waits for the other pipelines. The poses that come meanwhile are of the warm-up.
 fn await_others(
     held: &Weak<()>,
     poses: &mut Observer<'_, Pose>,
@@ -191,7 +175,6 @@ struct Session {
 }
 
 impl Session {
-    /// Begins now; `newest` is the last pose of the warm-up.
     fn begin(
         (tested, setup): (&TestedPipeline, &Setup),
         supervisor: u32,
@@ -252,7 +235,7 @@ impl Session {
 
     fn poll(&mut self) {
         if let Some(faults) = &mut self.faults {
-            faults.act(&mut self.processes);
+            faults.act(&self.processes);
         }
         if self.sampled.elapsed() >= SAMPLE_EVERY && clock::now_ns() < self.ends_ns {
             self.processes.sample();

@@ -9,7 +9,7 @@ mod distribution;
 use std::ops::Range;
 
 use gyre_messages::{Item, PoseHeader, StageId, WitnessCounts, flag};
-use gyre_run::latency::{Durations, LatencyMeter};
+use gyre_run::latency::Durations;
 use serde::Serialize;
 
 pub use distribution::Distribution;
@@ -17,7 +17,6 @@ pub use distribution::Distribution;
 /// The largest number of dropped scans between two poses that are recorded one by one.
 const MAX_GAP: u64 = 1 << 20;
 
-/// Counts of scans within the time that is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     pub due: u64,
@@ -41,30 +40,16 @@ impl Counts {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Hop {
-    pub stage: &'static str,
-    /// From the publication by the stage before to the reception; `None` of the first stage.
-    pub transport: Option<Distribution>,
-    /// From the reception to the start of the work.
-    pub wait: Distribution,
-    pub work: Distribution,
-}
-
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLatency {
     pub counts: Counts,
     /// From the time when a scan was due to its pose; a dropped scan counts until the pose that
     /// replaced it.
     pub sensor_to_pose: Distribution,
-    /// The same of the scans that have a pose alone.
-    pub posed: Distribution,
     /// The figure of a closed loop: from the publication of a scan to its pose.
     pub closed_loop: Distribution,
-    pub hops: Vec<Hop>,
 }
 
-/// Records poses whose scans were due within a time.
 #[derive(Debug, Default)]
 pub struct Recorder {
     /// `CLOCK_MONOTONIC`, ns.
@@ -73,9 +58,7 @@ pub struct Recorder {
     burst: u64,
     before: Option<Item>,
     counts: Counts,
-    meter: LatencyMeter,
     all: Durations,
-    posed: Durations,
     closed_loop: Durations,
     /// The basis of the motions in the first turn of the recording: where the recording starts
     /// again, the vehicle jumps.
@@ -112,11 +95,9 @@ impl Recorder {
         }
         self.counts.posed += 1;
         self.sample(item.due_ns, posed_ns);
-        self.meter.add(pose);
         if !item.is(flag::BREAK) && item.scan < self.turn_end {
             self.motions.add(&pose.motion.refinement);
         }
-        self.posed.add(posed_ns - item.due_ns);
         let published_ns = item.hops[StageId::RadarReplay as usize].published_ns;
         self.closed_loop.add(posed_ns - published_ns);
     }
@@ -175,18 +156,10 @@ impl Recorder {
             }
             due_ns += period_ns;
         }
-        let hop = |(stage, meter): (StageId, &gyre_run::latency::HopMeter)| Hop {
-            stage: stage.name(),
-            transport: (meter.transport.count() > 0).then(|| Distribution::of(&meter.transport)),
-            wait: Distribution::of(&meter.wait),
-            work: Distribution::of(&meter.work),
-        };
         RunLatency {
             counts: self.counts,
             sensor_to_pose: Distribution::of(&self.all),
-            posed: Distribution::of(&self.posed),
             closed_loop: Distribution::of(&self.closed_loop),
-            hops: self.meter.stages().map(hop).collect(),
         }
     }
 }
@@ -246,8 +219,6 @@ mod tests {
         // 10, 10, 260, 510 and 760 ms.
         assert!(near(recorded.sensor_to_pose.p50_ms, 260.0));
         assert!(near(recorded.sensor_to_pose.max_ms, 760.0));
-        assert!(near(recorded.posed.max_ms, 10.0));
-        assert_eq!(recorded.posed.samples, 2);
     }
 
     #[test]

@@ -13,27 +13,22 @@ pub use outcome::{Check, ScenarioOutcome, Verdict};
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is
 /// added does not.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
-/// The origin of a report: computer, program, recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
     /// The date, UTC.
     pub date: String,
     /// The processor and the number of its cores.
     pub machine: String,
-    pub kernel: String,
     pub gyre: String,
     /// BLAKE3 digest of the program.
     pub build: String,
     /// The file of the configuration; the resolved one lies beside the report.
     pub configuration: String,
     pub source: String,
-    /// Load of the machine before the first scenario, in processes: the mean of a minute.
-    pub load_before: Option<f64>,
 }
 
-/// All outcomes, in the order of their execution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     version: u32,

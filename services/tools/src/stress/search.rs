@@ -5,10 +5,7 @@ use std::time::Duration;
 use gyre_terminal::Failure;
 use serde::Serialize;
 
-use crate::stress::{
-    record::Distribution,
-    report::{Check, Figures},
-};
+use crate::stress::report::{Check, Figures};
 
 /// Share of a scenario's time that a step of a search takes.
 const STEP: u32 = 6;
@@ -91,7 +88,6 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// A step of a search for the largest load.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
     /// Scans a second, or radars.
@@ -102,12 +98,8 @@ pub struct Step {
     pub due: u64,
     /// Scans without a pose, in all pipelines.
     pub dropped: u64,
-    /// The largest median of its pipelines, ms.
-    pub p50_ms: Option<f64>,
     /// The largest 99th percentile of its pipelines, ms; of fewer than a hundred scans the maximum.
     pub p99_ms: Option<f64>,
-    /// Processor time of all pipelines, % of one processor.
-    pub cpu_percent: f64,
     pub reason: Option<String>,
 }
 
@@ -119,21 +111,15 @@ impl Step {
             passed: false,
             due: 0,
             dropped: 0,
-            p50_ms: None,
             p99_ms: None,
-            cpu_percent: 0.0,
             reason: Some(reason),
         }
     }
 
     pub fn of(level: f64, pipelines: &[(Vec<Check>, Option<String>, Figures)]) -> Self {
         let figures = || pipelines.iter().map(|(.., figures)| figures);
-        let largest = |of: fn(&Distribution) -> Option<f64>| {
-            let latencies = figures().map(|it| &it.latency.sensor_to_pose);
-            latencies
-                .filter_map(|it| it.judged(of(it)))
-                .reduce(f64::max)
-        };
+        let latencies = figures().map(|it| &it.latency.sensor_to_pose);
+        let p99_ms = latencies.filter_map(|it| it.judged(it.p99_ms));
         let reason = pipelines.iter().find_map(|(checks, problem, _)| {
             let failed = checks.iter().find(|check| !check.passed);
             problem.clone().or_else(|| failed.map(Check::sentence))
@@ -143,9 +129,7 @@ impl Step {
             passed: reason.is_none(),
             due: figures().map(|it| it.latency.counts.due).sum(),
             dropped: figures().map(|it| it.latency.counts.dropped).sum(),
-            p50_ms: largest(|latency| latency.p50_ms),
-            p99_ms: largest(|latency| latency.p99_ms),
-            cpu_percent: figures().map(Figures::cpu_percent).sum(),
+            p99_ms: p99_ms.reduce(f64::max),
             reason,
         }
     }

@@ -8,7 +8,6 @@ use crate::stress::{Others, TestedPipeline};
 
 /// The begin of the first fault, s after the stamp of the first scan: twice the warm-up.
 const FROM_S: f64 = 4.0;
-/// Duration of a fault of gyro and wheels, s.
 const FOR_S: f64 = 3.0;
 const BLIND_S: [f64; 3] = [2.0, 5.0, 10.0];
 /// The time after a fault for the recovery of the run, s.
@@ -97,15 +96,8 @@ impl WitnessFault {
         }
     }
 
-    /// Returns the reason why the run has not got over it.
     pub fn problem(&self) -> Option<String> {
-        let (for_s, motions) = (self.for_s, self.motions);
-        let name = match self.kind {
-            PlayedFaultKind::GyroOut => "gyro out",
-            PlayedFaultKind::WheelsSlip => "wheels slip",
-            PlayedFaultKind::ClockJump => "clock jumps",
-            PlayedFaultKind::RadarBlind => "radar blind",
-        };
+        let (name, for_s, motions) = (self.kind.name(), self.for_s, self.motions);
         match self.recovery_ms {
             _ if self.noticed == 0 => Some(format!(
                 "nothing has noticed the fault ({name}, {for_s} s) in {motions} motions"
@@ -118,7 +110,6 @@ impl WitnessFault {
     }
 }
 
-/// The clock of the played data relative to the clock of this computer.
 #[derive(Clone, Copy, Debug)]
 pub struct PlayedClock {
     /// The stamp of the first scan, ns since 1970.
@@ -132,7 +123,6 @@ pub struct PlayedClock {
 }
 
 impl PlayedClock {
-    /// Returns the time of a scan, s after the first one.
     fn time_s(&self, pose: &PoseHeader) -> f64 {
         (pose.item.stamp_ns - self.first_ns) as f64 * 1e-9
     }
@@ -145,7 +135,6 @@ impl PlayedClock {
     }
 }
 
-/// The faults of a run, as its poses report them.
 #[derive(Debug)]
 pub struct WitnessFaults {
     faults: Vec<PlayedFault>,
@@ -160,7 +149,6 @@ pub struct WitnessFaults {
 }
 
 impl WitnessFaults {
-    /// Looks for these faults from `began_ns` on.
     pub fn new(
         faults: Vec<PlayedFault>,
         others: Others,
@@ -216,7 +204,6 @@ impl WitnessFaults {
         }
     }
 
-    /// Returns whether a fault is still to come, or the recovery from it.
     pub fn are_open(&self) -> bool {
         self.found.iter().any(|fault| fault.recovery_ms.is_none())
     }

@@ -54,12 +54,12 @@ pub struct LatencyMeter {
 }
 
 #[derive(Debug, Default)]
-pub struct HopMeter {
+struct HopMeter {
     /// From the publication by the stage before to the reception; empty of the first stage.
-    pub transport: Durations,
+    transport: Durations,
     /// From the reception to the start of the work.
-    pub wait: Durations,
-    pub work: Durations,
+    wait: Durations,
+    work: Durations,
     busy_ns: i64,
 }
 
@@ -83,12 +83,6 @@ impl LatencyMeter {
         self.overlap.add(hops);
     }
 
-    /// Returns the durations of each stage that the run has, in the order of the stream.
-    pub fn stages(&self) -> impl Iterator<Item = (StageId, &HopMeter)> {
-        let stages = StageId::ALL.into_iter().zip(&self.stages);
-        stages.filter(|(_, meter)| meter.work.count() > 0)
-    }
-
     pub fn latency(self) -> Latency {
         let span_ns = self.span.map_or(0, |(first, last)| last - first).max(1) as f64;
         let hop = |meter: &HopMeter| HopLatency {
@@ -97,8 +91,9 @@ impl LatencyMeter {
             work: meter.work.percentiles(),
             busy: meter.busy_ns as f64 / span_ns,
         };
-        let stages: BTreeMap<_, _> = self
-            .stages()
+        let stages = StageId::ALL.into_iter().zip(&self.stages);
+        let stages: BTreeMap<_, _> = stages
+            .filter(|(_, meter)| meter.work.count() > 0)
             .map(|(stage, meter)| (stage.name(), hop(meter)))
             .collect();
         let busiest = stages.iter().max_by(|a, b| a.1.busy.total_cmp(&b.1.busy));

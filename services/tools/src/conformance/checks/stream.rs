@@ -15,7 +15,6 @@ use crate::conformance::{
 };
 
 impl Examination<'_> {
-    /// Returns whether the program has worked on items, so that more can be tested.
     pub(super) fn stream(&mut self) -> Result<bool, Failure> {
         let mut session = Session::open(self.context, "stream", &mut self.findings)?;
         let before = session.harness.rig.services();
@@ -74,7 +73,6 @@ impl Examination<'_> {
 }
 
 impl Session<'_> {
-    /// Starts the program, and requires that it opens its topic.
     pub(super) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
         let waited = self.start(&self.test.candidate.command)?;
@@ -174,7 +172,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Sends SIGTERM, and requires the exit code 0.
     pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
         let limit = self.demands().stop_timeout;
         let breach = match self.stop()? {

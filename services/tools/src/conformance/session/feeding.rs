@@ -20,7 +20,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Sends the inputs that are admitted now.
     pub(crate) fn admit(&mut self) -> Result<(), StageError> {
         let last = self.reference.end().min(self.until.saturating_sub(1));
         while self.next <= last && self.is_admitted(self.next) {
@@ -37,7 +36,6 @@ impl Session<'_> {
         }
     }
 
-    /// Sends an item on all topics that lead forward.
     pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), StageError> {
         if self.harness.topics.copied().is_some() {
             self.sent_ns.entry(seq).or_insert_with(clock::now_ns);
@@ -47,7 +45,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Sends the messages of these topics about an item.
     pub(crate) fn feed(&self, topics: &[&'static str], seq: u64) -> Result<(), StageError> {
         for topic in topics {
             if let Some(message) = self.reference.get(topic, seq) {
@@ -69,7 +66,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Publishes the last poses as the sink does when it starts.
     fn republish_poses(&mut self, newest: u64) -> Result<(), StageError> {
         let history = Pose::sizes(&self.harness.rig.manifest().window).history as u64;
         for seq in (newest + 1).saturating_sub(history)..=newest {

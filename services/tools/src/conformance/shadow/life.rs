@@ -32,7 +32,6 @@ pub(crate) struct ShadowProgram {
     pub output: Option<PathBuf>,
 }
 
-/// A process in a run of its own.
 pub(crate) struct Life<'a> {
     pub harness: Harness<'a>,
     pub began: Instant,
@@ -75,7 +74,6 @@ impl<'a> Life<'a> {
         received.take(AT_ONCE).collect()
     }
 
-    /// Asks it to end, and kills it if it does not.
     pub(crate) fn end(&mut self) -> Result<(), StageError> {
         self.harness.terminate();
         let since = Instant::now();

@@ -15,7 +15,6 @@ use crate::conformance::topics::StageTopics;
 /// mode most scans never become an item.
 const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 
-/// An item of the stage, with all messages that it is about.
 #[derive(Clone, Debug)]
 pub(crate) struct Observed {
     /// The inputs that lead down the stream, by topic.
@@ -40,7 +39,6 @@ impl Observed {
         self.output.item().seq
     }
 
-    /// Returns whether the chain of motions starts here.
     pub(crate) fn breaks(&self) -> bool {
         self.output.item().is(flag::BREAK)
     }
@@ -51,7 +49,6 @@ impl Observed {
     }
 }
 
-/// The observers of a stage's topics, and the items that their messages make.
 pub(crate) struct Observation<'run> {
     run: &'run ObservedRun,
     /// The inputs, the output, then the feedback.
@@ -69,7 +66,6 @@ pub(crate) struct Observation<'run> {
     last: Option<u64>,
     /// Items of the stage that were not seen whole.
     pub missed: u64,
-    /// The number of places with missing items.
     pub gaps: u64,
 }
 
@@ -126,7 +122,6 @@ impl<'run> Observation<'run> {
         self.observers.iter().map(|it| it.listener())
     }
 
-    /// Returns whether the stream or the run has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.run.has_ended() || self.observers.iter().all(|it| it.has_ended())
     }
@@ -193,7 +188,6 @@ impl<'run> Observation<'run> {
         self.last = Some(seq);
     }
 
-    /// Adds the feedback to earlier items that masking needs.
     fn add_feedback(&self, observed: &mut Observed) {
         let (seq, lag) = (observed.seq(), self.lag);
         observed.before = self.recent.iter().cloned().collect();

@@ -18,12 +18,10 @@ use crate::conformance::{
 /// Sentences about breaches and deaths that are kept; more are counted.
 const SENTENCES: usize = 5;
 
-/// The fates of the observed items.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Items of the stage that were seen whole.
     pub observed: u64,
-    /// Items whose results were compared.
     pub compared: u64,
     /// Compared items with the same bytes.
     pub identical: u64,
@@ -68,7 +66,6 @@ pub(crate) struct Record {
     pub ends: Vec<String>,
 }
 
-/// A row of `shadow.csv`.
 #[derive(Debug, Serialize)]
 struct ComparedItem {
     seq: u64,

@@ -17,7 +17,6 @@ use gyre_stage::StageError;
 use super::observation::{Feedback, Observed};
 use crate::conformance::harness::{Harness, start_of_trajectory};
 
-/// The numbers of the shadow's stream.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Renumbering {
     stage: StageId,

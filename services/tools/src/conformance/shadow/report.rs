@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::record::{Counts, Record, Times};
 use crate::conformance::Spreads;
 
-/// The comparison of a program with a stage of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub stage: &'static str,
@@ -20,7 +19,6 @@ pub struct Report {
     /// From the publication of an item's input to the publication of its output.
     pub answer: Option<Beside>,
     pub breaches: Vec<String>,
-    /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
     pub verdict: Verdict,
 }
@@ -34,7 +32,6 @@ pub enum Verdict {
     Nothing,
 }
 
-/// Times of the same items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
     pub shadow: Percentiles,

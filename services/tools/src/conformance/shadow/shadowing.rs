@@ -37,7 +37,6 @@ const STARTING: Duration = Duration::from_millis(5);
 const BACKOFF: Duration = Duration::from_secs(1);
 /// Ends in a row without a compared item after which it is not started again.
 const MAX_FAILURES: u64 = 3;
-/// Time between two lines about the progress.
 const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
 
 pub(crate) struct Shadowing<'a> {
@@ -150,7 +149,6 @@ impl<'a> Shadowing<'a> {
         self.signals.sleep_until_any(&listeners, limit)
     }
 
-    /// Takes the messages of the run, if a poll is due.
     fn take(&mut self, at_once: bool) -> Result<(), StageError> {
         if !at_once && self.taken.elapsed() < REST {
             return Ok(());
@@ -165,7 +163,6 @@ impl<'a> Shadowing<'a> {
         self.bound_backlog()
     }
 
-    /// Leaves out the items for which the shadow is too late.
     fn bound_backlog(&mut self) -> Result<(), StageError> {
         let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
         let bytes = || self.backlog.iter().map(Observed::bytes).sum::<usize>();
@@ -192,7 +189,6 @@ impl<'a> Shadowing<'a> {
         }
     }
 
-    /// Starts the shadow if it is not running, and exchanges messages with it.
     fn attend(&mut self) -> Result<(), Failure> {
         let Some(life) = &mut self.life else {
             return self.start();
@@ -235,7 +231,6 @@ impl<'a> Shadowing<'a> {
         Ok(())
     }
 
-    /// Returns a sentence if the shadow does not start or does not answer.
     fn hangs(&self) -> Option<String> {
         let life = self.life.as_ref()?;
         let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);

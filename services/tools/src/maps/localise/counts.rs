@@ -8,7 +8,6 @@ use super::RegisteredScan;
 /// Spans without a fix that are listed.
 const LISTED: usize = 10;
 
-/// Counts of the scans by their status, and the spans without a fix.
 #[derive(Debug, Default, Serialize)]
 pub struct Counts {
     found: usize,
@@ -57,12 +56,10 @@ impl Counts {
         self.found + self.tracked + self.predicted + self.lost
     }
 
-    /// Returns whether any scan was found.
     pub fn has_fix(&self) -> bool {
         self.first_fix.is_some()
     }
 
-    /// Returns a sentence with the numbers of found, lost and skipped scans.
     pub fn summary(&self, left_out: usize) -> String {
         let mut text = match self.first_fix {
             Some((scan, after_s)) => format!("first fix: scan {scan}, after {after_s:.1} s"),

@@ -10,7 +10,6 @@ use gyre_radar::OwnedScan;
 use gyre_slam::localisation::Observation;
 use gyre_terminal::{Failure, print};
 
-/// The scans of a recording, one after the other.
 pub struct Scans {
     dataset: Box<dyn Dataset>,
     /// The scans that are left.
@@ -18,7 +17,6 @@ pub struct Scans {
     odometry: Odometry,
     scan: OwnedScan,
     samples: ScanSamples,
-    /// Scans that could not be used.
     pub left_out: usize,
     /// Scans in a row that were left out, and the most that may be.
     unreadable: usize,

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use gyre_mapping::Origin;
 
-/// The arguments of `gyre map`.
 #[derive(Debug, Args)]
 pub struct MapArguments {
     /// The folder of the run's results, its --out, with journal/keyframes.log.
@@ -34,7 +33,6 @@ pub struct MapArguments {
     pub origin: Option<Origin>,
 }
 
-/// The forms of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MapFormat {
     /// map.toml and tiles/X_Y.png.
@@ -49,7 +47,6 @@ pub enum MapFormat {
     Web,
 }
 
-/// Parses latitude, longitude and heading in degrees.
 fn origin(text: &str) -> Result<Origin, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     let Ok([latitude_deg, longitude_deg, heading_deg]) = numbers.as_deref() else {

@@ -14,7 +14,6 @@ use crate::maps::{folder, localise::searched_map};
 /// Path between two drives, so that no submap has keyframes of both, m.
 const BETWEEN_DRIVES_M: f64 = 1e3;
 
-/// Places a run in the map in a folder, draws both, and writes the map of all.
 pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> {
     let (run, out) = (&arguments.run, &arguments.out);
     require_another_folder(map, out)?;
@@ -68,7 +67,6 @@ fn all(
     Ok(all)
 }
 
-/// Checks that the map that is extended is kept.
 fn require_another_folder(map: &Path, out: &Path) -> Result<(), Failure> {
     let same = fs::canonicalize(map).ok() == fs::canonicalize(out).ok() && out.exists();
     let map = map.display();

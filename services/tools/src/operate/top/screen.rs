@@ -6,15 +6,14 @@ use gyre_terminal::wrap;
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
-    style::{Color, Modifier, Style, Stylize},
-    text::Line,
-    widgets::{Block, Cell, Row, Sparkline, Table},
+    style::{Color, Style, Stylize},
+    text::{Line, Text},
+    widgets::{Block, Paragraph, Sparkline},
 };
 
 use super::snapshot::{Snapshot, Use};
 use crate::operate::processes::{duration, lacks, summary};
 
-/// The columns of the table: title and width.
 const COLUMNS: [(&str, u16); 12] = [
     ("process", 19),
     ("pid", 8),
@@ -46,20 +45,28 @@ fn columns(width: u16) -> Vec<usize> {
 }
 
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
-    let rows = snapshot.status.processes.len() as u16;
-    let lines = head_lines(snapshot, frame.area().width);
+    let width = frame.area().width;
+    let (lines, rows) = (
+        head_lines(snapshot, width),
+        rows(snapshot, width.saturating_sub(2)),
+    );
     let [head, latency, table, foot] = Layout::vertical([
         Constraint::Length(lines.len() as u16),
         Constraint::Max(12),
-        Constraint::Length(rows + 3),
+        Constraint::Length(rows.len() as u16 + 2),
         Constraint::Length(1),
     ])
     .areas(frame.area());
     let mut title: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
     title[0] = title[0].clone().bold();
-    frame.render_widget(ratatui::text::Text::from(title), head);
+    frame.render_widget(Text::from(title), head);
     draw_latency(frame, snapshot, latency);
-    draw_processes(frame, snapshot, table);
+    let rows = rows
+        .into_iter()
+        .map(|(row, style)| Line::styled(row, style));
+    let rows = Text::from(rows.collect::<Vec<_>>());
+    let block = Block::bordered().title(" processes ");
+    frame.render_widget(Paragraph::new(rows).block(block), table);
     frame.render_widget(Line::from(" q quit").dim(), foot);
 }
 
@@ -77,44 +84,35 @@ fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
     frame.render_widget(sparkline, area);
 }
 
-fn draw_processes(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
-    let style = |process: &ProcessStatus| match process.activity {
-        Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
-        Activity::Starting => Style::new().fg(Color::Yellow),
-        _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
-        _ => Style::new(),
-    };
-    let shown = columns(area.width.saturating_sub(2));
-    let rows = snapshot.status.processes.iter().zip(&snapshot.processes);
-    let rows = rows.map(|(process, used)| {
-        let cells = cells(snapshot, process, used);
-        Row::new(shown.iter().map(|it| Cell::from(cells[*it].clone()))).style(style(process))
-    });
-    let header = Row::new(shown.iter().map(|it| COLUMNS[*it].0));
-    let widths = shown.iter().map(|it| Constraint::Length(COLUMNS[*it].1));
-    let table = Table::new(rows, widths)
-        .header(header.style(Style::new().add_modifier(Modifier::BOLD)))
-        .block(Block::bordered().title(" processes "));
-    frame.render_widget(table, area);
-}
-
 /// Returns a snapshot as text of this width at most, as far as its columns can be left out.
 pub fn text(snapshot: &Snapshot, width: u16) -> String {
     let mut lines = head_lines(snapshot, width);
+    lines.extend(rows(snapshot, width).into_iter().map(|(row, _)| row));
+    lines.join("\n")
+}
+
+/// Returns the table of the processes, row by row.
+fn rows(snapshot: &Snapshot, width: u16) -> Vec<(String, Style)> {
     let shown = columns(width);
-    let line = |cells: [String; COLUMNS.len()]| {
+    let row = |cells: [String; COLUMNS.len()]| {
         let cell = |it: &usize| format!("{:width$}", cells[*it], width = COLUMNS[*it].1.into());
         let cells: Vec<String> = shown.iter().map(cell).collect();
         cells.join(" ").trim_end().to_owned()
     };
-    lines.push(line(COLUMNS.map(|(title, _)| title.to_owned())));
+    let titles = row(COLUMNS.map(|(title, _)| title.to_owned()));
+    let mut rows = vec![(titles, Style::new().bold())];
     for (process, used) in snapshot.status.processes.iter().zip(&snapshot.processes) {
-        lines.push(line(cells(snapshot, process, used)));
+        let style = match process.activity {
+            Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
+            Activity::Starting => Style::new().fg(Color::Yellow),
+            _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
+            _ => Style::new(),
+        };
+        rows.push((row(cells(snapshot, process, used)), style));
     }
-    lines.join("\n")
+    rows
 }
 
-/// Returns the lines above the table, wrapped to this width.
 fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let status = &snapshot.status;
     let in_flight = snapshot.in_flight.map(|count| count.to_string());
@@ -175,7 +173,6 @@ fn cells(snapshot: &Snapshot, process: &ProcessStatus, used: &Use) -> [String; C
     ]
 }
 
-/// Returns microseconds in three digits or so.
 fn us(us: f64) -> String {
     match us {
         us if us < 999.5 => format!("{us:.0} us"),

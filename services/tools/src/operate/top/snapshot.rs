@@ -17,9 +17,7 @@ use gyre_terminal::Failure;
 
 use super::{Poses, Scans};
 
-/// The time over which latencies are measured.
 const SPAN: Duration = Duration::from_secs(10);
-/// Number of snapshots whose latency is drawn.
 const HISTORY: usize = 300;
 
 pub struct Snapshot {
@@ -35,7 +33,6 @@ pub struct Snapshot {
     /// Rates of the samples of gyro and wheels, in words.
     pub samples: Option<String>,
     pub basis: Option<&'static str>,
-    /// The usage of each process, in the order of the status.
     pub processes: Vec<Use>,
     /// The longest sensor-to-pose time between two snapshots, us, oldest first.
     pub history: Vec<u64>,
@@ -64,7 +61,6 @@ pub struct Snapshots<'run> {
     earlier: Option<Earlier>,
 }
 
-/// The counts at the snapshot before.
 struct Earlier {
     at: Instant,
     poses: u64,

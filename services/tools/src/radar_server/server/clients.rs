@@ -19,8 +19,6 @@ const PAUSE: Duration = Duration::from_millis(50);
 const LINGER: Duration = Duration::from_secs(5);
 
 pub struct Clients {
-    /// It is taken when clients are accepted.
-    listener: Option<TcpListener>,
     all: Arc<Mutex<Vec<Client>>>,
 }
 
@@ -32,20 +30,10 @@ struct Client {
 }
 
 impl Clients {
-    /// The clients that connect to a listener; it accepts nobody yet.
-    pub fn of(listener: TcpListener) -> Self {
-        Self {
-            listener: Some(listener),
-            all: Arc::default(),
-        }
-    }
-
-    /// Accepts clients from now on, each in a thread of its own, which ends with its connection.
-    pub fn accept(&mut self, radar: &Configuration) -> io::Result<()> {
-        let Some(listener) = self.listener.take() else {
-            return Ok(());
-        };
-        let clients = Arc::clone(&self.all);
+    /// Accepts clients of this radar, each in a thread of its own, which ends with its connection.
+    pub fn accept(listener: TcpListener, radar: &Configuration) -> io::Result<Self> {
+        let all: Arc<Mutex<Vec<Client>>> = Arc::default();
+        let clients = Arc::clone(&all);
         let mut configuration = Vec::new();
         write_configuration(&mut configuration, radar);
         thread::Builder::new()
@@ -60,10 +48,9 @@ impl Clients {
                     let _ = admit(stream, number as u64, &configuration, &clients);
                 }
             })?;
-        Ok(())
+        Ok(Self { all })
     }
 
-    /// Returns whether a client has asked for azimuths.
     pub fn any_started(&self) -> bool {
         lock(&self.all).iter().any(|client| client.started)
     }
@@ -140,7 +127,6 @@ fn admit(
     Ok(())
 }
 
-/// Follows the requests of a client until it leaves.
 fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
     let mut parser = Parser::default();
     while let Ok(count @ 1..) = stream.read(parser.space(256)) {

@@ -2,7 +2,6 @@
 
 use clap::Args;
 
-/// The faults to inject while playing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Args)]
 pub struct Faults {
     /// Lose this share of the azimuths, or of the datagrams.
@@ -38,7 +37,6 @@ pub struct Faults {
     pub garbage_every: Option<u64>,
 }
 
-/// Returns whether a fault of every Nth scan is in a scan.
 pub(super) fn is_nth(scan: u64, every: Option<u64>) -> bool {
     every.is_some_and(|every| (scan + 1).is_multiple_of(every.max(1)))
 }

@@ -1,7 +1,7 @@
 //! The receivers of a playback: clients by TCP, or a group by UDP.
 
 use std::{
-    net::{Ipv4Addr, SocketAddrV4, UdpSocket},
+    net::{Ipv4Addr, SocketAddrV4, TcpListener, UdpSocket},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -11,7 +11,10 @@ use gyre_colossus::{
     asterix::{write_azimuth, write_description},
 };
 
-use super::{Clients, Faults, faults::uniform, unserved};
+use gyre_terminal::Failure;
+
+use super::{Faults, clients::Clients, faults::uniform, unserved};
+use crate::radar_server::RadarServerArguments;
 
 /// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
@@ -20,7 +23,6 @@ const POLL: Duration = Duration::from_millis(5);
 /// Time between two descriptions of a radar that sends no powers yet.
 const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// The receivers that a recording is played to.
 pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
     Clients(Clients),
@@ -30,12 +32,30 @@ pub enum Output {
 }
 
 impl Output {
-    /// Begins to accept clients of this radar.
-    pub fn begin(&mut self, radar: &Configuration) -> Result<(), String> {
-        match self {
-            Self::Clients(clients) => clients.accept(radar).map_err(unserved),
-            Self::Group { .. } => Ok(()),
+    /// Returns the receivers, the address for receiving the radar, and whether other machines reach
+    /// it.
+    pub fn open(
+        arguments: &RadarServerArguments,
+        radar: &Configuration,
+    ) -> Result<(Self, String, bool), Failure> {
+        if let Some(to) = arguments.udp {
+            if arguments.rate.factor().is_none() {
+                return Err("--rate max has no meaning with --udp: nobody says how fast datagrams are read; give a factor".into());
+            }
+            let wait = Duration::try_from_secs_f64(arguments.wait_s)
+                .map_err(|error| format!("--wait-s is {}: {error}", arguments.wait_s))?;
+            let group = Group::open(to, arguments.interface, arguments.faults)?;
+            let (output, address) = (Self::Group { group, wait }, format!("udp://{to}"));
+            return Ok((output, address, !arguments.interface.is_loopback()));
         }
+        let listen = &arguments.listen;
+        let listener = TcpListener::bind(listen).map_err(|error| {
+            format!("cannot serve at {listen}: {error}; choose another --listen")
+        })?;
+        let address = listener.local_addr()?;
+        let clients = Clients::accept(listener, radar).map_err(unserved)?;
+        let is_public = !address.ip().is_loopback();
+        Ok((Self::Clients(clients), address.to_string(), is_public))
     }
 
     /// Describes the radar to a group for the time that was asked for; false on a request to stop.
@@ -86,7 +106,7 @@ impl Output {
 
 /// Sleeps until a time; false on a request to stop. Before a short sleep `stop` is not called: it
 /// would take longer than the time between two azimuths.
-pub(crate) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
+pub(super) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
     loop {
         let left = due.saturating_duration_since(Instant::now());
         if left.is_zero() {
@@ -99,7 +119,6 @@ pub(crate) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
     }
 }
 
-/// The socket and the destination of datagrams.
 pub struct Group {
     socket: UdpSocket,
     to: SocketAddrV4,
@@ -107,7 +126,6 @@ pub struct Group {
     number: u32,
     /// A datagram that is sent after the next one.
     held: Option<Vec<u8>>,
-    /// Datagrams that were not sent.
     pub lost: u64,
 }
 

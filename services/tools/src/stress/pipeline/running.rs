@@ -21,7 +21,6 @@ use gyre_storage::create_folder;
 use gyre_supervise::last_line;
 use gyre_terminal::Failure;
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
 
 use super::{Setup, TICK, drain};
 use crate::stress::{
@@ -38,7 +37,7 @@ const END_LIMIT: Duration = Duration::from_secs(120);
 /// Time between two polls of a run that starts or ends.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
-/// A run as a child process. It is ended when this is dropped.
+/// A run as a child process. It is ended, and has written its results, when this is dropped.
 pub(super) struct Running<'a> {
     setup: &'a Setup,
     process: Child,
@@ -99,15 +98,12 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Waits until the run can be observed.
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
-        // A supervisor of the same results may still be there, if an earlier run was killed.
-        while !self.is_supervised_by_its_process() {
-            self.require_life()?;
-            thread::sleep(POLL_PERIOD);
-        }
         loop {
-            if let Ok(run) = ObservedRun::writing_to(&self.out) {
+            // A supervisor of the same results may still be there, if an earlier run was killed.
+            if self.is_supervised_by_its_process()
+                && let Ok(run) = ObservedRun::writing_to(&self.out)
+            {
                 match run.observe::<Pose>().map(drop) {
                     Ok(()) => return Ok(run),
                     Err(StageError::NoPlace { observers: 0, .. }) => {
@@ -164,16 +160,10 @@ impl<'a> Running<'a> {
         }
         Ok(newest)
     }
+}
 
-    /// Ends the run and reads its summary; without one it is null.
-    pub fn end(mut self) -> Value {
-        self.stop();
-        let summary = fs::read_to_string(self.out.join("summary.json"));
-        let summary = summary.map(|text| serde_json::from_str(&text).unwrap_or_default());
-        summary.unwrap_or_default()
-    }
-
-    fn stop(&mut self) {
+impl Drop for Running<'_> {
+    fn drop(&mut self) {
         if let Some(pid) = Pid::from_raw(self.process.id() as i32)
             && !self.has_ended()
         {
@@ -185,13 +175,6 @@ impl<'a> Running<'a> {
     }
 }
 
-impl Drop for Running<'_> {
-    fn drop(&mut self) {
-        self.stop();
-    }
-}
-
-/// Returns the arguments of `gyre` for the run.
 fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     // Relative to the sensor's own pace.
     let rate = tested.relative_rate(setup.rate_hz);

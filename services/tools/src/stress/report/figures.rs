@@ -1,13 +1,10 @@
 //! The figures of a run.
 
-use std::collections::BTreeMap;
-
 use gyre_messages::WitnessCounts;
 use serde::Serialize;
 
 use crate::stress::{
     fault::Fault,
-    load::Taken,
     processes::Cost,
     record::{Counts, RunLatency},
     witness_fault::WitnessFault,
@@ -23,14 +20,8 @@ pub struct Figures {
     pub witness_faults: Vec<WitnessFault>,
     /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
-    pub restarts: BTreeMap<String, usize>,
-    /// Lost wake-ups by stage, each found after up to 200 ms.
-    pub wakes_caught_late: BTreeMap<String, u64>,
     pub processes: Vec<Cost>,
     pub shared_bytes: u64,
-    /// Memory that a load has taken beside it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub taken: Option<Taken>,
 }
 
 impl Figures {
@@ -64,7 +55,7 @@ impl Figures {
         let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
         let Counts { due, dropped, .. } = self.latency.counts;
         let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
-        let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
+        let p99 = ms(latency.p99_ms) + &latency.p99_mark();
         let faults = match self.faults.len() + self.witness_faults.len() {
             0 => String::new(),
             1 => "; 1 fault".to_owned(),
@@ -75,12 +66,10 @@ impl Figures {
         )
     }
 
-    /// Returns the processor time of all processes, % of one processor.
     pub fn cpu_percent(&self) -> f64 {
         self.processes.iter().map(|cost| cost.cpu_percent).sum()
     }
 
-    /// Returns own memory of all processes and shared memory, MB.
     pub fn memory_mb(&self) -> f64 {
         let own: f64 = self.processes.iter().map(|cost| cost.own_mb).sum();
         own + self.shared_bytes as f64 * 1e-6

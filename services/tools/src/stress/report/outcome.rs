@@ -8,10 +8,8 @@ use serde::Serialize;
 use super::Figures;
 use crate::stress::search::Step;
 
-/// One figure beside its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
-    /// The key of `[budget]`.
     pub key: &'static str,
     /// The measured figure; `None`: there is no figure, which misses the limit.
     pub measured: Option<f64>,
@@ -72,7 +70,6 @@ impl Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenarioOutcome {
     pub scenario: Scenario,
-    pub line: &'static str,
     pub verdict: Verdict,
     pub checks: Vec<Check>,
     /// A failure that does not depend on the latency.
@@ -92,11 +89,9 @@ pub struct ScenarioOutcome {
 }
 
 impl ScenarioOutcome {
-    /// An outcome without any figure.
     pub fn new(scenario: Scenario, duration: Duration) -> Self {
         Self {
             scenario,
-            line: scenario.line(),
             verdict: Verdict::NotJudged,
             checks: Vec::new(),
             problem: None,

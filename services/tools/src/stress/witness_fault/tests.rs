@@ -1,9 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use std::time::Duration;
-
 use gyre_messages::{gyro, outcome};
-use gyre_run::Budget;
 
 use super::*;
 
@@ -116,35 +113,4 @@ fn without_a_normal_motion_before_a_fault_it_says_nothing() {
     let late = WitnessFaults::new(faults(Scenario::GyroOut), others(), CLOCK, BEGAN_NS);
     let (_, omitted) = late.finish();
     assert!(omitted.unwrap().contains("stop other programs"));
-}
-
-#[test]
-fn what_a_scenario_lacks_is_named_with_its_remedy() {
-    let mut tested = TestedPipeline {
-        program: "gyre".into(),
-        configuration: "config.toml".into(),
-        out: "out".into(),
-        period: Duration::from_millis(250),
-        turn: 0..240,
-        first_ns: Some(0),
-        others: others(),
-        stages: Vec::new(),
-        budget: Budget::default(),
-        shared_bytes: 0,
-    };
-    let lacks_in = |tested: &TestedPipeline, scenario| lacks(tested, scenario).unwrap_or_default();
-    for scenario in Scenario::ALL {
-        assert_eq!(lacks_in(&tested, scenario), "");
-    }
-    tested.turn = 0..60;
-    assert_eq!(lacks_in(&tested, Scenario::GyroOut), "");
-    let short = lacks_in(&tested, Scenario::RadarBlind);
-    assert!(short.contains("needs 33 s") && short.contains("lasts 15 s"));
-    tested.others.wheels = false;
-    let lacking = lacks_in(&tested, Scenario::WheelsSlip);
-    assert!(lacking.contains("wheels.kind=auto"), "{lacking}");
-    tested.others.gyro = false;
-    let lacking = lacks_in(&tested, Scenario::ClockJump);
-    assert!(lacking.contains("simulation.gyro.profile"), "{lacking}");
-    assert_eq!(lacks_in(&tested, Scenario::Kills), "");
 }

@@ -12,7 +12,6 @@ use crate::conformance::{
 };
 
 impl Shadowing<'_> {
-    /// Examines a message of the shadow.
     pub(super) fn receive(&mut self, sent: Sent) -> Result<(), Failure> {
         let output = match sent {
             Sent::Message(output) => output,
