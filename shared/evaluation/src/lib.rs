@@ -67,8 +67,7 @@ pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use objects::{
-    Hota, ObjectBand, ObjectErrors, ObjectOptions, ObjectScan, TrackedObject, TrueObject,
-    object_errors,
+    Hota, ObjectBand, ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors,
 };
 pub use plot::PlotError;
 pub use report::{Evaluation, Options, evaluate};

@@ -69,10 +69,10 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
 
 /// Prints how well the objects of a run agree with the true ones.
 fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
-    let (Some(run), Some(truth)) = (&arguments.estimate, &arguments.ground_truth) else {
+    let Some(truth) = &arguments.ground_truth else {
         return Err("name a run and the recording with its true objects: gyre evaluate --objects RUN RECORDING".into());
     };
-    let errors = objects::evaluate(run, truth)?;
+    let errors = objects::evaluate(&arguments.estimate, truth)?;
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&errors)?)?,
         false => print::line(errors)?,
@@ -82,18 +82,15 @@ fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> 
 
 /// Returns the files that are compared: of a run, its trajectory and its ground truth.
 fn files(arguments: &EvaluateArguments) -> Result<[PathBuf; 2], Failure> {
-    let named = |of: &Option<PathBuf>, old: &Option<PathBuf>| of.clone().or(old.clone());
-    let estimate = named(&arguments.estimate, &arguments.named_estimate);
-    let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
-    let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
+    let (estimate, given) = (&arguments.estimate, arguments.ground_truth.clone());
     if !estimate.is_dir() {
         let shown = estimate.display();
         let lacks = || format!("name the ground truth too: gyre evaluate {shown} FILE");
         let truth = given.ok_or_else(lacks)?;
-        return Ok([estimate, truth]);
+        return Ok([estimate.clone(), truth]);
     }
-    require_results(&estimate)?;
-    let truth = given.map_or_else(|| truth_of_run(&estimate), Ok)?;
+    require_results(estimate)?;
+    let truth = given.map_or_else(|| truth_of_run(estimate), Ok)?;
     Ok([estimate.join("trajectory.tum"), truth])
 }
 
