@@ -34,7 +34,7 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
         if Instant::now() >= due {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
-            let state = shared.shown().lock().clone();
+            let state = shared.state().clone();
             let out = shared.out.display().to_string();
             diagnostics.send(array(&out, &state, answer.ok(), &mut before));
         }
