@@ -67,40 +67,34 @@ fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
     run.set(&format!("source.scans={scans}"))
 }
 
+/// Of a driver as it is, of one before 2024, and of one that publishes whole turns.
 #[test]
 fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("configured", FFT_DATA, domain(2));
-}
-
-#[test]
-fn a_driver_of_before_2024_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("older", FFT_DATA, domain(5));
-}
-
-#[test]
-fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("turns", B_SCANS, domain(6));
-}
-
-fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
     only_if!(can_speak());
     let scans = recording::SCANS / 2;
     let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
-    let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
-    let run = receiving(with_constants(Run::small()), &domain, topic, scans);
-    let live = run.complete();
-    let source = &run.summary()["stages"]["radar-replay"];
-    for lost in [
-        "missing_azimuths",
-        "damaged_messages",
-        "scans_left_out",
-        "reconnections",
+    for (publishes, topic, of) in [
+        ("configured", FFT_DATA, 2),
+        ("older", FFT_DATA, 5),
+        ("turns", B_SCANS, 6),
     ] {
-        assert_eq!(source[lost], 0, "{lost}");
+        let domain = domain(of);
+        let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
+        let run = receiving(with_constants(Run::small()), &domain, topic, scans);
+        let live = run.complete();
+        let source = &run.summary()["stages"]["radar-replay"];
+        for lost in [
+            "missing_azimuths",
+            "damaged_messages",
+            "scans_left_out",
+            "reconnections",
+        ] {
+            assert_eq!(source[lost], 0, "{publishes}: {lost}");
+        }
+        assert_eq!(run.summary()["dropped"], 0);
+        assert!(live == recorded, "{publishes}: {live}\n{recorded}");
     }
-    assert_eq!(run.summary()["dropped"], 0);
-    assert!(live == recorded, "{live}\n{recorded}");
 }
 
 #[test]
