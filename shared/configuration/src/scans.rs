@@ -48,29 +48,27 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
             "the configuration is of {radar}, but this needs a recording: name one"
         ));
     }
-    if let Some(simulation) = configuration.streamed() {
-        let drive = SimulatedDrive::new(simulation)?;
-        let mut dataset = drive.open(options)?;
-        check_first(configuration, dataset.as_ref())?;
-        check_doppler(&method.doppler, dataset.as_mut())?;
-        return Ok(Played {
-            samples: simulated_samples(&drive, (&method.gyro, &method.wheels), dataset.as_mut())?,
-            dataset,
-            truth: Some(drive.ground_truth_tum()),
-        });
-    }
-    if data.as_os_str().is_empty() {
-        return refused(
-            "no dataset is named: name its folder, or source.data in the configuration, or add a section [simulation]",
-        );
-    }
-    let mut dataset = gyre_recording::open(data, options)?;
+    let drive = configuration.streamed().map(SimulatedDrive::new);
+    let drive = drive.transpose()?;
+    let mut dataset = match &drive {
+        Some(drive) => drive.open(options)?,
+        None if data.as_os_str().is_empty() => {
+            return refused(
+                "no dataset is named: name its folder, or source.data in the configuration, or add a section [simulation]",
+            );
+        }
+        None => gyre_recording::open(data, options)?,
+    };
     check_first(configuration, dataset.as_ref())?;
     check_doppler(&method.doppler, dataset.as_mut())?;
+    let (gyro, wheels) = (&method.gyro, &method.wheels);
     Ok(Played {
-        samples: ScanSamples::open(&method.gyro, &method.wheels, data, dataset.as_mut())?,
+        samples: match &drive {
+            Some(drive) => simulated_samples(drive, (gyro, wheels), dataset.as_mut())?,
+            None => ScanSamples::open(gyro, wheels, data, dataset.as_mut())?,
+        },
         dataset,
-        truth: None,
+        truth: drive.map(|drive| drive.ground_truth_tum()),
     })
 }
 

@@ -68,8 +68,8 @@ pub struct Endpoint {
 
 /// The server of a page, and on request of Foxglove.
 pub struct Server {
-    page: Endpoint,
-    foxglove: Option<Endpoint>,
+    pub page: Endpoint,
+    pub foxglove: Option<Endpoint>,
 }
 
 #[derive(Clone)]
@@ -117,17 +117,6 @@ impl Endpoint {
 }
 
 impl Server {
-    pub fn new(page: Endpoint) -> Self {
-        Self {
-            page,
-            foxglove: None,
-        }
-    }
-
-    pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
-        Self { foxglove, ..self }
-    }
-
     /// Shows the runs that write to `out`, one after the other, until a signal arrives.
     /// `is_complete` returns whether a run that has ended there has reached the end of its
     /// recording.
