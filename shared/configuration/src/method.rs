@@ -51,9 +51,9 @@ macro_rules! sections {
         }
 
         /// Checks the ranges of all values.
-        pub fn validate(&self) -> Result<(), ConfigurationError> {
-            $(within(stringify!($checked), self.odometry.$checked.validate())?;)*
-            within("gnss", self.gnss.validate())
+        pub fn check(odometry: &OdometryConfig, gnss: &GnssConfig) -> Result<(), ConfigurationError> {
+            $(within(stringify!($checked), odometry.$checked.validate())?;)*
+            within("gnss", gnss.validate())
         }
     };
 }

@@ -19,13 +19,12 @@
 //! - [`plot`]: trajectory, errors and error bands as SVG.
 //!
 //! ```
-//! use gyre_evaluation::{Association, Options, TimedPoses, evaluate};
+//! use gyre_evaluation::{STEP, TimedPoses, evaluate};
 //! use gyre_geometry::Pose;
 //!
 //! let truth: Vec<_> = (0..200).map(|k| Pose::translation(k as f64, 0.0)).collect();
 //! let estimate: Vec<_> = (0..200).map(|k| Pose::translation(1.01 * k as f64, 5.0)).collect();
-//! let options = Options { association: Association::Index, ..Options::default() };
-//! let evaluation = evaluate(TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth), &options)?;
+//! let evaluation = evaluate(TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth), STEP)?;
 //! let kitti = evaluation.kitti.as_ref().ok_or("shorter than 100 m")?;
 //! assert!((kitti.translation_percent - 1.01).abs() < 1e-9); // 1 % of the 101 m that exceed 100 m
 //! println!("{evaluation}");
@@ -54,7 +53,7 @@ pub mod seg;
 mod segments;
 mod truth_sigma;
 
-pub use associate::{Association, Coverage, TimedPoses, associate};
+pub use associate::{Coverage, TimedPoses, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
 pub use end::{EndError, end_error};
@@ -70,7 +69,7 @@ pub use objects::{
     Hota, ObjectBand, ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors,
 };
 pub use plot::PlotError;
-pub use report::{Evaluation, Options, evaluate};
+pub use report::{Evaluation, STEP, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};
 pub use segments::SEGMENT_LENGTHS_M;

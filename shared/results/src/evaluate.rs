@@ -10,12 +10,12 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
+use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma};
 use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    judgement::{Judgement, judge, judge_motions, note_time_offset, take_time_offset_out},
+    judgement::{Judgement, judge_by, judge_motions, note_time_offset, take_time_offset_out},
     odometry,
     out::{Content, Out, require_results},
     results::truth_of,
@@ -35,11 +35,7 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         true => offset = Some(take_time_offset_out(&estimate, &mut truth)?),
         false => note_time_offset(&estimate, &truth),
     }
-    let options = Options {
-        step: arguments.step,
-        ..Options::default()
-    };
-    let evaluation = judge(&estimate, &truth, options)?;
+    let evaluation = judge_by(&estimate, &truth, arguments.step)?;
     let motions = judged_motions(arguments, &file, &estimate, &truth, &evaluation)?;
     let options = NeesOptions {
         lengths: arguments.nees_lengths.clone(),

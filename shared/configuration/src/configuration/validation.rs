@@ -29,14 +29,7 @@ macro_rules! refuse {
 impl Configuration {
     /// Checks every section, then all together.
     pub(super) fn validate(&self) -> Result<(), ConfigurationError> {
-        let method = MethodConfig {
-            dataset: self.dataset,
-            odometry: self.odometry.clone(),
-            slam: self.slam.clone(),
-            gnss: self.gnss.clone(),
-            objects: self.objects.clone(),
-        };
-        method.validate()?;
+        MethodConfig::check(&self.odometry, &self.gnss)?;
         within("run", self.window(None, 1).validate())?;
         if let Some(simulation) = &self.simulation {
             within("simulation", simulation.validate())?;
