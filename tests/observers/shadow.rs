@@ -65,7 +65,6 @@ fn release(running: &Running) {
 /// A running shadow, and its output.
 struct Shadow {
     child: Child,
-    /// The folder of its report.
     report: PathBuf,
 }
 

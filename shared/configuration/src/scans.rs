@@ -14,7 +14,6 @@ use thiserror::Error;
 
 use crate::configuration::Configuration;
 
-/// Why the scans of a configuration cannot be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
     #[error(transparent)]
@@ -72,7 +71,6 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     })
 }
 
-/// Checks that the first scan to play is one of those that there are.
 fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), SourceError> {
     let (first, scans) = (configuration.source.first, dataset.scans());
     match first >= scans.end && !scans.is_empty() {

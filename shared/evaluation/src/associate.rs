@@ -36,7 +36,6 @@ impl<'a> TimedPoses<'a> {
 /// its own steps are: see [`max_gap_ns`].
 const LEAST_GAP_NS: i64 = 1_000_000_000;
 
-/// The numbers of poses that were associated and left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
@@ -58,14 +57,12 @@ pub enum Coverage {
 }
 
 impl Coverage {
-    /// Estimated poses with a ground-truth pose.
     pub fn matched(&self) -> usize {
         match *self {
             Coverage::Time { matched, .. } | Coverage::Index { matched, .. } => matched,
         }
     }
 
-    /// Estimated poses without a ground-truth pose.
     pub fn left_out(&self) -> usize {
         match *self {
             Coverage::Time {

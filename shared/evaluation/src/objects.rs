@@ -40,7 +40,6 @@ pub struct TrueObject {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedObject {
     pub id: u64,
-    /// Centre, m.
     pub position: Point2<f64>,
     /// Velocity over ground, m/s.
     pub velocity: Vector2<f64>,
@@ -85,19 +84,15 @@ pub struct ObjectErrors {
     #[serde(flatten)]
     pub hota: Hota,
     pub switches_per_object: f64,
-    /// Root mean square of the distance of the centres, m.
     pub position_rmse_m: f64,
     /// Root mean square of the difference of the velocities, m/s; over pairs whose true velocity is
     /// known, as the next two.
     pub velocity_rmse_mps: f64,
-    /// Root mean square of the difference of the headings, degrees.
     pub heading_rmse_deg: f64,
     /// Mean of the squared error of the velocity by its covariance, over its two dimensions: 1 if
     /// the covariance is right.
     pub velocity_nees: f64,
-    /// The same by range, m.
     pub by_range: Vec<ObjectBand>,
-    /// The same by speed, m/s.
     pub by_speed: Vec<ObjectBand>,
 }
 

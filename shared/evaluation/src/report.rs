@@ -20,7 +20,6 @@ pub const STEP: NonZeroUsize = NonZeroUsize::MIN.saturating_add(9);
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
     pub coverage: Coverage,
-    /// The axes that were negated in the estimate.
     pub axes: Axes,
     /// Heading of the estimate minus heading of the ground truth, degrees, if all differ by one
     /// large angle: then the sensors are mounted differently, and metrics that use headings are

@@ -7,7 +7,6 @@ use serde::Serialize;
 /// Standard deviations of each ground-truth pose, independent from pose to pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct TruthSigma {
-    /// Of x, and of y, m.
     pub position_m: f64,
     pub yaw_rad: f64,
 }

@@ -23,7 +23,6 @@ use crate::{
 
 pub use arguments::EvaluateArguments;
 
-/// Prints the errors of an estimate as a table or as JSON, and draws it.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {
         return evaluate_objects(arguments);
@@ -63,7 +62,6 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints how well the objects of a run agree with the true ones.
 fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let Some(truth) = &arguments.ground_truth else {
         return Err("name a run and the recording with its true objects: gyre evaluate --objects RUN RECORDING".into());
@@ -129,7 +127,6 @@ fn judged_motions(
     Ok(judged.inspect_err(note).ok())
 }
 
-/// Trajectories may be written in microseconds.
 const ROUNDING_NS: i64 = 1_000;
 
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {

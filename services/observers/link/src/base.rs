@@ -37,7 +37,6 @@ use crate::{
 const QUIET: Duration = Duration::from_secs(1);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Runs the base's side until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
@@ -216,7 +215,6 @@ impl Base<'_> {
         })
     }
 
-    /// Requests all items from one on of the robot.
     fn fetch(&self, from: u64) -> Vec<FromRobot> {
         let prefix = handshake::prefix(&self.config, Side::Robot);
         let topics = self.topics.iter().map(|name| {
@@ -236,7 +234,6 @@ impl Base<'_> {
         topics.collect()
     }
 
-    /// Returns the number of the item that is published next.
     fn next(&self) -> u64 {
         let newest = self.published.or(self.resumed_at());
         newest.map_or(0, |newest| newest.saturating_add(1))

@@ -25,7 +25,6 @@ pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     format!("gyre/split/{}/{side}", config.name)
 }
 
-/// Returns the key where a base reports the item to continue from.
 pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
@@ -62,7 +61,6 @@ pub(crate) struct Agreement {
     window: usize,
     look_back: usize,
     limits: Limits,
-    /// The topics that cross the link, with the versions of their messages.
     topics: Vec<(String, String)>,
     /// The checksum of the robot's recording, if it plays one.
     pub drive: Option<String>,
@@ -73,9 +71,7 @@ pub(crate) struct Agreement {
 pub(crate) enum StartAnswer {
     /// Items up to this one will have poses; `None`: there are no poses yet.
     Go(Option<u64>),
-    /// The robot has to ask again, for this reason.
     Wait(String),
-    /// The robot is a side of another run, for this reason.
     Refused(String),
 }
 

@@ -17,7 +17,6 @@ pub const ONE_THREAD: (&str, &str) = (
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Network {
-    /// The name of the link, the same on both sides.
     pub name: String,
     /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,

@@ -27,7 +27,6 @@ use crate::{
 pub use counts::{Received, ReceivedCount};
 use mirror::Mirror;
 
-/// The name of this process in the log.
 const NAME: &str = "link";
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -36,7 +35,6 @@ const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
     pub out: PathBuf,
-    /// The endpoints and certificates for the sender.
     pub network: Network,
     pub gyre: String,
     /// Topics to receive of those that are sent; empty: all.
@@ -91,7 +89,6 @@ impl RemoteRun {
     }
 }
 
-/// Receives until the run ends, or a signal requests a stop.
 pub fn receive(
     options: &ReceiveOptions,
     remote: RemoteRun,

@@ -26,7 +26,6 @@ use crate::{
     waker::Waker,
 };
 
-/// Runs the robot's side until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;

@@ -34,7 +34,6 @@ use crate::{
     serve::{Offer, Server},
 };
 
-/// The name of this process in the log of the run.
 const NAME: &str = "link";
 /// The topics that are sent unless others are named, of those that the run has.
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
@@ -48,7 +47,6 @@ const MAX_SCANS: usize = 2;
 #[derive(Clone, Debug)]
 pub struct SendOptions {
     pub out: PathBuf,
-    /// The endpoints and certificates for receivers.
     pub network: Network,
     /// The topics; empty: all that the run has but scans and rasters.
     pub topics: Vec<String>,
@@ -60,7 +58,6 @@ pub struct SendOptions {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
     pub topics: BTreeMap<String, (u64, u64)>,
-    /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,
 }
 
@@ -86,7 +83,6 @@ pub(crate) struct RunOffer {
     pub refines: bool,
     pub rate: Option<f64>,
     pub configuration: String,
-    /// The identity of the sender, a part of the keys.
     pub sender: String,
     /// The time of the first pose, ns since 1970, if there is one: it identifies the drive.
     pub began_ns: Option<i64>,
@@ -108,7 +104,6 @@ pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
 
-/// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
     options.network.check()?;
     let run = ObservedRun::writing_to(&options.out)?;
@@ -292,7 +287,6 @@ fn no_topic(name: &str) -> LinkError {
     ))
 }
 
-/// Offers the run to receivers.
 fn offer(
     session: &Session,
     options: &SendOptions,

@@ -47,7 +47,6 @@ pub(crate) struct Receiver {
     waiting: Arc<AtomicUsize>,
 }
 
-/// Makes a queue for so many bytes.
 pub(crate) fn queue(limit: usize) -> (Sender, Receiver) {
     let (sender, receiver) = mpsc::channel();
     let waiting = Arc::new(AtomicUsize::new(0));
@@ -76,7 +75,6 @@ impl Sender {
 }
 
 impl Receiver {
-    /// Takes the next entry, and waits for it at most so long.
     pub fn take(&self, limit: Duration) -> Result<Entry, RecvTimeoutError> {
         let entry = self.entries.recv_timeout(limit)?;
         self.waiting.fetch_sub(entry.bytes(), Ordering::Relaxed);

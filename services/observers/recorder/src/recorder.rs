@@ -27,9 +27,7 @@ use crate::{
     writing,
 };
 
-/// The name of the recorder in the log and among the processes of a run.
 const NAME: &str = "recorder";
-/// The topics that are recorded unless others are named.
 const DEFAULT: [&str; 8] = [
     "scan",
     "motion",
@@ -74,7 +72,6 @@ impl fmt::Display for Recorded {
     }
 }
 
-/// Records a run until it ends, or a signal requests a stop.
 pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
@@ -154,7 +151,6 @@ struct Recorder<'run> {
     queue: Sender,
     is_of_run: bool,
     reported: u64,
-    /// The time of the next message about missed messages.
     due: Instant,
 }
 

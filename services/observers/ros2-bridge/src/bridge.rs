@@ -19,7 +19,6 @@ const NODE: &str = "gyre";
 /// Messages that are kept for slow readers: 25 s at four turns a second.
 const DEPTH: usize = 100;
 
-/// A node that publishes the runs of a folder, one after the other.
 pub struct Bridge {
     shared: Shared,
     topics: Topics,

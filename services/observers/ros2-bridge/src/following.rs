@@ -24,11 +24,9 @@ use crate::{
 
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
-/// The topics of runs.
 pub struct Topics {
     pub poses: PoseTopics,
     pub objects: ObjectTopics,
-    /// `None`: no map is published.
     pub map: Option<MapTopic>,
 }
 
@@ -43,7 +41,6 @@ pub struct ObjectTopics {
     pub markers: Outlet<MarkerArray>,
 }
 
-/// Publishes one run after the other until the bridge stops.
 pub fn follow_runs(shared: &Shared, mut topics: Topics, say: fn(&str)) {
     while !shared.is_stopping() {
         let Ok(run) = ObservedRun::writing_to(&shared.out) else {

@@ -27,7 +27,6 @@ struct LastCounts {
     lost: u64,
 }
 
-/// Reports once a second until the bridge stops.
 pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
     let (mut before, mut due) = (LastCounts::default(), Instant::now());
     while !shared.is_stopping() {
@@ -42,7 +41,6 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
     }
 }
 
-/// Returns the diagnostics of the run and its processes.
 fn array(
     out: &str,
     state: &RunState,

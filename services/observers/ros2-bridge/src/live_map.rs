@@ -22,7 +22,6 @@ const PAUSE_FACTOR: u32 = 9;
 
 type LiveMapError = Box<dyn Error>;
 
-/// The keyframes of a run, drawn at their corrected poses.
 struct LiveMap {
     settings: MapSettings,
     keyframes: RecordReader<Keyframe>,
@@ -32,7 +31,6 @@ struct LiveMap {
     /// ignores the rotation of a grid.
     radar: Pose,
     evidence: Evidence,
-    /// The number of each keyframe's scan in the run.
     seqs: Vec<u64>,
     closed: usize,
 }

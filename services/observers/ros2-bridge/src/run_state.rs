@@ -21,7 +21,6 @@ pub struct Shared {
     state: Mutex<RunState>,
 }
 
-/// The state of the run that is published, or was.
 #[derive(Clone, Debug, Default)]
 pub struct RunState {
     pub phase: RunPhase,
@@ -80,11 +79,9 @@ impl RunState {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPhase {
-    /// There is no pose yet.
     #[default]
     Waiting,
     Working,
-    /// The last scan has its pose; results are being written.
     Finishing,
     Ended,
 }

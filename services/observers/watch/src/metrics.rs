@@ -13,7 +13,6 @@ use gyre_messages::Basis;
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
-/// The type of the answer.
 pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 #[derive(Debug)]
@@ -76,7 +75,6 @@ fn encode_value(kind: MetricType, value: f64, metric: MetricEncoder<'_>) -> fmt:
     }
 }
 
-/// A name, a help, a unit, a type and the values.
 type Metric<'a> = (Name, Name, Option<Unit>, MetricType, Values<'a>);
 type Name = &'static str;
 

@@ -9,7 +9,6 @@ use crate::{Evaluation, Kitti, Rpe};
 
 /// Size of the document, px: two panels of equal height below the header.
 const SIZE: (u32, u32) = (900, 640);
-/// Margin above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
 
 /// The errors of translation and of rotation, each with a description, points and a mean, which is

@@ -15,13 +15,10 @@ use crate::EvaluationError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// There is no pose to draw.
     #[error("there is no pose to plot")]
     Empty,
-    /// The poses cannot be compared.
     #[error(transparent)]
     Poses(#[from] EvaluationError),
-    /// The error message of the drawing library.
     #[error("failed to draw: {0}")]
     Draw(String),
 }

@@ -154,7 +154,6 @@ struct View {
 }
 
 impl View {
-    /// The view of all `points`; `None` without points.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
         let grow = |b: [f64; 4], p: &(f64, f64)| {
             [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]

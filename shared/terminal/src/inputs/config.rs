@@ -6,7 +6,6 @@ use crate::{Failure, WIDTH, print, wrap};
 use clap::Args;
 use gyre_configuration::paths;
 
-/// Columns of the names.
 const NAMES: usize = 18;
 
 /// The arguments of `gyre config`.
@@ -28,7 +27,6 @@ pub fn config(arguments: &ConfigArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a name with its purpose beside it.
 fn entry((name, purpose): (&str, String)) -> String {
     let indent = format!("\n{:NAMES$}", "");
     let lines = wrap(&purpose, WIDTH - NAMES).join(&indent);

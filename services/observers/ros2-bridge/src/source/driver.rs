@@ -23,10 +23,8 @@ const NODE: &str = "gyre_source";
 const AZIMUTHS: usize = 4_000;
 /// Samples of a gyro that are kept: ten seconds of 400 a second.
 const SAMPLES: usize = 4_000;
-/// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
 
-/// The types of azimuths that are read.
 fn names() -> [String; 3] {
     [
         RadarFftDataMsg::DEFINITION,
@@ -81,7 +79,6 @@ enum Azimuths {
     Turn(Subscription<RadarBScanMsg>),
 }
 
-/// The topics of a driver, as far as they are subscribed to.
 pub struct Driver {
     node: Node,
     topic: String,
@@ -163,12 +160,10 @@ impl Driver {
         Ok(true)
     }
 
-    /// Returns the descriptor that becomes readable when there is a message.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.wakeups.descriptor()
     }
 
-    /// Clears the descriptor: take all messages after this.
     pub fn clear(&mut self) -> io::Result<()> {
         self.wakeups.clear()
     }
