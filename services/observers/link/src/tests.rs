@@ -154,29 +154,6 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     assert_eq!(offer.sent().0, 3);
 }
 
-#[test]
-fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
-    let address = endpoint();
-    let mut there = None;
-    for (first, end) in [(0, 3), (2, 6)] {
-        let here = open(listening(&address));
-        let (_, fetcher) = there.get_or_insert_with(|| {
-            let session = open(connecting(&address));
-            let fetcher = fetcher(&session, 0);
-            (session, fetcher)
-        });
-        let buffer = Arc::new(MemoryBuffer::of(100));
-        (first..end).for_each(|seq| add(&buffer, seq));
-        let mut server = Server::new(&here, "gyre/test", None);
-        server.offer("topic", buffer).unwrap();
-        let taken = take(fetcher, 3);
-        assert_eq!(taken, [end - 3, end - 2, end - 1], "each once");
-        drop(server);
-        here.close().wait().unwrap();
-        until("the sender has gone", || !fetcher.is_connected());
-    }
-}
-
 /// A sender of a topic, and a receiver that has its first message.
 struct Ends {
     buffer: Arc<MemoryBuffer>,

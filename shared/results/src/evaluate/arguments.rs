@@ -75,18 +75,3 @@ fn part(text: &str) -> Result<Part, String> {
         }),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_are_all_or_a_range_of_percent() {
-        assert_eq!(part("all"), Ok(Part::ALL));
-        assert_eq!(part("0..100"), Ok(Part::ALL));
-        assert_eq!(part("12.5..50").ok(), Part::new(0.125, 0.5));
-        for text in ["", "half", "50", "50..", "60..50", "0..101", "nan..50"] {
-            assert!(part(text).is_err(), "{text}");
-        }
-    }
-}
