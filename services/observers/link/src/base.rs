@@ -24,12 +24,13 @@ use zenoh::{
 };
 
 use crate::{
-    LinkError, Network,
+    LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
     serve::{LAST_ANSWERS, Offer, Server},
+    session,
     waker::Waker,
 };
 
@@ -45,7 +46,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = Network::from(&config).open(sleep)? else {
+    let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
     let mut base = Base {

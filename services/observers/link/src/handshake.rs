@@ -9,7 +9,7 @@ use gyre_stage::Manifest;
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkError, Network, request::Question};
+use crate::{LinkError, request::Question, session};
 
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -40,7 +40,7 @@ pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
         thread::sleep(PAUSE);
         Ok(false)
     };
-    let session = Network::from(config).open(pause)?;
+    let session = session::open(config, pause)?;
     let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {

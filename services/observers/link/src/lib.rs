@@ -47,7 +47,7 @@ mod tests;
 #[cfg(feature = "zenoh")]
 mod waker;
 
-pub use network::{Network, NetworkError, ONE_THREAD};
+pub use network::{NetworkError, ONE_THREAD, check};
 
 #[cfg(feature = "zenoh")]
 pub use {

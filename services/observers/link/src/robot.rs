@@ -16,13 +16,14 @@ use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    LinkError, Network,
+    LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     request,
     serve::{LAST_ANSWERS, Offer, Server},
+    session,
     waker::Waker,
 };
 
@@ -33,7 +34,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = Network::from(&config).open(sleep)? else {
+    let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
     let mut robot = Robot {

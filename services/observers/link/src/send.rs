@@ -18,6 +18,7 @@ use gyre_journal::loops::LoggedLoops;
 use gyre_messages::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
+use gyre_run::LinkConfig;
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, TopicObserver, wait_for_any},
@@ -27,11 +28,13 @@ use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
-    LinkError, Network,
+    LinkError,
+    network::check,
     receive::began_ns,
     replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
     serve::{Offer, Server},
+    session,
 };
 
 const NAME: &str = "link";
@@ -47,7 +50,7 @@ const MAX_SCANS: usize = 2;
 #[derive(Clone, Debug)]
 pub struct SendOptions {
     pub out: PathBuf,
-    pub network: Network,
+    pub link: LinkConfig,
     /// The topics; empty: all that the run has but scans and rasters.
     pub topics: Vec<String>,
     /// Time to wait, after the end of the run, for receivers that have not everything yet.
@@ -105,12 +108,12 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
-    options.network.check()?;
+    check(&options.link)?;
     let run = ObservedRun::writing_to(&options.out)?;
     let _log = launch::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
     let pause = || Ok(signals.sleep(MAX_WAIT)?);
-    let Some(session) = options.network.open(pause)? else {
+    let Some(session) = session::open(&options.link, pause)? else {
         return Ok(Sent::default());
     };
     let sending = Sending::begin(&run, options, &session)?;
@@ -140,7 +143,7 @@ impl<'run> Sending<'run> {
         session: &Session,
     ) -> Result<Self, LinkError> {
         let manifest = run.manifest();
-        let prefix = prefix(&options.network.name, &session.zid().to_string());
+        let prefix = prefix(&options.link.name, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
         let logs = Logs::of(manifest)?;
         let names = topics(&options.topics, manifest)?;
@@ -310,7 +313,7 @@ fn offer(
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
-    let key = offer_key(&options.network.name);
+    let key = offer_key(&options.link.name);
     let out = manifest.out.clone();
     request::answer(session, key, "offer a run", move || RunOffer {
         began_ns: began_ns(&out).ok().flatten(),

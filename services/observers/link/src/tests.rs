@@ -13,14 +13,15 @@ use std::{
 };
 
 use gyre_messages::{Item, flag};
+use gyre_run::LinkConfig;
 use gyre_stage::source::RecordedMessage;
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    Network,
     fetch::{Fetcher, Request},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     serve::{Offer, Server},
+    session,
     waker::Waker,
 };
 
@@ -50,29 +51,29 @@ fn endpoint() -> String {
     format!("tcp/{}", listener.local_addr().unwrap())
 }
 
-fn open(network: Network) -> Session {
+fn open(link: LinkConfig) -> Session {
     let pause = || {
         thread::sleep(Duration::from_millis(5));
         Ok(false)
     };
-    network.open(pause).unwrap().unwrap()
+    session::open(&link, pause).unwrap().unwrap()
 }
 
-fn network(listen: &[&str], connect: &[&str]) -> Network {
+fn network(listen: &[&str], connect: &[&str]) -> LinkConfig {
     let [listen, connect] = [listen, connect].map(|all| all.iter().map(|&it| it.into()).collect());
-    Network {
+    LinkConfig {
         name: "test".to_owned(),
         listen,
         connect,
-        ..Network::default()
+        ..LinkConfig::default()
     }
 }
 
-fn listening(endpoint: &str) -> Network {
+fn listening(endpoint: &str) -> LinkConfig {
     network(&[endpoint], &[])
 }
 
-fn connecting(endpoint: &str) -> Network {
+fn connecting(endpoint: &str) -> LinkConfig {
     network(&[], &[endpoint])
 }
 
