@@ -94,8 +94,7 @@ impl Evaluation {
 
     /// Returns the drawing of `plot`, which notebooks show.
     fn _repr_svg_(&self) -> PyResult<String> {
-        let matched = &self.0.matched;
-        trajectory_svg(matched.estimate(), Some(matched)).map_err(errors::trajectory)
+        trajectory_svg(&self.0.matched).map_err(errors::trajectory)
     }
 
     fn __str__(&self) -> String {

@@ -52,8 +52,7 @@ impl Judgement {
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
-        let matched = &self.evaluation.matched;
-        let trajectory = trajectory_svg(matched.estimate(), Some(matched))?;
+        let trajectory = trajectory_svg(&self.evaluation.matched)?;
         let mut plots = vec![("trajectory.svg", trajectory)];
         if self.evaluation.rpe.is_some() {
             plots.push(("errors.svg", errors_svg(&self.evaluation)?));

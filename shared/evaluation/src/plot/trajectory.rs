@@ -4,11 +4,7 @@ use gyre_geometry::Pose;
 use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
-use crate::{
-    MatchedPoses, ate,
-    error::ESTIMATE as NAME,
-    matched::{path_m, require_poses},
-};
+use crate::{MatchedPoses, ate, error::ESTIMATE as NAME, matched::require_poses};
 
 const LARGEST: (f64, f64) = (900.0, 720.0);
 /// Smallest plotting area, px: the header needs the width.
@@ -21,19 +17,18 @@ const MARGIN: u32 = 20;
 const BORDER: f64 = 0.06;
 const MIN_EXTENT_M: f64 = 1.0;
 
-/// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or
-/// `estimate` alone in its own frame.
-pub fn trajectory_svg(
-    estimate: &[Pose],
-    matched: Option<&MatchedPoses>,
-) -> Result<String, PlotError> {
-    match matched {
-        Some(matched) => {
-            require_poses(NAME, estimate)?;
-            scene_svg(&Scene::matched(matched))
-        }
-        None => path_svg(estimate, estimate.len(), path_m(estimate)),
-    }
+/// Returns the plot as an SVG document: the aligned estimate over its ground truth.
+pub fn trajectory_svg(matched: &MatchedPoses) -> Result<String, PlotError> {
+    let ate = ate(matched);
+    let rmse_m = ate.rmse_m;
+    let align = |pose: &Pose| ate.truth_from_estimate * pose;
+    let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
+    scene_svg(&Scene {
+        paths: vec![("estimate", positions(&aligned))],
+        truth: Some(positions(matched.truth())),
+        title: "Trajectory and ground truth",
+        caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
+    })
 }
 
 /// Returns the plot of a trajectory with this number of poses and this length; only the poses
@@ -94,19 +89,6 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn matched(matched: &MatchedPoses) -> Self {
-        let ate = ate(matched);
-        let rmse_m = ate.rmse_m;
-        let align = |pose: &Pose| ate.truth_from_estimate * pose;
-        let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
-        Self {
-            paths: vec![("estimate", positions(&aligned))],
-            truth: Some(positions(matched.truth())),
-            title: "Trajectory and ground truth",
-            caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
-        }
-    }
-
     fn legend(&self) -> Vec<Entry<'_>> {
         let entry = |label, style| (label, Symbol::Line(style));
         let truth = self.truth.iter();

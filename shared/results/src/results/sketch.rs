@@ -56,7 +56,7 @@ impl Sketch {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_evaluation::plot::trajectory_svg;
+    use gyre_evaluation::path_m;
     use gyre_geometry::pose;
 
     use super::*;
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn a_path_of_usual_length_is_drawn_whole() {
         let whole: Vec<Pose> = poses(500).collect();
-        let expected = trajectory_svg(&whole, None).unwrap();
+        let expected = path_svg(&whole, 500, path_m(&whole)).unwrap();
         assert_eq!(sketch(500).svg().unwrap().unwrap(), expected);
         assert!(sketch(0).svg().unwrap().is_none());
     }
