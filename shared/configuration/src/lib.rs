@@ -34,6 +34,4 @@ pub use error::ConfigurationError;
 pub use masks::{describe_masks, describe_masks_in_process, describe_objects};
 pub use method::MethodConfig;
 #[cfg(feature = "run")]
-pub use scans::{
-    Played, SourceError, fingerprint, gnss_log, open, simulated_samples, with_stored_options,
-};
+pub use scans::{Played, fingerprint, gnss_log, open, simulated_samples, with_stored_options};

@@ -1,34 +1,22 @@
 //! The scans that a configuration names: a recording, or a simulation that is rendered while it is
 //! read.
 
-use std::path::Path;
+use std::{error::Error, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
-    check_first_scan,
+    Dataset, Fingerprint, GnssLog, GyroLog, OpenError, ScanSamples, WheelLog, check_first_scan,
 };
 use gyre_run::PlayedFrom;
 use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
-use gyre_simulator::{SimulatedDrive, SimulatorError};
-use thiserror::Error;
+use gyre_simulator::SimulatedDrive;
 
 use crate::configuration::Configuration;
 
-#[derive(Debug, Error)]
-pub enum SourceError {
-    #[error(transparent)]
-    Simulator(#[from] SimulatorError),
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// The log of the gyro, of the wheels or of the GNSS receiver cannot be used.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error("{0}")]
-    Configuration(String),
-}
+/// Why the scans of a configuration, or the logs of its sensors, cannot be read.
+type Failure = Box<dyn Error + Send + Sync>;
 
-fn refused<T>(reason: &str) -> Result<T, SourceError> {
-    Err(SourceError::Configuration(reason.to_owned()))
+fn refused<T>(reason: &str) -> Result<T, Failure> {
+    Err(reason.into())
 }
 
 pub struct Played {
@@ -38,7 +26,7 @@ pub struct Played {
     pub samples: ScanSamples,
 }
 
-pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
+pub fn open(configuration: &Configuration) -> Result<Played, Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;
     if configuration.is_radar() {
@@ -71,7 +59,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     })
 }
 
-fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), SourceError> {
+fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), Failure> {
     let (first, scans) = (configuration.source.first, dataset.scans());
     match first >= scans.end && !scans.is_empty() {
         true => refused(&format!(
@@ -86,7 +74,7 @@ fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(
 }
 
 /// Checks that the radar reports its velocity by Doppler, if Doppler is used.
-fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
+fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), Failure> {
     match doppler.is_used().then(|| check_first_scan(dataset)) {
         Some(Err(reason)) => refused(&format!(
             "doppler.kind is `auto`, but {reason}; with doppler.kind = \"none\" it is not used"
@@ -101,7 +89,7 @@ pub fn simulated_samples(
     drive: &SimulatedDrive,
     (gyro, wheels): (&GyroConfig, &WheelsConfig),
     dataset: &mut dyn Dataset,
-) -> Result<ScanSamples, SourceError> {
+) -> Result<ScanSamples, Failure> {
     let path = Path::new("simulation");
     let turns = match gyro.kind {
         GyroKind::Auto => {
@@ -130,7 +118,7 @@ pub fn simulated_samples(
 
 /// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
 /// results in `out`; `None` without GNSS.
-pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, SourceError> {
+pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, Failure> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
     match config.kind == GnssKind::Auto && !is_in_folder {
@@ -153,7 +141,7 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
 }
 
 /// Returns the identification of a recording; `None`: its configuration does.
-pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
+pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, Failure> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
     if !plays_scans || configuration.streamed().is_some() {
         return Ok(None);

@@ -68,7 +68,6 @@ pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use objects::{
     Hota, ObjectBand, ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors,
 };
-pub use plot::PlotError;
 pub use report::{Evaluation, STEP, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};

@@ -2,7 +2,7 @@
 
 use crate::common::{by_index, drive};
 use gyre_evaluation::{
-    Evaluation, PlotError,
+    Evaluation,
     plot::{errors_svg, path_svg, trajectory_svg},
 };
 use gyre_geometry::{Pose, pose};
@@ -68,9 +68,9 @@ fn long_paths_have_kitti_errors_and_short_ones_the_relative_pose_error() {
 fn paths_of_any_extent_are_drawn_and_missing_and_invalid_poses_are_errors() {
     assert!(path_svg(&[Pose::identity()], 1, 0.0).is_ok());
     assert!(path_svg(&[Pose::identity(); 9], 9, 0.0).is_ok());
-    assert!(matches!(path_svg(&[], 0, 0.0), Err(PlotError::Empty)));
+    assert!(path_svg(&[], 0, 0.0).is_err());
     let invalid = path_svg(&[pose(f64::NAN, 0.0, 0.0)], 1, 0.0);
-    assert!(matches!(invalid, Err(PlotError::Poses(_))));
+    assert!(invalid.unwrap_err().to_string().contains("pose 0"));
     for extent in [1e-9, 1.0, 1e4, 1e9] {
         let far = [pose(1e9 - extent, -1e9, 0.0), pose(1e9, extent - 1e9, 0.0)];
         assert!(path_svg(&far, 2, 0.0).unwrap().contains("<polyline"));

@@ -13,12 +13,6 @@ pub use trajectory::{path_svg, paths_svg, trajectory_svg};
 
 use crate::EvaluationError;
 
-#[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    #[error("there is no pose to plot")]
-    Empty,
-    #[error(transparent)]
-    Poses(#[from] EvaluationError),
-    #[error("failed to draw: {0}")]
-    Draw(String),
+fn no_pose() -> EvaluationError {
+    EvaluationError("there is no pose to plot".to_owned())
 }

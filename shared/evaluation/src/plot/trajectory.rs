@@ -3,7 +3,7 @@
 use gyre_geometry::Pose;
 use plotters::prelude::*;
 
-use super::{PlotError, canvas::*};
+use super::{EvaluationError, canvas::*, no_pose};
 use crate::{MatchedPoses, ate, error::ESTIMATE as NAME, matched::require_poses};
 
 const LARGEST: (f64, f64) = (900.0, 720.0);
@@ -18,7 +18,7 @@ const BORDER: f64 = 0.06;
 const MIN_EXTENT_M: f64 = 1.0;
 
 /// Returns the plot as an SVG document: the aligned estimate over its ground truth.
-pub fn trajectory_svg(matched: &MatchedPoses) -> Result<String, PlotError> {
+pub fn trajectory_svg(matched: &MatchedPoses) -> Result<String, EvaluationError> {
     let ate = ate(matched);
     let rmse_m = ate.rmse_m;
     let align = |pose: &Pose| ate.truth_from_estimate * pose;
@@ -33,7 +33,7 @@ pub fn trajectory_svg(matched: &MatchedPoses) -> Result<String, PlotError> {
 
 /// Returns the plot of a trajectory with this number of poses and this length; only the poses
 /// `drawn` are plotted.
-pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
+pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, EvaluationError> {
     require_poses(NAME, drawn)?;
     scene_svg(&Scene {
         paths: vec![("estimate", positions(drawn))],
@@ -45,7 +45,10 @@ pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, P
 
 /// Returns the plot of trajectories by their names, in the frame of the ground truth if there is
 /// one.
-pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<String, PlotError> {
+pub fn paths_svg(
+    paths: &[(&str, Vec<Pose>)],
+    truth: Option<&[Pose]>,
+) -> Result<String, EvaluationError> {
     for (_, poses) in paths {
         require_poses(NAME, poses)?;
     }
@@ -68,9 +71,9 @@ pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<
     })
 }
 
-fn scene_svg(scene: &Scene<'_>) -> Result<String, PlotError> {
+fn scene_svg(scene: &Scene<'_>) -> Result<String, EvaluationError> {
     let paths = scene.paths.iter().flat_map(|(_, path)| path);
-    let view = View::around(paths.chain(scene.truth.iter().flatten())).ok_or(PlotError::Empty)?;
+    let view = View::around(paths.chain(scene.truth.iter().flatten())).ok_or_else(no_pose)?;
     let size = (
         view.width_px + LEFT + 2 * MARGIN,
         view.height_px + BELOW + HEADER + MARGIN,
@@ -161,7 +164,7 @@ impl View {
     }
 }
 
-fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), PlotError> {
+fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), EvaluationError> {
     let below_header = area.split_vertically(px(f64::from(HEADER))).1;
     let (x_m, y_m) = (view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1);
     let mut chart = chart(&below_header, [MARGIN, BELOW], x_m, y_m)?;

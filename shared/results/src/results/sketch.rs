@@ -1,6 +1,6 @@
 //! The path to be drawn, reduced to the number of poses that a picture needs.
 
-use gyre_evaluation::{PlotError, plot::path_svg};
+use gyre_evaluation::{EvaluationError, plot::path_svg};
 use gyre_geometry::Pose;
 
 /// Up to twice as many poses are drawn.
@@ -44,7 +44,7 @@ impl Sketch {
     }
 
     /// Returns the plot as an SVG document; `None` without poses.
-    pub fn svg(&self) -> Result<Option<String>, PlotError> {
+    pub fn svg(&self) -> Result<Option<String>, EvaluationError> {
         let drawn = self.path();
         match drawn.is_empty() {
             true => Ok(None),
