@@ -108,18 +108,21 @@ impl Driver {
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
-        let (gyro, wheels) = (&settings.gyro_topic, &settings.wheels_topic);
+        let gyro = settings.gyro_topic.as_deref();
+        let gyro = gyro.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let wheels = settings.wheels_topic.as_deref();
+        let wheels = wheels.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
         let fixes = settings.fixes.as_ref();
         let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
             configuration_dds_name: node.dds_name(&topic)?,
-            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
-            older: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
+            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
+            older: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
             azimuths: None,
-            gyro: sensor(&mut node, &mut sample_wakeups, gyro.as_deref())?,
-            wheels: sensor(&mut node, &mut sample_wakeups, wheels.as_deref())?,
+            gyro: gyro.transpose()?,
+            wheels: wheels.transpose()?,
             fixes: fixes.transpose()?,
             node,
             wakeups,
@@ -151,11 +154,11 @@ impl Driver {
         let [azimuth, turn, _] = names();
         let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
         self.azimuths = Some(if found == azimuth {
-            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS)?)
+            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
         } else if found == turn {
-            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS)?)
+            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS, false)?)
         } else {
-            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS)?)
+            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
         });
         Ok(true)
     }
@@ -232,23 +235,11 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     wakeups: &mut Wakeups,
     topic: &str,
     depth: usize,
+    is_lossy: bool,
 ) -> Result<Subscription<M>, NodeError> {
-    let mut subscription = node.subscribe(topic, depth, false)?;
+    let mut subscription = node.subscribe(topic, depth, is_lossy)?;
     wakeups.add(&mut subscription)?;
     Ok(subscription)
-}
-
-fn sensor<M: Ros2Message + Send + 'static>(
-    node: &mut Node,
-    wakeups: &mut Wakeups,
-    topic: Option<&str>,
-) -> Result<Option<Subscription<M>>, NodeError> {
-    let Some(topic) = topic else {
-        return Ok(None);
-    };
-    let mut subscription = node.subscribe(topic, SAMPLES, true)?;
-    wakeups.add(&mut subscription)?;
-    Ok(Some(subscription))
 }
 
 fn take<M: Ros2Message + 'static>(
