@@ -34,12 +34,9 @@ struct Driver {
 }
 
 impl Driver {
-    fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
-        Self::with_logs(recording, domain, publishes, options, &[])
-    }
-
-    /// One beside which a gyro, wheels and a GNSS receiver publish what their logs hold.
-    fn with_logs(
+    /// Plays a recording, beside a gyro, wheels and a GNSS receiver that publish what their logs
+    /// hold.
+    fn playing(
         recording: &Path,
         domain: &str,
         publishes: &str,
@@ -80,7 +77,7 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
         ("turns", B_SCANS, 6),
     ] {
         let domain = domain(of);
-        let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
+        let _driver = Driver::playing(whole.path(), &domain, publishes, &[], &[]);
         let run = receiving(with_constants(Run::small()), &domain, topic, scans);
         let live = run.complete();
         let source = &run.summary()["stages"]["radar-replay"];
@@ -101,7 +98,7 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
     only_if!(can_speak());
     let domain = domain(3);
-    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
+    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"], &[]);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, 6);
     let motions = odometry::rows(&run.complete());
     assert_eq!(motions.len(), 5);
@@ -116,7 +113,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let whole = with_log();
     let logs = ["imu.csv", "wheels.csv"].map(|log| whole.path().join(log));
     let domain = domain(9);
-    let _driver = Driver::with_logs(whole.path(), &domain, "configured", &[], &logs);
+    let _driver = Driver::playing(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
     let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
     let run = run.set("wheels.kind=ros2");
@@ -138,7 +135,7 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     fs::write(&log, gnss::log_of_drive()).unwrap();
     let logs = ["/dev/null".into(), "/dev/null".into(), log];
     let domain = domain(11);
-    let _driver = Driver::with_logs(drive.path(), &domain, "configured", &[], &logs);
+    let _driver = Driver::playing(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
     let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
     let run = run.set("gnss.topic='/fix'");
