@@ -3,6 +3,8 @@
 
 use std::num::NonZeroUsize;
 
+use crate::MatchedPoses;
+
 pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
 /// One segment: from pose `first` to pose `last`, both included.
@@ -25,10 +27,7 @@ impl Segment {
 /// length.
 ///
 /// `distance_m` does not decrease. A length that the rest of the path does not exceed is skipped.
-pub(crate) fn segments(
-    distance_m: &[f64],
-    step: NonZeroUsize,
-) -> impl Iterator<Item = Segment> + '_ {
+fn segments(distance_m: &[f64], step: NonZeroUsize) -> impl Iterator<Item = Segment> + '_ {
     let ends = move |first: usize| {
         (0..SEGMENT_LENGTHS_M.len()).filter_map(move |length| {
             let limit = distance_m[first] + SEGMENT_LENGTHS_M[length];
@@ -50,18 +49,23 @@ pub(crate) struct PerLength<const N: usize> {
 }
 
 impl<const N: usize> PerLength<N> {
-    pub fn new() -> Self {
-        Self {
+    /// Sums the errors of all segments that start at every `step`-th pose.
+    pub fn of(
+        matched: &MatchedPoses,
+        step: NonZeroUsize,
+        error: impl Fn(Segment) -> [f64; N],
+    ) -> Self {
+        let mut of = Self {
             sums: [[0.0; N]; SEGMENT_LENGTHS_M.len()],
             counts: [0; SEGMENT_LENGTHS_M.len()],
+        };
+        for segment in segments(&matched.distance_m(), step) {
+            of.counts[segment.length] += 1;
+            let sums = of.sums[segment.length].iter_mut();
+            sums.zip(error(segment))
+                .for_each(|(sum, value)| *sum += value);
         }
-    }
-
-    pub fn add(&mut self, length: usize, values: [f64; N]) {
-        self.counts[length] += 1;
-        for (sum, value) in self.sums[length].iter_mut().zip(values) {
-            *sum += value;
-        }
+        of
     }
 
     /// Returns the mean over all segments of all lengths, and their count; `None` without a
