@@ -57,17 +57,17 @@ impl fmt::Display for Recorded {
         let list = |number: fn(&Counts) -> u64| {
             let counts = self.counts.iter().filter(|counts| number(counts) > 0);
             let counts = counts.map(|it| format!("{} {}", number(it), it.topic));
-            let counts: Vec<String> = counts.collect();
-            match counts.is_empty() {
-                true => "nothing".to_owned(),
-                false => counts.join(", "),
+            match &counts.collect::<Vec<String>>()[..] {
+                [] => "nothing".to_owned(),
+                counts => counts.join(", "),
             }
         };
         let (recorded, missed) = (list(|it| it.recorded), list(|it| it.missed));
-        write!(f, "recorded {recorded} in {}", self.path.display())?;
+        let path = self.path.display();
+        write!(f, "recorded {recorded} in {path}; missed {missed}")?;
         match self.is_complete() {
-            true => write!(f, "; missed nothing"),
-            false => write!(f, "; missed {missed}: the recording is not complete"),
+            true => Ok(()),
+            false => write!(f, ": the recording is not complete"),
         }
     }
 }
