@@ -10,8 +10,9 @@ use std::{
 
 use gyre_geometry::Pose;
 use gyre_ros2_messages::frames::Frames;
+use gyre_stage::clock;
 
-use crate::{Mounting, clock::Clock};
+use crate::{Mounting, clock::offset_ns};
 
 pub struct Shared {
     pub out: PathBuf,
@@ -24,8 +25,8 @@ pub struct Shared {
 #[derive(Clone, Debug, Default)]
 pub struct RunState {
     pub phase: RunPhase,
-    /// The clock of its stamps, from its first pose on.
-    pub clock: Option<Clock>,
+    /// The offset from its stamps to times of ROS, ns, from its first pose on.
+    offset_ns: Option<i64>,
     pub map_from_odometry: Option<Pose>,
     pub poses: Counts,
     /// The scans whose objects are published, in a run that tracks them.
@@ -66,9 +67,12 @@ impl RunState {
     /// Returns a time of the run as a time of ROS, and whether it is the first one: by that the
     /// clock is set.
     pub fn stamp_ns(&mut self, time_ns: i64) -> (i64, bool) {
-        let is_first = self.clock.is_none();
-        let clock = self.clock.get_or_insert_with(|| Clock::of(time_ns));
-        (clock.stamp_ns(time_ns), is_first)
+        let is_first = self.offset_ns.is_none();
+        let now_ns = clock::since_1970_ns();
+        let offset_ns = self
+            .offset_ns
+            .get_or_insert_with(|| offset_ns(time_ns, now_ns));
+        (time_ns.saturating_add(*offset_ns), is_first)
     }
 
     /// Returns the number of messages that were not published or not sent.
