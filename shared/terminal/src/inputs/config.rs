@@ -32,17 +32,3 @@ fn entry((name, purpose): (&str, String)) -> String {
     let lines = wrap(&purpose, WIDTH - NAMES).join(&indent);
     format!("{name:NAMES$}{lines}")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_list_fits_a_terminal() {
-        for it in gyre_shipped::configurations() {
-            let entry = entry(it);
-            let widest = entry.lines().map(|line| line.chars().count()).max();
-            assert!(widest <= Some(WIDTH), "{entry}");
-        }
-    }
-}
