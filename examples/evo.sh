@@ -7,4 +7,4 @@ truth="${2:-$1/ground_truth.tum}"
 evo_ape tum "$truth" "$estimate" --align
 evo_rpe tum "$truth" "$estimate" --delta 1 --delta_unit f --pose_relation trans_part
 evo_rpe tum "$truth" "$estimate" --delta 1 --delta_unit f --pose_relation angle_deg
-gyre evaluate --estimate "$estimate" --ground-truth "$truth"
+gyre evaluate "$estimate" "$truth"

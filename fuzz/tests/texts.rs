@@ -48,8 +48,7 @@ fn use_trajectory(text: &str) -> Result<(), Failure> {
     if trajectory.stamp_ns.is_some() {
         write_tum(&trajectory, &mut Vec::new())?;
     }
-    let options = gyre_evaluation::Options::default();
-    judge(&trajectory, &trajectory, options)?;
+    judge(&trajectory, &trajectory)?;
     Ok(())
 }
 

@@ -49,7 +49,7 @@ impl Config {
             let unknown = strict::unknown("the configuration", key, MethodConfig::SECTIONS);
             return Err(errors::config(unknown));
         }
-        method.validate().map_err(errors::config)?;
+        MethodConfig::check(&method.odometry, &method.gnss).map_err(errors::config)?;
         method.dataset.check().map_err(errors::config)?;
         Ok(Self { method, note })
     }

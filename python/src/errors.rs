@@ -65,11 +65,7 @@ pub fn registration(error: OdometryError) -> PyErr {
         OdometryError::Scan(_) | OdometryError::Mask(MaskError::Raster(_) | MaskError::Scan(_)) => {
             scan(error)
         }
-        OdometryError::Mask(
-            MaskError::Network(_) | MaskError::Function(_) | MaskError::MissingPrevious(_),
-        )
-        | OdometryError::Search(_)
-        | OdometryError::Own(_) => other(error),
+        error => other(error),
     }
 }
 

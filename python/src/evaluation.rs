@@ -3,7 +3,7 @@
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use gyre_evaluation::{
-    Association, Options, TimedPoses,
+    TimedPoses,
     plot::{errors_svg, trajectory_svg},
 };
 use pyo3::{exceptions::PyValueError, prelude::*};
@@ -26,15 +26,7 @@ pub fn evaluate(
     let step = NonZeroUsize::new(step);
     let step = step.ok_or_else(|| PyValueError::new_err("step is 0, but must be 1 or more"))?;
     let (estimate, truth) = (&estimate.get().0, &truth.get().0);
-    let options = Options {
-        step,
-        association: match estimate.stamp_ns.is_some() && truth.stamp_ns.is_some() {
-            true => Association::default(),
-            false => Association::Index,
-        },
-    };
-    let evaluation =
-        py.detach(|| gyre_evaluation::evaluate(timed(estimate), timed(truth), &options));
+    let evaluation = py.detach(|| gyre_evaluation::evaluate(timed(estimate), timed(truth), step));
     evaluation.map(Evaluation).map_err(errors::trajectory)
 }
 
@@ -102,8 +94,7 @@ impl Evaluation {
 
     /// Returns the drawing of `plot`, which notebooks show.
     fn _repr_svg_(&self) -> PyResult<String> {
-        let matched = &self.0.matched;
-        trajectory_svg(matched.estimate(), Some(matched)).map_err(errors::trajectory)
+        trajectory_svg(&self.0.matched).map_err(errors::trajectory)
     }
 
     fn __str__(&self) -> String {

@@ -3,7 +3,7 @@
 use std::{io, path::PathBuf};
 
 use gyre_datasets::{read_trajectory, write_kitti, write_tum};
-use gyre_evaluation::plot::trajectory_svg;
+use gyre_evaluation::plot::path_svg;
 use gyre_geometry::{Pose, pose, xy_yaw};
 use ndarray::{Array2, Ix2};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -133,7 +133,7 @@ impl Trajectory {
 
     /// Returns the drawing, which notebooks show.
     fn _repr_svg_(&self) -> PyResult<String> {
-        trajectory_svg(&self.0.poses, None).map_err(errors::trajectory)
+        path_svg(&self.0.poses, self.0.len(), self.path_m()).map_err(errors::trajectory)
     }
 
     fn __len__(&self) -> usize {

@@ -90,7 +90,7 @@ def test_an_evaluation_is_that_of_the_program(recording: Path, tmp_path: Path) -
     odometry.trajectory.write_tum(tmp_path / "trajectory.tum")
     truth = gyre.find_ground_truth(recording)
     assert truth is not None
-    printed = gyre_program("evaluate", "--estimate", tmp_path / "trajectory.tum", "--ground-truth", truth)
+    printed = gyre_program("evaluate", tmp_path / "trajectory.tum", truth)
     estimate = gyre.Trajectory.read(tmp_path / "trajectory.tum")
     assert str(gyre.evaluate(estimate, gyre.Trajectory.read(truth))).strip() in printed
     with pytest.raises(ValueError, match="step is 0"):

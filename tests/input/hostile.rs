@@ -75,7 +75,7 @@ fn files_without_end_are_refused_whatever_reads_them() {
         );
         format!("{run}\n--set\nraster.n=127\n--set\nraster.cell_m=0.8\n--set\n{model}")
     };
-    let evaluate = format!("evaluate\n--estimate\n{}\n--ground-truth", path(&estimate));
+    let evaluate = format!("evaluate\n{}", path(&estimate));
     let motions = format!("{}\n--odometry\n{}", path(&estimate), path(&motions));
     let simulated = path(simulated.path());
     // The arguments by lines.

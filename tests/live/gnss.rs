@@ -53,7 +53,6 @@ pub fn log_of_drive() -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-/// The log of a run's fixes.
 fn received(run: &Run) -> PathBuf {
     run.out().join("journal/gnss.csv")
 }
@@ -117,7 +116,6 @@ pub fn assert_replays(run: &Run) {
     assert_eq!(left(&replayed(run)), left(run));
 }
 
-/// The replay of a run's recording.
 fn replayed(run: &Run) -> Run {
     record::replayed(&record::file(run), &[]).0
 }

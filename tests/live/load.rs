@@ -99,13 +99,3 @@ fn any_process_can_die_and_every_scan_is_accounted_for() {
         }
     }
 }
-
-#[test]
-fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
-    let run = Run::of_recording().rate("1.5").set("run.mode=live");
-    let run = run.set("source.scans=12");
-    let lossless = Run::of_recording().set("source.scans=12").complete();
-    let live = run.complete();
-    assert_eq!(run.summary()["dropped"], 0);
-    assert_eq!(live, lossless);
-}

@@ -55,7 +55,6 @@ impl Radar {
         Self { server, address }
     }
 
-    /// A run that receives so many scans of it.
     pub fn run(&self, scans: usize) -> Run {
         run_at(&self.address).set(&format!("source.scans={scans}"))
     }
@@ -78,13 +77,11 @@ impl Radar {
         }
     }
 
-    /// As [`Radar::run`] on the loopback's network.
     pub fn received(&self, scans: usize) -> Run {
         self.run(scans).set("source.interface='127.0.0.1'")
     }
 }
 
-/// The report of a playback.
 #[derive(Debug)]
 pub(crate) struct Played {
     pub scans: u64,

@@ -31,7 +31,6 @@ fn interrupt(run: &Run, running: Running) -> Value {
     run.summary()
 }
 
-/// A count of the source.
 fn count(summary: &Value, key: &str) -> u64 {
     summary["stages"]["radar-replay"][key].as_u64().unwrap()
 }

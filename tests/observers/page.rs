@@ -23,7 +23,6 @@ fn started(run: &Run) -> Running {
     running
 }
 
-/// Interrupts a run and waits for its end.
 fn interrupt(running: Running) {
     running.signal(Signal::TERM);
     assert_eq!(running.finish().code(), Some(130));

@@ -226,7 +226,6 @@ fn a_recorder_that_dies_right_before_the_end_is_reported() {
     assert!(has_said.iter().any(|it| said.contains(it)), "{said}");
 }
 
-/// The messages on `/health`.
 fn health(recording: &Path) -> Vec<Value> {
     let bytes = fs::read(recording).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap();

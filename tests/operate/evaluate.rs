@@ -22,8 +22,11 @@ fn run() -> Run {
 fn evaluate(run: &Run) -> Command {
     let mut command = gyre();
     let truth = recording::small().join("gt/radar_odometry.csv");
-    command.arg("evaluate").arg("--ground-truth").arg(truth);
-    with(command, "--estimate", run.out().join("trajectory.tum"))
+    command
+        .arg("evaluate")
+        .arg(run.out().join("trajectory.tum"))
+        .arg(truth);
+    command
 }
 
 fn with(mut command: Command, option: &str, value: impl AsRef<OsStr>) -> Command {

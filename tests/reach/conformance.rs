@@ -69,7 +69,6 @@ fn broken(stage: &str, breach: &str, more: &[&str]) -> Value {
     report
 }
 
-/// The sentences of a report about a rule.
 fn why(report: &Value, rule: &str) -> String {
     judged(report, rule)["why"].to_string()
 }

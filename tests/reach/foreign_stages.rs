@@ -105,7 +105,6 @@ fn any_word_of_a_header_is_refused_or_harmless() {
     }
 }
 
-/// Asserts that all motions are numbers.
 fn assert_numbers(run: &Run, fault: &str) {
     let odometry = run.odometry();
     let are_numbers = !odometry.contains("NaN") && !odometry.contains("inf");

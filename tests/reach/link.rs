@@ -234,7 +234,6 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     running.kill_supervisor();
 }
 
-/// A link over a free port of this machine.
 struct Link {
     address: String,
 }
@@ -277,7 +276,6 @@ fn end(process: &mut Child) {
     process.wait().unwrap();
 }
 
-/// The number of poses in a folder, with the end.
 fn poses(out: &Path) -> usize {
     journal::records(&journal::path(out)).map_or(0, |records| records.into_iter().flatten().count())
 }

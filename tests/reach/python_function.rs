@@ -253,24 +253,14 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
 }
 
 #[test]
-#[ignore = ".ci/nightly: begins a stage and holds it to its contract"]
-fn a_begun_mask_keeps_the_contract_and_drives() {
-    begun_keep_the_contract_and_drive(&[("masking", "mask")]);
-}
-
-#[test]
-#[ignore = ".ci/nightly: the same of the searches"]
-fn begun_searches_keep_the_contract_and_drive() {
-    let searches = [
+#[ignore = ".ci/nightly: begins stages and holds them to their contracts"]
+fn begun_stages_keep_the_contract_and_drive() {
+    only_if!(python_has("numpy"));
+    for (stage, function) in [
+        ("masking", "mask"),
         ("rotation-search", "rotation"),
         ("translation-search", "translation"),
-    ];
-    begun_keep_the_contract_and_drive(&searches);
-}
-
-fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
-    only_if!(python_has("numpy"));
-    for (stage, function) in stages {
+    ] {
         let folder = folder();
         let mut new = gyre();
         new.current_dir(&folder)

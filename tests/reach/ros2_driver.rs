@@ -34,12 +34,9 @@ struct Driver {
 }
 
 impl Driver {
-    fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
-        Self::with_logs(recording, domain, publishes, options, &[])
-    }
-
-    /// One beside which a gyro, wheels and a GNSS receiver publish what their logs hold.
-    fn with_logs(
+    /// Plays a recording, beside a gyro, wheels and a GNSS receiver that publish what their logs
+    /// hold.
+    fn playing(
         recording: &Path,
         domain: &str,
         publishes: &str,
@@ -67,47 +64,41 @@ fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
     run.set(&format!("source.scans={scans}"))
 }
 
+/// Of a driver as it is, of one before 2024, and of one that publishes whole turns.
 #[test]
 fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("configured", FFT_DATA, domain(2));
-}
-
-#[test]
-fn a_driver_of_before_2024_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("older", FFT_DATA, domain(5));
-}
-
-#[test]
-fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("turns", B_SCANS, domain(6));
-}
-
-fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
     only_if!(can_speak());
     let scans = recording::SCANS / 2;
     let whole = whole(scans);
     let recorded = Run::small().data(whole.path()).complete();
-    let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
-    let run = receiving(with_constants(Run::small()), &domain, topic, scans);
-    let live = run.complete();
-    let source = &run.summary()["stages"]["radar-replay"];
-    for lost in [
-        "missing_azimuths",
-        "damaged_messages",
-        "scans_left_out",
-        "reconnections",
+    for (publishes, topic, of) in [
+        ("configured", FFT_DATA, 2),
+        ("older", FFT_DATA, 5),
+        ("turns", B_SCANS, 6),
     ] {
-        assert_eq!(source[lost], 0, "{lost}");
+        let domain = domain(of);
+        let _driver = Driver::playing(whole.path(), &domain, publishes, &[], &[]);
+        let run = receiving(with_constants(Run::small()), &domain, topic, scans);
+        let live = run.complete();
+        let source = &run.summary()["stages"]["radar-replay"];
+        for lost in [
+            "missing_azimuths",
+            "damaged_messages",
+            "scans_left_out",
+            "reconnections",
+        ] {
+            assert_eq!(source[lost], 0, "{publishes}: {lost}");
+        }
+        assert_eq!(run.summary()["dropped"], 0);
+        assert!(live == recorded, "{publishes}: {live}\n{recorded}");
     }
-    assert_eq!(run.summary()["dropped"], 0);
-    assert!(live == recorded, "{live}\n{recorded}");
 }
 
 #[test]
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
     only_if!(can_speak());
     let domain = domain(3);
-    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
+    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"], &[]);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, 6);
     let motions = odometry::rows(&run.complete());
     assert_eq!(motions.len(), 5);
@@ -122,7 +113,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let whole = with_log();
     let logs = ["imu.csv", "wheels.csv"].map(|log| whole.path().join(log));
     let domain = domain(9);
-    let _driver = Driver::with_logs(whole.path(), &domain, "configured", &[], &logs);
+    let _driver = Driver::playing(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
     let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
     let run = run.set("wheels.kind=ros2");
@@ -144,7 +135,7 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     fs::write(&log, gnss::log_of_drive()).unwrap();
     let logs = ["/dev/null".into(), "/dev/null".into(), log];
     let domain = domain(11);
-    let _driver = Driver::with_logs(drive.path(), &domain, "configured", &[], &logs);
+    let _driver = Driver::playing(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
     let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
     let run = run.set("gnss.topic='/fix'");

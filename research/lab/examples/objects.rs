@@ -17,7 +17,7 @@ use std::path::Path;
 use std::{env, fs};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
+use gyre_evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_masking::networks::runtime;
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
@@ -56,10 +56,7 @@ fn main() -> Outcome<()> {
     let mut all = Vec::new();
     for name in &arguments {
         let scans = track(&simulated(name)?)?;
-        println!(
-            "{name}\n{}\n",
-            object_errors(&scans, &ObjectOptions::default())
-        );
+        println!("{name}\n{}\n", object_errors(&scans));
         all.push(scans);
     }
     // Identities of one drive are not those of another.
@@ -73,7 +70,7 @@ fn main() -> Outcome<()> {
         });
     }
     let all: Vec<ObjectScan> = all.into_iter().flatten().collect();
-    println!("all\n{}", object_errors(&all, &ObjectOptions::default()));
+    println!("all\n{}", object_errors(&all));
     Ok(())
 }
 
@@ -342,7 +339,7 @@ fn show(scans: &[ObjectScan]) -> Outcome<()> {
             }
         }
     }
-    println!("{}", object_errors(scans, &ObjectOptions::default()));
+    println!("{}", object_errors(scans));
     Ok(())
 }
 
@@ -441,7 +438,7 @@ mod tests {
     fn a_network_finds_the_vehicles_of_a_simulated_town_and_little_else() -> Outcome<()> {
         let drive = simulated("cts350x-radiate:21:dry:60")?;
         let scans = track(&drive)?;
-        let errors = object_errors(&scans, &ObjectOptions::default());
+        let errors = object_errors(&scans);
         assert!(errors.required > 100, "{errors}");
         // Of this drive's 14 vehicles a hidden one is a tenth; over 24 drives it is 92 and 98 %.
         assert!(errors.recall > 0.7 && errors.precision > 0.85, "{errors}");

@@ -2,9 +2,10 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use gyre_link::{Network, ReceiveOptions, SendOptions};
+use gyre_link::{ReceiveOptions, SendOptions};
 use gyre_messages::Footprint;
 use gyre_results::Out;
+use gyre_run::LinkConfig;
 use gyre_stage::{run::sweep, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds};
 
@@ -25,7 +26,7 @@ fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
     let linger = seconds("--linger-s", arguments.linger_s)?;
     let sent = gyre_link::send(&SendOptions {
         out: arguments.out.clone(),
-        network: network(&arguments.network),
+        link: link_of(&arguments.network),
         topics: arguments.topics.clone(),
         linger,
     })?;
@@ -44,21 +45,21 @@ fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
 fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
     let out = Out::lock(&arguments.out)?;
     sweep();
-    let network = network(&arguments.network);
+    let link = link_of(&arguments.network);
     let signals = Signals::install()?;
-    let Some(seen) = gyre_link::ask(&network, &signals)? else {
+    let Some(seen) = gyre_link::ask(&link, &signals)? else {
         return Ok(ExitCode::from(INTERRUPTED));
     };
     let manifest = seen.manifest(out.path());
     preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
     print::note(format_args!(
         "gyre link: the run {} is here as {}",
-        network.name,
+        link.name,
         out.path().display()
     ));
     let options = ReceiveOptions {
         out: out.path().to_owned(),
-        network,
+        link,
         gyre: own().to_string_lossy().into_owned(),
         topics: arguments.topics.clone(),
     };
@@ -71,14 +72,15 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-fn network(arguments: &NetworkArguments) -> Network {
+fn link_of(arguments: &NetworkArguments) -> LinkConfig {
     let file = |path: &Option<PathBuf>| path.clone().unwrap_or_default();
-    Network {
+    LinkConfig {
         name: arguments.name.clone(),
         listen: arguments.listen.clone(),
         connect: arguments.connect.clone(),
         ca: file(&arguments.ca),
         certificate: file(&arguments.certificate),
         key: file(&arguments.key),
+        ..LinkConfig::default()
     }
 }

@@ -21,9 +21,7 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
     #[cfg(not(feature = "link"))]
     return Err(crate::features::absent(absent::PART).into());
     #[cfg(feature = "link")]
-    gyre_link::Network::from(&configuration.link)
-        .check()
-        .map_err(|error| format!("[link]: {error}").into())
+    gyre_link::check(&configuration.link).map_err(|error| format!("[link]: {error}").into())
 }
 
 /// Executes the same command again with the environment that the network layer needs.

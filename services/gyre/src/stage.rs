@@ -136,6 +136,6 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut dataset = drive.open(&options).map_err(|error| input(&error))?;
     let (gyro, wheels) = (launch.section("gyro")?, launch.section("wheels")?);
     let samples = simulated_samples(&drive, (&gyro, &wheels), dataset.as_mut());
-    let samples = samples.map_err(|error| input(&error))?;
+    let samples = samples.map_err(|error| input(&*error))?;
     gyre_stages::radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

@@ -40,9 +40,8 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
             "gyre: whoever knows such an address can look on, and the network between carries it unencrypted",
         );
     }
-    let server = Server::new(page).with_foxglove(foxglove);
     let signals = Signals::install()?;
-    server.show(out, earlier::is_complete, &signals)?;
+    Server { page, foxglove }.show(out, earlier::is_complete, &signals)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -28,11 +28,9 @@ const LONG_REACH_DEG: f64 = 45.0;
 #[derive(Clone, Debug)]
 pub struct Automatic {
     pub table: Table,
-    /// The settings and their reasons, in a sentence.
     pub sentence: String,
 }
 
-/// The reason why there are no settings.
 #[derive(Debug, Error)]
 pub enum AutomaticError {
     #[error(transparent)]
@@ -89,7 +87,6 @@ pub fn radar_constants(
     })
 }
 
-/// Returns the configuration of the recorded run, as far as it determines the computed result.
 fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let recording = gyre_recording::open_recording(data)?;
     let parsed: Result<Table, toml::de::Error> = recording.head().configuration.parse();
@@ -143,7 +140,6 @@ struct Measured {
 }
 
 impl Measured {
-    /// Reads some scans of a recording.
     fn of(dataset: &mut dyn Dataset) -> Result<Self, AutomaticError> {
         let mut scan = OwnedScan::with_limits(dataset.limits());
         let (mut counts, mut failure) = ([0_u64; 256], None);
@@ -171,7 +167,6 @@ impl Measured {
         }
     }
 
-    /// Returns the settings that follow, as overrides.
     fn settings(&self) -> Vec<String> {
         let cell_m = (2.0 * self.max_range_m / CELLS)
             .min(MAX_CELL_M)

@@ -191,12 +191,10 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the scans come from a radar on the network.
     pub fn is_radar(&self) -> bool {
         self.source.kind != SourceKind::Recording
     }
 
-    /// Returns whether this run has this side of one that is split.
     pub fn is_side(&self, side: Side) -> bool {
         self.link.side == Some(side)
     }
@@ -219,7 +217,6 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the link is in the place of this stage.
     pub fn is_link(&self, stage: &str) -> bool {
         let place = match self.link.side {
             Some(Side::Robot) => StageId::PoseIntegration,
@@ -275,7 +272,6 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the run has this stage.
     pub fn has(&self, stage: StageId) -> bool {
         match stage {
             StageId::RotationSearch | StageId::TranslationSearch => {
@@ -356,7 +352,6 @@ fn set_all(table: &mut toml::Table, overrides: &[String]) -> Result<(), Configur
     overrides.try_for_each(|sentence| strict::set(table, sentence))
 }
 
-/// Reads the limits for all scenarios, and those for each.
 fn budget(table: &mut toml::Table) -> Result<Budget, ConfigurationError> {
     let mut scenarios = toml::Table::new();
     if let Some(toml::Value::Table(budget)) = table.get_mut("budget") {
@@ -377,7 +372,6 @@ fn budget(table: &mut toml::Table) -> Result<Budget, ConfigurationError> {
     })
 }
 
-/// Returns the names of all processes that a run can have.
 pub fn process_names() -> Vec<&'static str> {
     let followers = FollowerId::ALL.map(FollowerId::name);
     StageId::ALL

@@ -1,15 +1,6 @@
 //! Configurations: TOML that is read strictly and overridden key by key, and the settings of a
-//! recording that is played without a configuration.
-//!
-//! - [`MethodConfig`]: the settings of the method alone, for a program that computes without
-//!   processes;
-//! - [`paths`]: configurations by path or by name, and the files that they name;
-//! - [`automatic`](automatic()): the settings of a recording without a configuration;
-//!
-//! and with the feature `run`:
-//! - `Configuration`: the settings of a run of processes, with the sections of `gyre-run`;
-//! - `open`: the scans that a configuration names;
-//! - `schema`: the schema and the reference, made from the structures.
+//! recording that is played without a configuration. [`MethodConfig`] has the settings of the method
+//! alone; with the feature `run`, `Configuration` has those of a run of processes.
 
 mod automatic;
 pub mod calibration;
@@ -34,6 +25,4 @@ pub use error::ConfigurationError;
 pub use masks::{describe_masks, describe_masks_in_process, describe_objects};
 pub use method::MethodConfig;
 #[cfg(feature = "run")]
-pub use scans::{
-    Played, SourceError, fingerprint, gnss_log, open, simulated_samples, with_stored_options,
-};
+pub use scans::{Played, fingerprint, gnss_log, open, simulated_samples, with_stored_options};

@@ -17,16 +17,11 @@ use crate::{
 /// sections, which are for a run of processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MethodConfig {
-    /// The format of the recording, and the constants of its radar.
     pub dataset: DatasetOptions,
-    /// The settings of the method: the sections from `raster` to `doppler`.
     #[serde(flatten)]
     pub odometry: OdometryConfig,
-    /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
-    /// The fixes that the corrected trajectory is made with.
     pub gnss: GnssConfig,
-    /// The tracking of moving objects.
     pub objects: ObjectsConfig,
 }
 
@@ -34,7 +29,6 @@ pub struct MethodConfig {
 /// checked.
 macro_rules! sections {
     (checked: $($checked:ident)*; unchecked: $($unchecked:ident)*; others: $($other:ident)*) => {
-        /// The names of the sections.
         pub const SECTIONS: &[&str] = &[
             $(stringify!($checked),)* $(stringify!($unchecked),)* $(stringify!($other),)*
         ];
@@ -50,10 +44,9 @@ macro_rules! sections {
             })
         }
 
-        /// Checks the ranges of all values.
-        pub fn validate(&self) -> Result<(), ConfigurationError> {
-            $(within(stringify!($checked), self.odometry.$checked.validate())?;)*
-            within("gnss", self.gnss.validate())
+        pub fn check(odometry: &OdometryConfig, gnss: &GnssConfig) -> Result<(), ConfigurationError> {
+            $(within(stringify!($checked), odometry.$checked.validate())?;)*
+            within("gnss", gnss.validate())
         }
     };
 }

@@ -1,35 +1,22 @@
 //! The scans that a configuration names: a recording, or a simulation that is rendered while it is
 //! read.
 
-use std::path::Path;
+use std::{error::Error, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
-    check_first_scan,
+    Dataset, Fingerprint, GnssLog, GyroLog, OpenError, ScanSamples, WheelLog, check_first_scan,
 };
 use gyre_run::PlayedFrom;
 use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
-use gyre_simulator::{SimulatedDrive, SimulatorError};
-use thiserror::Error;
+use gyre_simulator::SimulatedDrive;
 
 use crate::configuration::Configuration;
 
-/// Why the scans of a configuration cannot be read.
-#[derive(Debug, Error)]
-pub enum SourceError {
-    #[error(transparent)]
-    Simulator(#[from] SimulatorError),
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// The log of the gyro, of the wheels or of the GNSS receiver cannot be used.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error("{0}")]
-    Configuration(String),
-}
+/// Why the scans of a configuration, or the logs of its sensors, cannot be read.
+type Failure = Box<dyn Error + Send + Sync>;
 
-fn refused<T>(reason: &str) -> Result<T, SourceError> {
-    Err(SourceError::Configuration(reason.to_owned()))
+fn refused<T>(reason: &str) -> Result<T, Failure> {
+    Err(reason.into())
 }
 
 pub struct Played {
@@ -39,7 +26,7 @@ pub struct Played {
     pub samples: ScanSamples,
 }
 
-pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
+pub fn open(configuration: &Configuration) -> Result<Played, Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;
     if configuration.is_radar() {
@@ -48,34 +35,31 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
             "the configuration is of {radar}, but this needs a recording: name one"
         ));
     }
-    if let Some(simulation) = configuration.streamed() {
-        let drive = SimulatedDrive::new(simulation)?;
-        let mut dataset = drive.open(options)?;
-        check_first(configuration, dataset.as_ref())?;
-        check_doppler(&method.doppler, dataset.as_mut())?;
-        return Ok(Played {
-            samples: simulated_samples(&drive, (&method.gyro, &method.wheels), dataset.as_mut())?,
-            dataset,
-            truth: Some(drive.ground_truth_tum()),
-        });
-    }
-    if data.as_os_str().is_empty() {
-        return refused(
-            "no dataset is named: name its folder, or source.data in the configuration, or add a section [simulation]",
-        );
-    }
-    let mut dataset = gyre_recording::open(data, options)?;
+    let drive = configuration.streamed().map(SimulatedDrive::new);
+    let drive = drive.transpose()?;
+    let mut dataset = match &drive {
+        Some(drive) => drive.open(options)?,
+        None if data.as_os_str().is_empty() => {
+            return refused(
+                "no dataset is named: name its folder, or source.data in the configuration, or add a section [simulation]",
+            );
+        }
+        None => gyre_recording::open(data, options)?,
+    };
     check_first(configuration, dataset.as_ref())?;
     check_doppler(&method.doppler, dataset.as_mut())?;
+    let (gyro, wheels) = (&method.gyro, &method.wheels);
     Ok(Played {
-        samples: ScanSamples::open(&method.gyro, &method.wheels, data, dataset.as_mut())?,
+        samples: match &drive {
+            Some(drive) => simulated_samples(drive, (gyro, wheels), dataset.as_mut())?,
+            None => ScanSamples::open(gyro, wheels, data, dataset.as_mut())?,
+        },
         dataset,
-        truth: None,
+        truth: drive.map(|drive| drive.ground_truth_tum()),
     })
 }
 
-/// Checks that the first scan to play is one of those that there are.
-fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), SourceError> {
+fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), Failure> {
     let (first, scans) = (configuration.source.first, dataset.scans());
     match first >= scans.end && !scans.is_empty() {
         true => refused(&format!(
@@ -90,7 +74,7 @@ fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(
 }
 
 /// Checks that the radar reports its velocity by Doppler, if Doppler is used.
-fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
+fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), Failure> {
     match doppler.is_used().then(|| check_first_scan(dataset)) {
         Some(Err(reason)) => refused(&format!(
             "doppler.kind is `auto`, but {reason}; with doppler.kind = \"none\" it is not used"
@@ -105,7 +89,7 @@ pub fn simulated_samples(
     drive: &SimulatedDrive,
     (gyro, wheels): (&GyroConfig, &WheelsConfig),
     dataset: &mut dyn Dataset,
-) -> Result<ScanSamples, SourceError> {
+) -> Result<ScanSamples, Failure> {
     let path = Path::new("simulation");
     let turns = match gyro.kind {
         GyroKind::Auto => {
@@ -134,7 +118,7 @@ pub fn simulated_samples(
 
 /// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
 /// results in `out`; `None` without GNSS.
-pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, SourceError> {
+pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, Failure> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
     match config.kind == GnssKind::Auto && !is_in_folder {
@@ -157,7 +141,7 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
 }
 
 /// Returns the identification of a recording; `None`: its configuration does.
-pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
+pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, Failure> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
     if !plays_scans || configuration.streamed().is_some() {
         return Ok(None);

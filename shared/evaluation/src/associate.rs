@@ -13,7 +13,7 @@ use crate::{
 /// A trajectory: poses, and their stamps where they have any.
 #[derive(Debug, Clone, Copy)]
 pub struct TimedPoses<'a> {
-    /// One stamp a pose, ns, in order. Association by index ignores them.
+    /// One stamp a pose, ns, in order; empty without stamps.
     pub stamps_ns: &'a [i64],
     pub poses: &'a [Pose],
 }
@@ -23,7 +23,7 @@ impl<'a> TimedPoses<'a> {
         Self { stamps_ns, poses }
     }
 
-    /// The poses without stamps, as in KITTI files: for association by index.
+    /// The poses without stamps, as in KITTI files.
     pub fn untimed(poses: &'a [Pose]) -> Self {
         Self {
             stamps_ns: &[],
@@ -32,30 +32,10 @@ impl<'a> TimedPoses<'a> {
     }
 }
 
-/// The rule that associates estimated poses with ground-truth poses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Association {
-    /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the
-    /// shorter way round.
-    Time {
-        /// The widest gap between two stamps of the ground truth that is interpolated across, ns;
-        /// wider if its own steps are: see [`max_gap_ns`].
-        max_gap_ns: i64,
-    },
-    /// Pose `k` belongs to pose `k`; the longer list is cut to the shorter.
-    Index,
-}
+/// The widest gap between two stamps of the ground truth that is interpolated across, ns; wider if
+/// its own steps are: see [`max_gap_ns`].
+const LEAST_GAP_NS: i64 = 1_000_000_000;
 
-impl Default for Association {
-    /// Returns association by time, across gaps of up to 1 s.
-    fn default() -> Self {
-        Self::Time {
-            max_gap_ns: 1_000_000_000,
-        }
-    }
-}
-
-/// The numbers of poses that were associated and left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
@@ -76,39 +56,18 @@ pub enum Coverage {
     },
 }
 
-impl Coverage {
-    /// Estimated poses with a ground-truth pose.
-    pub fn matched(&self) -> usize {
-        match *self {
-            Coverage::Time { matched, .. } | Coverage::Index { matched, .. } => matched,
-        }
-    }
-
-    /// Estimated poses without a ground-truth pose.
-    pub fn left_out(&self) -> usize {
-        match *self {
-            Coverage::Time {
-                outside_span,
-                in_gaps,
-                ..
-            } => outside_span + in_gaps,
-            Coverage::Index {
-                estimate_surplus, ..
-            } => estimate_surplus,
-        }
-    }
-}
-
+/// Interpolates the ground truth at the stamps of the estimate: positions linearly, yaw the shorter
+/// way round. If one of them has no stamps, pose `k` belongs to pose `k`, and the longer list is cut
+/// to the shorter.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
-    association: Association,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     require_poses(ESTIMATE, estimate.poses)?;
     require_poses(TRUTH, truth.poses)?;
-    match association {
-        Association::Time { max_gap_ns } => by_time(estimate, truth, max_gap_ns),
-        Association::Index => by_index(estimate.poses, truth.poses),
+    match estimate.stamps_ns.is_empty() || truth.stamps_ns.is_empty() {
+        true => by_index(estimate.poses, truth.poses),
+        false => by_time(estimate, truth),
     }
 }
 
@@ -133,11 +92,10 @@ fn by_index(
 fn by_time(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
-    least_gap_ns: i64,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-    let estimate_ns = require_stamps(ESTIMATE, &estimate)?;
-    let truth_ns = require_stamps(TRUTH, &truth)?;
-    let max_gap_ns = max_gap_ns(truth.stamps_ns, least_gap_ns);
+    require_stamps(ESTIMATE, &estimate)?;
+    require_stamps(TRUTH, &truth)?;
+    let max_gap_ns = max_gap_ns(truth.stamps_ns, LEAST_GAP_NS);
     let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
     for (&stamp_ns, pose) in estimate.stamps_ns.iter().zip(estimate.poses) {
@@ -151,15 +109,13 @@ fn by_time(
         }
     }
     let matched = kept.len();
-    if matched == 0
-        && in_gaps == 0
-        && let (Some(estimate_ns), Some(truth_ns)) = (estimate_ns, truth_ns)
-    {
-        let span_s = |(first_ns, last_ns): (i64, i64)| {
-            let [first_s, last_s] = [first_ns, last_ns].map(|ns| ns as f64 * 1e-9);
+    if matched == 0 && in_gaps == 0 {
+        let span_s = |stamps_ns: &[i64]| {
+            let ends = [stamps_ns[0], stamps_ns[stamps_ns.len() - 1]];
+            let [first_s, last_s] = ends.map(|ns| ns as f64 * 1e-9);
             format!("{first_s:.3} s to {last_s:.3} s")
         };
-        let (estimate, truth) = (span_s(estimate_ns), span_s(truth_ns));
+        let (estimate, truth) = (span_s(estimate.stamps_ns), span_s(truth.stamps_ns));
         return Err(EvaluationError(format!(
             "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
         )));
@@ -177,12 +133,11 @@ fn by_time(
     Ok((MatchedPoses::new(kept, true_poses)?, coverage))
 }
 
-/// Returns the first and last stamp, `None` of an empty trajectory; refuses a wrong count and
-/// decreasing stamps.
+/// Refuses a wrong count of stamps, and stamps that decrease.
 pub(crate) fn require_stamps(
     side: &str,
     trajectory: &TimedPoses<'_>,
-) -> Result<Option<(i64, i64)>, EvaluationError> {
+) -> Result<(), EvaluationError> {
     let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
     if stamps.len() != poses {
         let stamps = stamps.len();
@@ -196,7 +151,7 @@ pub(crate) fn require_stamps(
             "the stamps of the {side} decrease at pose {k}: {later} ns after {before} ns"
         )));
     }
-    Ok(stamps.first().copied().zip(stamps.last().copied()))
+    Ok(())
 }
 
 pub(crate) enum At {
@@ -259,7 +214,7 @@ mod tests {
         let (estimate, truth) = (line(estimate_ns.len()), line(truth_ns.len()));
         let estimate = TimedPoses::new(estimate_ns, &estimate);
         let truth = TimedPoses::new(truth_ns, &truth);
-        associate(estimate, truth, Association::default())
+        associate(estimate, truth)
     }
 
     #[test]
@@ -268,7 +223,6 @@ mod tests {
         let (matched, _) = associate(
             TimedPoses::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
             TimedPoses::new(&seconds(&[10.0, 11.0]), &truth),
-            Association::default(),
         )
         .unwrap();
         let between = matched.truth()[1];
@@ -288,7 +242,6 @@ mod tests {
             max_gap_ns: 3 * SECOND / 2,
         };
         assert_eq!(coverage, expected);
-        assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
     }
@@ -298,20 +251,20 @@ mod tests {
         let jittering = |k: i64| k * SECOND + 2_000_000 * (k % 3);
         let slow: Vec<i64> = (0..60).map(jittering).collect();
         let fast: Vec<i64> = (0..200).map(|k| k * SECOND / 4).collect();
-        let left_out = |estimate: &[i64], truth: &[i64]| by_time(estimate, truth).unwrap().1;
-        assert_eq!(left_out(&fast, &slow).left_out(), 0);
-        for (estimate, expected) in [([4_500, 7_000, 9_999], 0), ([3_000, 7_000, 9_000], 1)] {
-            assert_eq!(left_out(&estimate, &[5_000, 9_000]).left_out(), expected);
+        let matched = |estimate: &[i64], truth: &[i64]| by_time(estimate, truth).unwrap().0.len();
+        assert_eq!(matched(&fast, &slow), fast.len());
+        for (estimate, expected) in [([4_500, 7_000, 9_999], 3), ([3_000, 7_000, 9_000], 2)] {
+            assert_eq!(matched(&estimate, &[5_000, 9_000]), expected);
         }
         let whole = [i64::MIN, i64::MAX];
-        assert_eq!(left_out(&[i64::MIN, 0, i64::MAX], &whole).matched(), 2);
+        assert_eq!(matched(&[i64::MIN, 0, i64::MAX], &whole), 2);
     }
 
     #[test]
     fn association_by_index_cuts_the_longer_trajectory_and_counts() {
         let (estimate, truth) = (line(3), line(5));
         let (estimate, truth) = (TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth));
-        let (matched, coverage) = associate(estimate, truth, Association::Index).unwrap();
+        let (matched, coverage) = associate(estimate, truth).unwrap();
         let expected = Coverage::Index {
             matched: 3,
             estimate_surplus: 0,
@@ -336,8 +289,8 @@ mod tests {
         }
         let (poses, empty) = (line(3), TimedPoses::untimed(&[]));
         let short = TimedPoses::new(&two, &poses);
-        let refused = associate(short, short, Association::default()).unwrap_err();
+        let refused = associate(short, short).unwrap_err();
         assert!(refused.0.contains("estimate has 3 poses but 2 stamps"));
-        assert!(associate(empty, empty, Association::Index).is_err());
+        assert!(associate(empty, empty).is_err());
     }
 }

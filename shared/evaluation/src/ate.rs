@@ -9,13 +9,11 @@ use serde::{Serialize, Serializer};
 
 use crate::MatchedPoses;
 
-/// Absolute trajectory error after SE(2) alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ate {
     /// Root of the mean squared distance, m: the figure that papers give.
     pub rmse_m: f64,
     pub mean_m: f64,
-    /// Largest distance, m.
     pub max_m: f64,
     /// The alignment: the fixed frame of the estimate in the fixed frame of the ground truth.
     #[serde(serialize_with = "serialize_isometry")]

@@ -87,7 +87,6 @@ impl Evaluation {
 
 impl fmt::Display for Coverage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let all = self.matched() + self.left_out();
         match *self {
             Coverage::Time {
                 matched,
@@ -96,8 +95,9 @@ impl fmt::Display for Coverage {
                 max_gap_ns,
             } => write!(
                 f,
-                "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the span of the ground truth, \
+                "by time: {matched} of {} estimated poses; left out: {outside_span} outside the span of the ground truth, \
                  {in_gaps} in its gaps above {} s",
+                matched + outside_span + in_gaps,
                 (max_gap_ns as f64 * 1e-7).round() / 100.0
             ),
             Coverage::Index {
@@ -105,6 +105,7 @@ impl fmt::Display for Coverage {
                 estimate_surplus,
                 truth_surplus,
             } => {
+                let all = matched + estimate_surplus;
                 write!(f, "by index: {matched} of {all} estimated poses")?;
                 match (estimate_surplus, truth_surplus) {
                     (0, 0) => write!(f, ", as many as the ground truth has"),

@@ -1,11 +1,9 @@
 //! Errors of an evaluation's input.
 
-/// The reason why two trajectories cannot be compared, a sentence.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct EvaluationError(pub(crate) String);
 
-/// The names of the two trajectories.
 pub(crate) const ESTIMATE: &str = "estimate";
 pub(crate) const TRUTH: &str = "ground truth";
 

@@ -58,7 +58,6 @@ pub enum HeadingFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sign {
     AsGiven,
-    /// The opposite sign.
     Negated,
     /// Neither: a straight path equals its mirror image.
     Open,

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::{
     MatchedPoses,
-    segments::{PerLength, Segment, segments},
+    segments::{PerLength, Segment},
 };
 
 /// The KITTI odometry errors, means over all segments of all lengths.
@@ -44,10 +44,7 @@ pub struct KittiLength {
 /// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s
 /// at 4 Hz).
 pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
-    let mut errors = PerLength::new();
-    for segment in segments(&matched.distance_m(), step) {
-        errors.add(segment.length, segment_error(matched, segment));
-    }
+    let errors = PerLength::of(matched, step, |segment| segment_error(matched, segment));
     let ([translation_percent, rotation_deg_per_100m], segments) = errors.mean()?;
     let by_length = errors.means();
     let by_length = by_length.map(

@@ -1,36 +1,10 @@
 //! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES,
-//! with plots; and of tracked objects.
+//! with plots; and of tracked objects. [`evaluate`] is the whole method, one line a step.
 //!
 //! The crate computes on slices of poses and stamps; files are read elsewhere. A
 //! [`Pose`](gyre_geometry::Pose) is the pose of the sensor in a fixed frame (REP-103: x forward, y
 //! left, yaw counter-clockwise); stamps are in ns. Estimate and ground truth may have different
 //! fixed frames.
-//!
-//! Reading order:
-//! - [`report`]: [`evaluate`] is the whole method, one line a step;
-//! - [`mod@associate`]: association of estimated poses with ground-truth poses;
-//! - [`handedness`]: frames with y to the right or clockwise yaw, detected and converted;
-//! - [`mod@kitti`], [`mod@seg`], [`mod@ate`], [`mod@end`], [`mod@rpe`]: one metric each, on
-//!   [`MatchedPoses`];
-//! - [`mod@loops`]: places that are seen again, against a trajectory or the ground truth itself;
-//! - [`motions`]: reported motions with covariances, associated with the ground truth;
-//! - [`mod@nees`], [`mod@bands`]: consistency of these covariances, as figures and over time;
-//! - [`objects`]: tracked objects against true ones;
-//! - [`plot`]: trajectory, errors and error bands as SVG.
-//!
-//! ```
-//! use gyre_evaluation::{Association, Options, TimedPoses, evaluate};
-//! use gyre_geometry::Pose;
-//!
-//! let truth: Vec<_> = (0..200).map(|k| Pose::translation(k as f64, 0.0)).collect();
-//! let estimate: Vec<_> = (0..200).map(|k| Pose::translation(1.01 * k as f64, 5.0)).collect();
-//! let options = Options { association: Association::Index, ..Options::default() };
-//! let evaluation = evaluate(TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth), &options)?;
-//! let kitti = evaluation.kitti.as_ref().ok_or("shorter than 100 m")?;
-//! assert!((kitti.translation_percent - 1.01).abs() < 1e-9); // 1 % of the 101 m that exceed 100 m
-//! println!("{evaluation}");
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod associate;
 pub mod ate;
@@ -54,7 +28,7 @@ pub mod seg;
 mod segments;
 mod truth_sigma;
 
-pub use associate::{Association, Coverage, TimedPoses, associate};
+pub use associate::{Coverage, TimedPoses, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
 pub use end::{EndError, end_error};
@@ -67,11 +41,9 @@ pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use objects::{
-    Hota, ObjectBand, ObjectErrors, ObjectOptions, ObjectScan, TrackedObject, TrueObject,
-    object_errors,
+    Hota, ObjectBand, ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors,
 };
-pub use plot::PlotError;
-pub use report::{Evaluation, Options, evaluate};
+pub use report::{Evaluation, STEP, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};
 pub use segments::SEGMENT_LENGTHS_M;

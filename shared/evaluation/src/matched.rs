@@ -131,11 +131,4 @@ mod tests {
             assert!(refused.contains(words), "{refused}");
         }
     }
-
-    #[test]
-    fn distance_is_the_path_length_of_the_ground_truth() {
-        let truth = [(1.0, 1.0), (4.0, 5.0), (4.0, 3.0)].map(|(x, y)| pose(x, y, 0.0));
-        let matched = MatchedPoses::new(vec![Pose::identity(); 3], truth.to_vec()).unwrap();
-        assert_eq!(matched.distance_m(), [0.0, 5.0, 7.0]);
-    }
 }

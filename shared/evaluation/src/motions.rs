@@ -9,12 +9,9 @@ use crate::{
     matched::require_poses,
 };
 
-/// A motion with its stamps and covariance, as an odometry reports it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedMotion {
-    /// Stamp of the earlier frame, ns.
     pub from_ns: i64,
-    /// Stamp of the later frame, ns.
     pub to_ns: i64,
     pub estimate: OdometryMotion,
 }
@@ -28,7 +25,6 @@ pub struct Part {
 }
 
 impl Part {
-    /// The whole drive.
     pub const ALL: Self = Self { from: 0.0, to: 1.0 };
 
     /// The part from one share of the duration to another; `None` unless 0 <= `from` < `to` <= 1.
@@ -60,7 +56,6 @@ impl Part {
 pub struct MatchedMotions {
     pub(crate) chains: Vec<Chain>,
     pub motions: usize,
-    /// Motions without ground truth at both ends.
     pub without_truth: usize,
     /// Motions without a positive definite covariance: left out, and the chain ends there.
     pub without_covariance: usize,

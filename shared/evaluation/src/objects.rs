@@ -40,7 +40,6 @@ pub struct TrueObject {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedObject {
     pub id: u64,
-    /// Centre, m.
     pub position: Point2<f64>,
     /// Velocity over ground, m/s.
     pub velocity: Vector2<f64>,
@@ -56,27 +55,14 @@ pub struct ObjectScan {
     pub tracked: Vec<TrackedObject>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectOptions {
-    pub max_range_m: f64,
-    /// Lowest speed of a required object, m/s.
-    pub min_speed_mps: f64,
-    /// Scans within that range that have shown it, including the present one.
-    pub min_scans: usize,
-    /// Largest distance between the centres of a pair, m: the length of a car.
-    pub gate_m: f64,
-}
-
-impl Default for ObjectOptions {
-    fn default() -> Self {
-        Self {
-            max_range_m: 60.0,
-            min_speed_mps: 2.0,
-            min_scans: 3,
-            gate_m: 4.0,
-        }
-    }
-}
+/// The largest range of a required object, m.
+const MAX_RANGE_M: f64 = 60.0;
+/// Lowest speed of a required object, m/s.
+const MIN_SPEED_MPS: f64 = 2.0;
+/// Scans within that range that have shown a required object, including the present one.
+const MIN_SCANS: usize = 3;
+/// Largest distance between the centres of a pair, m: the length of a car.
+const GATE_M: f64 = 4.0;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
@@ -98,19 +84,15 @@ pub struct ObjectErrors {
     #[serde(flatten)]
     pub hota: Hota,
     pub switches_per_object: f64,
-    /// Root mean square of the distance of the centres, m.
     pub position_rmse_m: f64,
     /// Root mean square of the difference of the velocities, m/s; over pairs whose true velocity is
     /// known, as the next two.
     pub velocity_rmse_mps: f64,
-    /// Root mean square of the difference of the headings, degrees.
     pub heading_rmse_deg: f64,
     /// Mean of the squared error of the velocity by its covariance, over its two dimensions: 1 if
     /// the covariance is right.
     pub velocity_nees: f64,
-    /// The same by range, m.
     pub by_range: Vec<ObjectBand>,
-    /// The same by speed, m/s.
     pub by_speed: Vec<ObjectBand>,
 }
 
@@ -145,10 +127,15 @@ impl fmt::Display for ObjectErrors {
     }
 }
 
-pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErrors {
+pub fn object_errors(scans: &[ObjectScan]) -> ObjectErrors {
+    errors_from_scan(MIN_SCANS, scans)
+}
+
+/// Returns the errors where an object is required from its scan of this number on.
+fn errors_from_scan(min_scans: usize, scans: &[ObjectScan]) -> ObjectErrors {
     let mut count = Count::default();
     for scan in scans {
-        count.add(scan, options);
+        count.add(scan, min_scans);
     }
     count.errors(scans.len())
 }
@@ -167,11 +154,11 @@ struct Count {
 }
 
 impl Count {
-    fn add(&mut self, scan: &ObjectScan, options: &ObjectOptions) {
-        let (required, others) = self.split(scan, options);
+    fn add(&mut self, scan: &ObjectScan, min_scans: usize) {
+        let (required, others) = self.split(scan, min_scans);
         let tracked = scan.tracked.iter().filter(|tracked| tracked.moving);
         let tracked: Vec<TrackedObject> = tracked.copied().collect();
-        let pairs = self.pairs(&required, &tracked, options.gate_m);
+        let pairs = self.pairs(&required, &tracked);
         let found_as = |truth: usize| {
             let pair = pairs.iter().find(|pair| pair.0 == truth)?;
             Some(&tracked[pair.1])
@@ -180,8 +167,8 @@ impl Count {
             self.add_required(truth, found_as(index));
         }
         let is_excused = |tracked: &TrackedObject| {
-            let near = |other: &TrueObject| distance_m(other, tracked) <= options.gate_m;
-            range_m(&tracked.position) > options.max_range_m || others.iter().any(near)
+            let near = |other: &TrueObject| distance_m(other, tracked) <= GATE_M;
+            range_m(&tracked.position) > MAX_RANGE_M || others.iter().any(near)
         };
         let is_matched = |found: usize| pairs.iter().any(|pair| pair.1 == found);
         let (matched, rest): (Vec<usize>, Vec<usize>) =
@@ -194,39 +181,30 @@ impl Count {
         let judged = matched.iter().chain(&wrong).map(|found| &tracked[*found]);
         let judged: Vec<&TrackedObject> = judged.collect();
         self.compared
-            .push(Compared::new(&required, &judged, options.gate_m));
+            .push(Compared::new(&required, &judged, GATE_M));
     }
 
-    fn split(
-        &mut self,
-        scan: &ObjectScan,
-        options: &ObjectOptions,
-    ) -> (Vec<TrueObject>, Vec<TrueObject>) {
+    fn split(&mut self, scan: &ObjectScan, min_scans: usize) -> (Vec<TrueObject>, Vec<TrueObject>) {
         let is_required = |truth: &TrueObject| {
-            let is_near = range_m(&truth.position) <= options.max_range_m;
+            let is_near = range_m(&truth.position) <= MAX_RANGE_M;
             let seen = self.seen.entry(truth.id).or_default();
             *seen += usize::from(is_near && truth.is_seen);
             let speed_mps = truth.velocity.map_or(f64::INFINITY, |it| it.norm());
             is_near
                 && truth.is_seen
                 && truth.is_vehicle
-                && speed_mps > options.min_speed_mps
-                && *seen >= options.min_scans
+                && speed_mps > MIN_SPEED_MPS
+                && *seen >= min_scans
         };
         scan.truth.iter().copied().partition(is_required)
     }
 
     /// Pairs true and tracked objects, by their places in the lists: those that were a pair before
     /// and still fit, then the rest, so that as many as possible fit and the distances are least.
-    fn pairs(
-        &self,
-        truth: &[TrueObject],
-        tracked: &[TrackedObject],
-        gate_m: f64,
-    ) -> Vec<(usize, usize)> {
+    fn pairs(&self, truth: &[TrueObject], tracked: &[TrackedObject]) -> Vec<(usize, usize)> {
         let within = |t: usize, f: usize| {
             let distance_m = distance_m(&truth[t], &tracked[f]);
-            (distance_m <= gate_m).then_some(distance_m)
+            (distance_m <= GATE_M).then_some(distance_m)
         };
         let kept = |t: usize| {
             let id = self.matches.get(&truth[t].id)?;
@@ -359,24 +337,20 @@ mod tests {
 
     /// The errors where each object is required from its first scan on.
     fn at_once(scans: &[ObjectScan]) -> ObjectErrors {
-        let options = ObjectOptions {
-            min_scans: 1,
-            ..ObjectOptions::default()
-        };
-        object_errors(scans, &options)
+        errors_from_scan(1, scans)
     }
 
     #[test]
     fn an_object_is_required_from_its_third_scan_on() {
         let scans = vec![scan(&[truth(1, 20.0)], &[]); 5];
-        let errors = object_errors(&scans, &ObjectOptions::default());
+        let errors = object_errors(&scans);
         assert_eq!((errors.objects, errors.required, errors.matched), (1, 3, 0));
         let hidden = TrueObject {
             is_seen: false,
             ..truth(1, 20.0)
         };
         let scans = vec![scan(&[hidden], &[]); 5];
-        assert_eq!(object_errors(&scans, &ObjectOptions::default()).required, 0);
+        assert_eq!(object_errors(&scans).required, 0);
     }
 
     #[test]

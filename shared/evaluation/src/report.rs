@@ -6,35 +6,20 @@ use gyre_geometry::Pose;
 use serde::Serialize;
 
 use crate::{
-    Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg,
-    TimedPoses, associate, ate, end_error, handedness::resolve_axes, kitti,
-    mounting::heading_offset_rad, rpe, seg,
+    Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, TimedPoses,
+    associate, ate, end_error, handedness::resolve_axes, kitti, mounting::heading_offset_rad, rpe,
+    seg,
 };
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
-    /// Poses from the start of a segment of KITTI and seg to the start of the next; published
-    /// figures use 10 or 4.
-    pub step: NonZeroUsize,
-    pub association: Association,
-}
-
-impl Default for Options {
-    /// Returns step 10 and association by time.
-    fn default() -> Self {
-        Self {
-            step: NonZeroUsize::MIN.saturating_add(9),
-            association: Association::default(),
-        }
-    }
-}
+/// Poses from the start of a segment of KITTI and seg to the start of the next; published figures
+/// use 10 or 4.
+pub const STEP: NonZeroUsize = NonZeroUsize::MIN.saturating_add(9);
 
 /// All metrics of one estimate. `Display` is a short table; `{:#}` adds a line for each segment
 /// length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
     pub coverage: Coverage,
-    /// The axes that were negated in the estimate.
     pub axes: Axes,
     /// Heading of the estimate minus heading of the ground truth, degrees, if all differ by one
     /// large angle: then the sensors are mounted differently, and metrics that use headings are
@@ -62,15 +47,15 @@ pub struct Evaluation {
     pub matched: MatchedPoses,
 }
 
-/// Compares `estimate` with `truth`.
+/// Compares `estimate` with `truth`, by segments that start at every `step`-th pose.
 ///
 /// A path that is too short for KITTI is not an error.
 pub fn evaluate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
-    options: &Options,
+    step: NonZeroUsize,
 ) -> Result<Evaluation, EvaluationError> {
-    let (matched, coverage) = associate(estimate, truth, options.association)?;
+    let (matched, coverage) = associate(estimate, truth)?;
     let (matched, axes) = resolve_axes(matched);
     let has_heading = axes.without_heading().is_none();
     let ate = ate(&matched);
@@ -84,9 +69,9 @@ pub fn evaluate(
         path_m: crate::matched::path_m(matched.truth()),
         estimated_path_m: crate::matched::path_m(matched.estimate()),
         truth_stands: moved_m < STANDING_M && travelled_m > MOVING_M,
-        kitti: has_heading.then(|| kitti(&matched, options.step)).flatten(),
+        kitti: has_heading.then(|| kitti(&matched, step)).flatten(),
         ate,
-        seg: seg(&matched, options.step),
+        seg: seg(&matched, step),
         end: has_heading.then(|| end_error(&matched)),
         rpe: has_heading.then(|| rpe(&matched)),
         matched,
@@ -116,12 +101,8 @@ mod tests {
     use gyre_geometry::pose;
 
     fn evaluated(estimate: &[Pose], truth: &[Pose]) -> Evaluation {
-        let options = Options {
-            association: Association::Index,
-            ..Options::default()
-        };
         let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
-        evaluate(estimate, truth, &options).unwrap()
+        evaluate(estimate, truth, STEP).unwrap()
     }
 
     #[test]

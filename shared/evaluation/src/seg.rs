@@ -4,11 +4,7 @@ use std::num::NonZeroUsize;
 
 use serde::Serialize;
 
-use crate::{
-    MatchedPoses,
-    ate::aligned_rmse_m,
-    segments::{PerLength, segments},
-};
+use crate::{MatchedPoses, ate::aligned_rmse_m, segments::PerLength};
 
 /// The RMSE of the positions of a segment after its own SE(2) alignment, in % of its length.
 ///
@@ -36,12 +32,11 @@ pub struct SegLength {
 /// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned
 /// separately; `None` if the path is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
-    let mut errors = PerLength::new();
-    for segment in segments(&matched.distance_m(), step) {
+    let errors = PerLength::of(matched, step, |segment| {
         let range = segment.first..=segment.last;
         let rmse_m = aligned_rmse_m(&matched.estimate()[range.clone()], &matched.truth()[range]);
-        errors.add(segment.length, [100.0 * rmse_m / segment.length_m()]);
-    }
+        [100.0 * rmse_m / segment.length_m()]
+    });
     let ([percent], segments) = errors.mean()?;
     let by_length = errors.means();
     let by_length = by_length.map(|(length_m, [percent], segments)| SegLength {

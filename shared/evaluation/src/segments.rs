@@ -3,6 +3,8 @@
 
 use std::num::NonZeroUsize;
 
+use crate::MatchedPoses;
+
 pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
 /// One segment: from pose `first` to pose `last`, both included.
@@ -25,10 +27,7 @@ impl Segment {
 /// length.
 ///
 /// `distance_m` does not decrease. A length that the rest of the path does not exceed is skipped.
-pub(crate) fn segments(
-    distance_m: &[f64],
-    step: NonZeroUsize,
-) -> impl Iterator<Item = Segment> + '_ {
+fn segments(distance_m: &[f64], step: NonZeroUsize) -> impl Iterator<Item = Segment> + '_ {
     let ends = move |first: usize| {
         (0..SEGMENT_LENGTHS_M.len()).filter_map(move |length| {
             let limit = distance_m[first] + SEGMENT_LENGTHS_M[length];
@@ -50,18 +49,23 @@ pub(crate) struct PerLength<const N: usize> {
 }
 
 impl<const N: usize> PerLength<N> {
-    pub fn new() -> Self {
-        Self {
+    /// Sums the errors of all segments that start at every `step`-th pose.
+    pub fn of(
+        matched: &MatchedPoses,
+        step: NonZeroUsize,
+        error: impl Fn(Segment) -> [f64; N],
+    ) -> Self {
+        let mut of = Self {
             sums: [[0.0; N]; SEGMENT_LENGTHS_M.len()],
             counts: [0; SEGMENT_LENGTHS_M.len()],
+        };
+        for segment in segments(&matched.distance_m(), step) {
+            of.counts[segment.length] += 1;
+            let sums = of.sums[segment.length].iter_mut();
+            sums.zip(error(segment))
+                .for_each(|(sum, value)| *sum += value);
         }
-    }
-
-    pub fn add(&mut self, length: usize, values: [f64; N]) {
-        self.counts[length] += 1;
-        for (sum, value) in self.sums[length].iter_mut().zip(values) {
-            *sum += value;
-        }
+        of
     }
 
     /// Returns the mean over all segments of all lengths, and their count; `None` without a
@@ -81,52 +85,5 @@ impl<const N: usize> PerLength<N> {
             .map(|((&length_m, sums), &count)| {
                 (length_m, sums.map(|sum| sum / count as f64), count)
             })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const EVERY: NonZeroUsize = NonZeroUsize::MIN;
-
-    #[test]
-    fn a_segment_ends_strictly_beyond_its_length() {
-        let distance = [0.0, 100.0, 100.0, 101.0];
-        let found: Vec<_> = segments(&distance, EVERY).collect();
-        let [
-            Segment {
-                first,
-                last,
-                length,
-            },
-        ] = found[..]
-        else {
-            panic!("{found:?}");
-        };
-        assert_eq!((first, last, length), (0, 3, 0));
-        assert_eq!(segments(&[0.0, 100.0], EVERY).count(), 0);
-    }
-
-    #[test]
-    fn segments_of_every_length_start_at_every_step() {
-        let distance: Vec<f64> = (0..=250).map(f64::from).collect();
-        let step = NonZeroUsize::new(50).unwrap_or(EVERY);
-        let found = segments(&distance, step).map(|s| (s.first, s.last, s.length));
-        let found: Vec<_> = found.collect();
-        let expected = [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)];
-        assert_eq!(found, expected);
-    }
-
-    #[test]
-    fn means_leave_out_lengths_without_a_segment() {
-        let mut per_length = PerLength::<1>::new();
-        assert_eq!(per_length.mean(), None);
-        per_length.add(0, [1.0]);
-        per_length.add(0, [3.0]);
-        per_length.add(2, [8.0]);
-        assert_eq!(per_length.mean(), Some(([4.0], 3)));
-        let means: Vec<_> = per_length.means().collect();
-        assert_eq!(means, [(100.0, [2.0], 2), (300.0, [8.0], 1)]);
     }
 }

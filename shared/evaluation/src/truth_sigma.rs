@@ -7,7 +7,6 @@ use serde::Serialize;
 /// Standard deviations of each ground-truth pose, independent from pose to pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct TruthSigma {
-    /// Of x, and of y, m.
     pub position_m: f64,
     pub yaw_rad: f64,
 }
@@ -21,23 +20,5 @@ impl TruthSigma {
         let pose = Matrix3::from_diagonal(&variances);
         let by_first = lever(truth.translation.x, truth.translation.y);
         by_first * pose * by_first.transpose() + pose
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use gyre_geometry::pose;
-
-    use super::*;
-
-    #[test]
-    fn an_uncertain_true_heading_adds_lateral_variance_to_a_long_motion() {
-        let sigma = TruthSigma {
-            position_m: 0.1,
-            yaw_rad: 0.01,
-        };
-        let noise = sigma.of_motion(&pose(100.0, 0.0, 0.0));
-        assert!((noise[(0, 0)] - 0.02).abs() < 1e-12 && (noise[(1, 1)] - 1.02).abs() < 1e-12);
-        assert!((noise[(2, 2)] - 2e-4).abs() < 1e-15 && (noise[(1, 2)] - 0.01).abs() < 1e-12);
     }
 }

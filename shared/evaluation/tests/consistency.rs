@@ -1,7 +1,5 @@
 //! NEES and error bands of motions whose covariance is known.
 
-use std::num::NonZeroUsize;
-
 use gyre_evaluation::{
     MatchedMotions, Nees, NeesFigure, NeesFigures, NeesOptions, TimedMotion, TimedPoses,
     TruthSigma, bands, nees, plot::bands_svg,
@@ -195,21 +193,6 @@ fn sigma_starts_at_zero_and_that_of_yaw_grows_with_the_root_of_time() {
     );
     assert_eq!(samples[100].time_s, 25.0);
     assert!((samples[100].sigma.z / covariance()[(2, 2)].sqrt() - 10.0).abs() < 1e-9);
-}
-
-#[test]
-fn lengths_without_a_segment_are_left_out() {
-    let drive = Drive::new(10, 1);
-    let lengths = [4, 11].into_iter().filter_map(NonZeroUsize::new).collect();
-    let options = NeesOptions {
-        lengths,
-        ..NeesOptions::default()
-    };
-    let nees = nees(&drive.matched(), &options);
-    let [length] = &nees.by_length[..] else {
-        panic!("{nees}");
-    };
-    assert_eq!((length.motions, length.all.segments), (4, 2));
 }
 
 #[test]

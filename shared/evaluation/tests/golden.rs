@@ -2,9 +2,9 @@
 
 use std::{fs, path::PathBuf};
 
-use crate::common::{by_index, chain};
-use gyre_evaluation::{Coverage, Evaluation};
-use gyre_geometry::{Pose, pose};
+use crate::common::by_index;
+use gyre_evaluation::Evaluation;
+use gyre_geometry::Pose;
 use nalgebra::{Complex, Unit};
 
 /// The folder of real data; without it the tests are skipped.
@@ -29,17 +29,6 @@ fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     text.lines().map(parse).collect()
 }
 
-/// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw
-/// clockwise.
-fn chained_csv(path: PathBuf) -> Vec<Pose> {
-    let mut motions = Vec::new();
-    for line in fs::read_to_string(path).unwrap().lines().skip(1) {
-        let field: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
-        motions.push(pose(field[2], field[3], field[7]));
-    }
-    chain(Pose::identity(), motions)
-}
-
 /// Returns translation (%) and rotation (deg/100 m) to five decimals, as published.
 fn five_decimals(evaluation: &Evaluation) -> [String; 2] {
     let kitti = evaluation.kitti.as_ref().unwrap();
@@ -61,30 +50,4 @@ fn kitti_errors_equal_the_published_figures_at_all_steps() {
         assert_eq!(five_decimals(&evaluation), expected, "step {step}");
         assert!(!evaluation.axes.y_negated && !evaluation.axes.heading_negated);
     }
-}
-
-#[test]
-fn kitti_errors_of_chained_motions_equal_the_published_figures_in_both_handednesses() {
-    let Some(data) = data() else { return };
-    let estimate = kitti_poses(data.join("golden/csv-chain/estimate.txt"));
-    let y_right =
-        chained_csv(data.join("trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv"));
-    let mirrored = |p: &Pose| pose(p.translation.x, -p.translation.y, -p.rotation.angle());
-    let y_left: Vec<_> = y_right.iter().map(mirrored).collect();
-    let evaluations = [&y_right, &y_left].map(|truth| by_index(&estimate, truth, 10));
-    for evaluation in &evaluations {
-        assert_eq!(five_decimals(evaluation), ["1.22286", "0.39305"]);
-        assert_eq!(evaluation.axes.y_negated, evaluation.axes.heading_negated);
-        assert!(matches!(
-            evaluation.coverage,
-            Coverage::Index {
-                matched: 8865,
-                estimate_surplus: 0,
-                ..
-            }
-        ));
-        println!("{evaluation:#}\n");
-    }
-    let mirrored = evaluations.map(|e| e.axes.y_negated);
-    assert_eq!(mirrored.iter().filter(|&&m| m).count(), 1, "{mirrored:?}");
 }

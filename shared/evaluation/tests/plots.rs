@@ -2,8 +2,8 @@
 
 use crate::common::{by_index, drive};
 use gyre_evaluation::{
-    Evaluation, PlotError,
-    plot::{errors_svg, trajectory_svg},
+    Evaluation,
+    plot::{errors_svg, path_svg, trajectory_svg},
 };
 use gyre_geometry::{Pose, pose};
 
@@ -35,7 +35,7 @@ const TRUTH: &str = "#787C82";
 fn axes_are_equal_and_y_points_up() {
     for side in [(30.0, 30.0), (400.0, 3.0), (2.0, 900.0)] {
         let corners = [(0.0, 0.0), (side.0, 0.0), (side.0, side.1)].map(|(x, y)| pose(x, y, 0.0));
-        let points = polyline(&trajectory_svg(&corners, None).unwrap(), ESTIMATE);
+        let points = polyline(&path_svg(&corners, 3, 0.0).unwrap(), ESTIMATE);
         let (right, up) = (points[1].0 - points[0].0, points[1].1 - points[2].1);
         let apart = (right / side.0 - up / side.1) * side.0.min(side.1);
         assert!(apart.abs() < 2.5, "{side:?}: {right} {up}");
@@ -45,7 +45,7 @@ fn axes_are_equal_and_y_points_up() {
 #[test]
 fn an_estimate_in_another_frame_is_drawn_over_its_ground_truth() {
     let e = evaluation(200);
-    let svg = trajectory_svg(e.matched.estimate(), Some(&e.matched)).unwrap();
+    let svg = trajectory_svg(&e.matched).unwrap();
     let (estimate, truth) = (polyline(&svg, ESTIMATE), polyline(&svg, TRUTH));
     assert_eq!(estimate.len(), truth.len());
     for (a, b) in estimate.iter().zip(&truth) {
@@ -66,13 +66,13 @@ fn long_paths_have_kitti_errors_and_short_ones_the_relative_pose_error() {
 
 #[test]
 fn paths_of_any_extent_are_drawn_and_missing_and_invalid_poses_are_errors() {
-    assert!(trajectory_svg(&[Pose::identity()], None).is_ok());
-    assert!(trajectory_svg(&[Pose::identity(); 9], None).is_ok());
-    assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
-    let invalid = trajectory_svg(&[pose(f64::NAN, 0.0, 0.0)], None);
-    assert!(matches!(invalid, Err(PlotError::Poses(_))));
+    assert!(path_svg(&[Pose::identity()], 1, 0.0).is_ok());
+    assert!(path_svg(&[Pose::identity(); 9], 9, 0.0).is_ok());
+    assert!(path_svg(&[], 0, 0.0).is_err());
+    let invalid = path_svg(&[pose(f64::NAN, 0.0, 0.0)], 1, 0.0);
+    assert!(invalid.unwrap_err().to_string().contains("pose 0"));
     for extent in [1e-9, 1.0, 1e4, 1e9] {
         let far = [pose(1e9 - extent, -1e9, 0.0), pose(1e9, extent - 1e9, 0.0)];
-        assert!(trajectory_svg(&far, None).unwrap().contains("<polyline"));
+        assert!(path_svg(&far, 2, 0.0).unwrap().contains("<polyline"));
     }
 }

@@ -10,12 +10,12 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
+use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma};
 use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    judgement::{Judgement, judge, judge_motions, note_time_offset, take_time_offset_out},
+    judgement::{Judgement, judge_by, judge_motions, note_time_offset, take_time_offset_out},
     odometry,
     out::{Content, Out, require_results},
     results::truth_of,
@@ -23,7 +23,6 @@ use crate::{
 
 pub use arguments::EvaluateArguments;
 
-/// Prints the errors of an estimate as a table or as JSON, and draws it.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {
         return evaluate_objects(arguments);
@@ -35,11 +34,7 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         true => offset = Some(take_time_offset_out(&estimate, &mut truth)?),
         false => note_time_offset(&estimate, &truth),
     }
-    let options = Options {
-        step: arguments.step,
-        ..Options::default()
-    };
-    let evaluation = judge(&estimate, &truth, options)?;
+    let evaluation = judge_by(&estimate, &truth, arguments.step)?;
     let motions = judged_motions(arguments, &file, &estimate, &truth, &evaluation)?;
     let options = NeesOptions {
         lengths: arguments.nees_lengths.clone(),
@@ -67,12 +62,11 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints how well the objects of a run agree with the true ones.
 fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
-    let (Some(run), Some(truth)) = (&arguments.estimate, &arguments.ground_truth) else {
+    let Some(truth) = &arguments.ground_truth else {
         return Err("name a run and the recording with its true objects: gyre evaluate --objects RUN RECORDING".into());
     };
-    let errors = objects::evaluate(run, truth)?;
+    let errors = objects::evaluate(&arguments.estimate, truth)?;
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&errors)?)?,
         false => print::line(errors)?,
@@ -82,18 +76,15 @@ fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> 
 
 /// Returns the files that are compared: of a run, its trajectory and its ground truth.
 fn files(arguments: &EvaluateArguments) -> Result<[PathBuf; 2], Failure> {
-    let named = |of: &Option<PathBuf>, old: &Option<PathBuf>| of.clone().or(old.clone());
-    let estimate = named(&arguments.estimate, &arguments.named_estimate);
-    let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
-    let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
+    let (estimate, given) = (&arguments.estimate, arguments.ground_truth.clone());
     if !estimate.is_dir() {
         let shown = estimate.display();
         let lacks = || format!("name the ground truth too: gyre evaluate {shown} FILE");
         let truth = given.ok_or_else(lacks)?;
-        return Ok([estimate, truth]);
+        return Ok([estimate.clone(), truth]);
     }
-    require_results(&estimate)?;
-    let truth = given.map_or_else(|| truth_of_run(&estimate), Ok)?;
+    require_results(estimate)?;
+    let truth = given.map_or_else(|| truth_of_run(estimate), Ok)?;
     Ok([estimate.join("trajectory.tum"), truth])
 }
 
@@ -136,7 +127,6 @@ fn judged_motions(
     Ok(judged.inspect_err(note).ok())
 }
 
-/// Trajectories may be written in microseconds.
 const ROUNDING_NS: i64 = 1_000;
 
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {

@@ -20,7 +20,6 @@ enum Kind {
     Plain,
     /// An error: the smallest is the best.
     Error,
-    /// A count of unusual events.
     Unusual,
 }
 
@@ -54,7 +53,6 @@ const fn error(name: &'static str, place: &'static str, decimals: usize) -> Figu
     }
 }
 
-/// The title of the errors against a ground truth.
 pub const ACCURACY: &str = "Accuracy";
 
 #[rustfmt::skip]

@@ -47,7 +47,6 @@ pub enum Holds {
 #[serde(deny_unknown_fields)]
 pub struct Programs {
     version: String,
-    /// BLAKE3 digest of Gyre's program.
     pub build: String,
     /// BLAKE3 digest of each replaced stage's command and of the files that it names.
     replaced: BTreeMap<String, String>,

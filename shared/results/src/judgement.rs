@@ -1,11 +1,11 @@
 //! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both
 //! report it: its errors, and the consistency of its covariances.
 
-use std::fmt;
+use std::{fmt, num::NonZeroUsize};
 
 use gyre_evaluation::{
-    Association, Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions,
-    Options, TimedMotion, TimedPoses, bands, nees,
+    Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions, STEP,
+    TimedMotion, TimedPoses, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
 use gyre_radar::{ClockOffset, MAX_OFFSET_S, Trajectory, clock_offset};
@@ -52,8 +52,7 @@ impl Judgement {
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
-        let matched = &self.evaluation.matched;
-        let trajectory = trajectory_svg(matched.estimate(), Some(matched))?;
+        let trajectory = trajectory_svg(&self.evaluation.matched)?;
         let mut plots = vec![("trajectory.svg", trajectory)];
         if self.evaluation.rpe.is_some() {
             plots.push(("errors.svg", errors_svg(&self.evaluation)?));
@@ -111,20 +110,17 @@ pub fn take_time_offset_out(estimate: &Trajectory, truth: &mut Trajectory) -> Re
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
-pub fn judge(
+pub fn judge(estimate: &Trajectory, truth: &Trajectory) -> Result<Evaluation, EvaluationError> {
+    judge_by(estimate, truth, STEP)
+}
+
+/// Evaluates by segments that start at every `step`-th pose.
+pub fn judge_by(
     estimate: &Trajectory,
     truth: &Trajectory,
-    options: Options,
+    step: NonZeroUsize,
 ) -> Result<Evaluation, EvaluationError> {
-    let by_time = estimate.stamp_ns.is_some() && truth.stamp_ns.is_some();
-    let options = match by_time {
-        true => options,
-        false => Options {
-            association: Association::Index,
-            ..options
-        },
-    };
-    gyre_evaluation::evaluate(timed(estimate), timed(truth), &options)
+    gyre_evaluation::evaluate(timed(estimate), timed(truth), step)
 }
 
 pub fn judge_motions(
@@ -185,7 +181,7 @@ mod tests {
     }
 
     fn ate_m(estimate: &Trajectory, truth: &Trajectory) -> f64 {
-        let judged = judge(estimate, truth, Options::default());
+        let judged = judge(estimate, truth);
         judged.unwrap().ate.rmse_m
     }
 
@@ -218,7 +214,7 @@ mod tests {
         };
         let read = |name| read_trajectory(&folder.join(name)).unwrap();
         let (truth, odometry) = (read("gps_poses.csv"), read("odometry.txt"));
-        let evaluation = judge(&odometry, &truth, Options::default()).unwrap();
+        let evaluation = judge(&odometry, &truth).unwrap();
         let (ate_m, path_m) = (evaluation.ate.rmse_m, evaluation.path_m);
         assert!((0.030..0.035).contains(&ate_m), "{ate_m}");
         assert!((7_900.0..8_000.0).contains(&path_m), "{path_m}");

@@ -1,14 +1,6 @@
-//! The files that a run leaves in the folder of its results, written and read; and reports of them.
-//!
-//! - [`Out`]: the folder, which one run at a time may change; [`Content`] decides what may be
-//!   written to a place that a user names;
-//! - [`write`](write()): all results, made from the journal in one pass;
-//! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
-//!   evaluation in it;
-//! - [`figures`]: all figures of a run, with their names and units;
-//! - [`georeference`]: the place of a run on the earth;
-//! - [`Identity`]: the inputs of the run at its start;
-//! - [`evaluate`]: the report on a trajectory beside ground truth.
+//! The files that a run leaves in the folder of its results ([`Out`]), made from the journal in one
+//! pass ([`write`](write())) and read back; and the report on a trajectory beside ground truth
+//! ([`evaluate`]).
 
 pub mod evaluate;
 pub mod figures;

@@ -7,16 +7,13 @@ use std::{
 
 use serde::Serialize;
 
-/// The properties of a computer that times depend on.
 #[derive(Debug, Serialize)]
 pub struct Machine {
     pub processor: String,
-    /// Hardware threads that this process may use.
     pub cores: usize,
 }
 
 impl Machine {
-    /// The one that this program runs on.
     pub fn this() -> Self {
         let model = |text: String| {
             let line = text.lines().find(|line| line.starts_with("model name"))?;

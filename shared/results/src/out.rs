@@ -19,7 +19,6 @@ pub const SUMMARY: &str = "summary.json";
 
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
-/// All results.
 pub const FILES: [&str; 15] = [
     "odometry.csv",
     "poses.csv",
@@ -51,7 +50,6 @@ pub const REPLACED: &str = "journal.replaced";
 pub struct Content(&'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
-#[allow(missing_docs, reason = "each names its command")]
 impl Content {
     pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl");
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log");
@@ -145,7 +143,6 @@ pub fn require_results(run: &Path) -> Result<(), OutError> {
 /// Why a path is invalid for the output of a command, or for results.
 #[derive(Debug, Error)]
 pub enum OutError {
-    /// It cannot be written.
     #[error("cannot write to {path}: {source}", path = path.display())]
     Unwritable { path: PathBuf, source: io::Error },
     /// Another run, map or localisation is writing to it.
@@ -155,7 +152,6 @@ pub enum OutError {
         /// The process, if the system reports it: `, process 123 (gyre)`.
         holder: String,
     },
-    /// Something else is there, which the sentence names.
     #[error("{0}")]
     Refused(String),
 }

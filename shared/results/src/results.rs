@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
-use gyre_evaluation::{NeesOptions, Options, plot::bands_svg};
+use gyre_evaluation::{NeesOptions, plot::bands_svg};
 use gyre_journal as journal;
 use gyre_messages::StageId;
 use gyre_radar::Trajectory;
@@ -145,7 +145,7 @@ fn add_corrected(
     let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
         return Ok(summary);
     };
-    if let Ok(evaluation) = judge(corrected, &truth, Options::default()) {
+    if let Ok(evaluation) = judge(corrected, &truth) {
         summary.ate_m = Some(evaluation.ate.rmse_m);
         let are_as_given = evaluation.axes.are_as_given();
         summary.ground_truth = are_as_given.then(|| slam.errors_of(&truth)).flatten();
@@ -165,7 +165,7 @@ fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
     }
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
         note_time_offset(&estimate.trajectory, &truth);
-        let evaluation = judge(&estimate.trajectory, &truth, Options::default())?;
+        let evaluation = judge(&estimate.trajectory, &truth)?;
         let motions = judge_motions(&estimate.motions, &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
         let options = NeesOptions::default();

@@ -157,9 +157,7 @@ pub struct Summary {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Five lines.
     Brief,
-    /// All figures.
     Table,
     Json,
 }
@@ -182,7 +180,6 @@ impl Summary {
         self.problem.as_ref()
     }
 
-    /// Puts it together.
     pub fn new(
         configuration: &Configuration,
         out: &Path,

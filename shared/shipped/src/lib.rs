@@ -20,7 +20,6 @@ macro_rules! files {
     };
 }
 
-/// The files by their paths from the root of the project.
 const FILES: &[(&str, &[u8])] = files![
     "configs/boreas-rt.toml"
     "configs/boreas.toml"
@@ -104,7 +103,6 @@ pub fn configurations() -> impl Iterator<Item = (&'static str, String)> {
     })
 }
 
-/// Returns the first sentence of the comment that a file begins with.
 fn purpose(text: &str) -> String {
     let comment = text.lines().map_while(|line| line.strip_prefix('#'));
     let comment: Vec<&str> = comment.map(str::trim).collect();

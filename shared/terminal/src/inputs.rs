@@ -1,10 +1,5 @@
 //! The things that commands work on: a recording, a configuration, a radar. All commands receive
-//! them in one form, and recognise each by its content.
-//!
-//! - [`Inputs`]: the arguments;
-//! - [`Given`]: the things that they name;
-//! - [`Kind`]: what one of them is;
-//! - [`config`](config()): the configurations in the program.
+//! them in one form, [`Inputs`], and recognise each by its content.
 
 mod config;
 mod given;

@@ -23,7 +23,6 @@ pub fn values(text: impl Display) -> Result<(), Failure> {
     }
 }
 
-/// Returns whether standard output was written, in a sentence.
 pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

@@ -12,7 +12,6 @@ use gyre_supervise::rig::{Feed, Joining, Ports, Recorded, Tap};
 /// The environment variable with the fault of a stage.
 pub const BREACH: &str = "GYRE_TEST_BREACH";
 
-/// The item with the fault.
 const WRONG: u64 = 5;
 const REST: Duration = Duration::from_millis(2);
 /// The items that one answers which then answers no more.

@@ -26,7 +26,6 @@ pub const FAULT: &str = "GYRE_TEST_FAULT";
 /// A file that exists once the fault has been sent, if it is to be sent only once.
 pub const ONCE: &str = "GYRE_TEST_ONCE";
 
-/// Works as the stage that publishes the topic of the fault.
 pub fn play(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
     match fault.topic.as_str() {
         "scan" => replay(launch, fault),
@@ -49,7 +48,6 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Reads `TOPIC FIELD VALUE`.
     pub fn parse(text: &str) -> Self {
         let words: Vec<&str> = text.split(' ').collect();
         Self {
@@ -150,7 +148,6 @@ fn refine(
     item.seq
 }
 
-/// Returns a motion of a meter forward.
 fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
     let x_m = fault.of("x", seq).unwrap_or(1.0);
     let variance = fault.of("covariance", seq).unwrap_or(0.01);

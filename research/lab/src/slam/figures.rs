@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use gyre_evaluation::Options;
 use gyre_geometry::UncertainMotion;
 use gyre_radar::Trajectory;
 use gyre_results::judgement::judge;
@@ -115,9 +114,7 @@ pub fn table(rows: Vec<Record>) -> Table {
 }
 
 fn ate_m(drive: &Drive, trajectory: &Trajectory) -> Result<f64, Failure> {
-    Ok(judge(trajectory, &drive.truth, Options::default())?
-        .ate
-        .rmse_m)
+    Ok(judge(trajectory, &drive.truth)?.ate.rmse_m)
 }
 
 /// The mean NEES of poses in the frame of the first one, over its expectation.

@@ -47,5 +47,5 @@ fn ate_m(configuration: &Configuration, scans: usize, truth: &Trajectory) -> Res
     }
     let stamp_ns = Some(stamps_ns);
     let estimate = Trajectory { stamp_ns, poses };
-    Ok(judge(&estimate, truth, Default::default())?.ate.rmse_m)
+    Ok(judge(&estimate, truth)?.ate.rmse_m)
 }

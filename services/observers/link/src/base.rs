@@ -24,12 +24,13 @@ use zenoh::{
 };
 
 use crate::{
-    LinkError, Network,
+    LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
     serve::{LAST_ANSWERS, Offer, Server},
+    session,
     waker::Waker,
 };
 
@@ -37,7 +38,6 @@ use crate::{
 const QUIET: Duration = Duration::from_secs(1);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Runs the base's side until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
@@ -46,7 +46,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = Network::from(&config).open(sleep)? else {
+    let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
     let mut base = Base {
@@ -216,7 +216,6 @@ impl Base<'_> {
         })
     }
 
-    /// Requests all items from one on of the robot.
     fn fetch(&self, from: u64) -> Vec<FromRobot> {
         let prefix = handshake::prefix(&self.config, Side::Robot);
         let topics = self.topics.iter().map(|name| {
@@ -236,7 +235,6 @@ impl Base<'_> {
         topics.collect()
     }
 
-    /// Returns the number of the item that is published next.
     fn next(&self) -> u64 {
         let newest = self.published.or(self.resumed_at());
         newest.map_or(0, |newest| newest.saturating_add(1))

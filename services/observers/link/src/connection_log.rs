@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-/// The logged state of the connection to the other side.
 pub(crate) struct ConnectionLog {
     other: &'static str,
     is_connected: bool,
@@ -10,7 +9,6 @@ pub(crate) struct ConnectionLog {
 }
 
 impl ConnectionLog {
-    /// Creates a log that begins without the other side.
     pub fn of(other: &'static str) -> Self {
         Self {
             other,

@@ -9,7 +9,6 @@ use thiserror::Error;
 
 use crate::NetworkError;
 
-/// A failure of a link, by whether a restart of its process may help.
 #[derive(Debug, Error)]
 pub enum LinkError {
     #[error("link: {0}")]

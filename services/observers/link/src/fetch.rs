@@ -42,7 +42,6 @@ struct State {
     stop: AtomicBool,
     /// True if the thread informs the sender, at the stop, that it needs no more messages.
     leaves: AtomicBool,
-    /// True if the thread requests again, from `confirmed` on.
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
@@ -60,7 +59,6 @@ pub(crate) struct Request {
     pub generation: Option<u32>,
     /// The identity of this receiver, the same after its restart.
     pub receiver: String,
-    /// The priority: poses go before scans.
     pub priority: Priority,
 }
 
@@ -167,7 +165,6 @@ struct RequestLoop {
     request: Request,
     sender: Sender<Vec<u8>>,
     waker: Waker,
-    /// True once the end of the stream has arrived.
     has_end: bool,
     patience: Patience,
     state: Arc<State>,

@@ -9,7 +9,7 @@ use gyre_stage::Manifest;
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkError, Network, request::Question};
+use crate::{LinkError, request::Question, session};
 
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -25,7 +25,6 @@ pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     format!("gyre/split/{}/{side}", config.name)
 }
 
-/// Returns the key where a base reports the item to continue from.
 pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
@@ -41,7 +40,7 @@ pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
         thread::sleep(PAUSE);
         Ok(false)
     };
-    let session = Network::from(config).open(pause)?;
+    let session = session::open(config, pause)?;
     let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
@@ -62,7 +61,6 @@ pub(crate) struct Agreement {
     window: usize,
     look_back: usize,
     limits: Limits,
-    /// The topics that cross the link, with the versions of their messages.
     topics: Vec<(String, String)>,
     /// The checksum of the robot's recording, if it plays one.
     pub drive: Option<String>,
@@ -73,9 +71,7 @@ pub(crate) struct Agreement {
 pub(crate) enum StartAnswer {
     /// Items up to this one will have poses; `None`: there are no poses yet.
     Go(Option<u64>),
-    /// The robot has to ask again, for this reason.
     Wait(String),
-    /// The robot is a side of another run, for this reason.
     Refused(String),
 }
 

@@ -1,18 +1,11 @@
-//! The topics of a run on another machine, over [zenoh](https://zenoh.io).
+//! The topics of a run on another machine, over [zenoh](https://zenoh.io): a run that is split
+//! between two machines (`robot` has the first stages and `base` the last ones), and a copy of a run
+//! (`send` observes a run, `receive` publishes the messages that arrive as a run of its own).
 //!
-//! Two things are built on it: a run that is split between two machines (`robot` has the first
-//! stages and `base` the last ones), and a copy of a run on another machine (`send` observes a run,
-//! `receive` publishes the messages that arrive as a run of its own).
-//!
-//! The receiver asks: a request names a topic and the first message that is wanted, and is answered
-//! by that message and all that follow, as they come. After a cut the receiver asks again from
-//! where it is. So a message that is still there is neither lost nor doubled, and the sender keeps
-//! no state of a receiver. The messages that are still there depend on the topic: see
-//! `replay_buffer`.
-//!
-//! Reading order: `network` and `session` (endpoints and certificates), `replay_buffer`
-//! (the messages that can be sent), `serve` and `fetch` (the two ends of a topic), `handshake` with
-//! `robot` and `base`, then `send` and `receive`.
+//! The receiver asks: a request names a topic and the first message that is wanted (`fetch`), and is
+//! answered by that message and all that follow, as they come (`serve`). After a cut the receiver
+//! asks again from where it is. So a message that is still there (`replay_buffer`) is neither lost
+//! nor doubled, and the sender keeps no state of a receiver.
 
 mod network;
 
@@ -47,7 +40,7 @@ mod tests;
 #[cfg(feature = "zenoh")]
 mod waker;
 
-pub use network::{Network, NetworkError, ONE_THREAD};
+pub use network::{NetworkError, ONE_THREAD, check};
 
 #[cfg(feature = "zenoh")]
 pub use {

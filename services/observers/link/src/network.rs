@@ -1,6 +1,6 @@
 //! Endpoints and certificates: plain TCP on this machine, else TLS with certificates of both sides.
 
-use std::{net::IpAddr, path::PathBuf};
+use std::net::IpAddr;
 
 use gyre_run::LinkConfig;
 use thiserror::Error;
@@ -15,31 +15,6 @@ pub const ONE_THREAD: (&str, &str) = (
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
 );
 
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Network {
-    /// The name of the link, the same on both sides.
-    pub name: String,
-    /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
-    pub listen: Vec<String>,
-    pub connect: Vec<String>,
-    pub ca: PathBuf,
-    pub certificate: PathBuf,
-    pub key: PathBuf,
-}
-
-impl From<&LinkConfig> for Network {
-    fn from(config: &LinkConfig) -> Self {
-        Self {
-            name: config.name.clone(),
-            listen: config.listen.clone(),
-            connect: config.connect.clone(),
-            ca: config.ca.clone(),
-            certificate: config.certificate.clone(),
-            key: config.key.clone(),
-        }
-    }
-}
-
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{0}")]
 pub struct NetworkError(String);
@@ -48,54 +23,52 @@ pub struct NetworkError(String);
 /// documents.
 const PRIVATE_ZONES: &str = ".internal .lan .local .home.arpa .test .example .localhost";
 
-impl Network {
-    /// Checks the endpoints, and that the files of TLS can be read.
-    pub fn check(&self) -> Result<(), NetworkError> {
-        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if self.name.is_empty() || !self.name.chars().all(is_word) {
+/// Checks the endpoints, and that the files of TLS can be read.
+pub fn check(link: &LinkConfig) -> Result<(), NetworkError> {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if link.name.is_empty() || !link.name.chars().all(is_word) {
+        return Err(NetworkError(format!(
+            "`{}` is no name of a link: it has letters, digits, `-` and `_`",
+            link.name
+        )));
+    }
+    if link.listen.is_empty() && link.connect.is_empty() {
+        return Err(NetworkError(
+            "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447".to_owned(),
+        ));
+    }
+    for endpoint in link.listen.iter().chain(&link.connect) {
+        if is_tls(endpoint)? {
+            check_certificates(link, endpoint)?;
+        }
+    }
+    // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
+    // certificates others can have.
+    match link.connect.iter().find(|endpoint| is_public(endpoint)) {
+        Some(endpoint) => Err(NetworkError(format!(
+            "{endpoint} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn check_certificates(link: &LinkConfig, endpoint: &str) -> Result<(), NetworkError> {
+    for (what, path) in [
+        ("the authority's certificate (ca)", &link.ca),
+        ("a certificate (certificate)", &link.certificate),
+        ("a private key (key)", &link.key),
+    ] {
+        if path.as_os_str().is_empty() {
             return Err(NetworkError(format!(
-                "`{}` is no name of a link: it has letters, digits, `-` and `_`",
-                self.name
+                "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
             )));
         }
-        if self.listen.is_empty() && self.connect.is_empty() {
-            return Err(NetworkError(
-                "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447".to_owned(),
-            ));
-        }
-        for endpoint in self.listen.iter().chain(&self.connect) {
-            if is_tls(endpoint)? {
-                self.check_certificates(endpoint)?;
-            }
-        }
-        // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
-        // certificates others can have.
-        match self.connect.iter().find(|endpoint| is_public(endpoint)) {
-            Some(endpoint) => Err(NetworkError(format!(
-                "{endpoint} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
-            ))),
-            None => Ok(()),
-        }
+        std::fs::read(path).map_err(|reason| {
+            let path = path.display();
+            NetworkError(format!("{what} {path} cannot be read: {reason}"))
+        })?;
     }
-
-    fn check_certificates(&self, endpoint: &str) -> Result<(), NetworkError> {
-        for (what, path) in [
-            ("the authority's certificate (ca)", &self.ca),
-            ("a certificate (certificate)", &self.certificate),
-            ("a private key (key)", &self.key),
-        ] {
-            if path.as_os_str().is_empty() {
-                return Err(NetworkError(format!(
-                    "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
-                )));
-            }
-            std::fs::read(path).map_err(|reason| {
-                let path = path.display();
-                NetworkError(format!("{what} {path} cannot be read: {reason}"))
-            })?;
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 fn is_tls(endpoint: &str) -> Result<bool, NetworkError> {
@@ -154,11 +127,11 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn listening(endpoint: &str) -> Network {
-        Network {
+    fn listening(endpoint: &str) -> LinkConfig {
+        LinkConfig {
             name: "robot-1".to_owned(),
             listen: vec![endpoint.to_owned()],
-            ..Network::default()
+            ..LinkConfig::default()
         }
     }
 
@@ -166,14 +139,14 @@ mod tests {
     fn endpoints_are_tls_or_on_this_machine_and_smuggle_no_settings_of_zenoh_in() {
         let (plain, malformed) = ("would leave this machine unencrypted", "is no endpoint");
         for endpoint in ["tcp/127.0.0.1:7447", "tcp/127.1.2.3:1", "tcp/[::1]:7447"] {
-            assert_eq!(listening(endpoint).check(), Ok(()), "{endpoint}");
+            assert_eq!(check(&listening(endpoint)), Ok(()), "{endpoint}");
         }
         let off = "tcp/0.0.0.0:1 tcp/[::]:1 tcp/192.168.0.1:1 tcp/localhost:1";
         let others = " 7447 udp/127.0.0.1:7447 tls/:7447 tls/base tls/base:port";
         let smuggling = "tls/base:7447#enable_mtls=false tcp/127.0.0.1:7447?rel=0";
         for (endpoints, words) in [(off, plain), (others, malformed), (smuggling, malformed)] {
             for endpoint in endpoints.split(' ') {
-                let refused = listening(endpoint).check().unwrap_err().0;
+                let refused = check(&listening(endpoint)).unwrap_err().0;
                 assert!(refused.contains(words), "{endpoint}: {refused}");
             }
         }
@@ -188,7 +161,7 @@ mod tests {
             path
         };
         let mut network = listening("tls/0.0.0.0:7447");
-        let lacks = |network: &Network| network.check().unwrap_err().0;
+        let lacks = |network: &LinkConfig| check(network).unwrap_err().0;
         assert!(lacks(&network).contains("(ca)"));
         network.ca = file("ca.pem");
         assert!(lacks(&network).contains("(certificate)"));
@@ -197,7 +170,7 @@ mod tests {
         network.key = folder.path().join("missing.key");
         assert!(lacks(&network).contains("cannot be read"));
         network.key = file("robot.key");
-        assert_eq!(network.check(), Ok(()));
+        assert_eq!(check(&network), Ok(()));
     }
 
     #[test]
@@ -211,15 +184,15 @@ mod tests {
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         let path = || file.path().to_owned();
-        let network = Network {
+        let network = LinkConfig {
             name: "robot-1".to_owned(),
             connect: vec!["tls/base.example.com:7447".to_owned()],
             ca: path(),
             certificate: path(),
             key: path(),
-            ..Network::default()
+            ..LinkConfig::default()
         };
-        assert!(network.check().unwrap_err().0.contains("public name"));
+        assert!(check(&network).unwrap_err().0.contains("public name"));
     }
 
     #[test]
@@ -227,10 +200,10 @@ mod tests {
         for name in ["", "a/b", "*", "rob ot"] {
             let mut network = listening("tcp/127.0.0.1:7447");
             network.name = name.to_owned();
-            assert!(network.check().unwrap_err().0.contains("is no name"));
+            assert!(check(&network).unwrap_err().0.contains("is no name"));
         }
         let mut nowhere = listening("");
         nowhere.listen.clear();
-        assert!(nowhere.check().unwrap_err().0.contains("no endpoint"));
+        assert!(check(&nowhere).unwrap_err().0.contains("no endpoint"));
     }
 }

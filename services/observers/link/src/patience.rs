@@ -5,7 +5,6 @@ use std::time::Duration;
 
 /// Time after which answers have ceased: a cut can lose a request without an end.
 const SHORTEST: Duration = Duration::from_secs(12);
-/// The longest time that a message may take.
 const LONGEST: Duration = Duration::from_secs(15 * 60);
 /// The first answer is empty, and takes less time; it may come behind a message that was given up.
 const FIRST_ANSWER_SHARE: u32 = 4;
@@ -13,7 +12,6 @@ const LONGEST_FIRST: Duration = Duration::from_secs(30);
 /// The time that a message may take, as a multiple of the time of the previous message.
 const MARGIN: u32 = 2;
 
-/// The time that a receiver waits for the next answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Patience(Duration);
 

@@ -13,21 +13,22 @@ use std::{
 
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::topic;
+use gyre_run::LinkConfig;
 use gyre_stage::{Manifest, launch, wake::Signals};
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, Wait};
 
 use crate::{
-    LinkError, Network,
+    LinkError,
     request::Question,
     send::{OfferedTopic, RunOffer, began_ns, offer_key},
+    session,
     waker::Waker,
 };
 
 pub use counts::{Received, ReceivedCount};
 use mirror::Mirror;
 
-/// The name of this process in the log.
 const NAME: &str = "link";
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -36,8 +37,7 @@ const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 #[derive(Clone, Debug)]
 pub struct ReceiveOptions {
     pub out: PathBuf,
-    /// The endpoints and certificates for the sender.
-    pub network: Network,
+    pub link: LinkConfig,
     pub gyre: String,
     /// Topics to receive of those that are sent; empty: all.
     pub topics: Vec<String>,
@@ -49,13 +49,12 @@ pub struct RemoteRun {
 }
 
 /// Waits for the sender. `None` on a request to stop.
-pub fn ask(network: &Network, signals: &Signals) -> Result<Option<RemoteRun>, LinkError> {
-    network.check()?;
-    let Some(session) = network.open(|| Ok(signals.sleep(PAUSE)?))? else {
+pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, LinkError> {
+    let Some(session) = session::open(link, || Ok(signals.sleep(PAUSE)?))? else {
         return Ok(None);
     };
     loop {
-        let key = offer_key(&network.name);
+        let key = offer_key(&link.name);
         if let Some(offer) = ASK_FOR_RUN.ask::<RunOffer>(&session, key, [])? {
             offer.topics.iter().try_for_each(require_same)?;
             return Ok(Some(RemoteRun { session, offer }));
@@ -91,7 +90,6 @@ impl RemoteRun {
     }
 }
 
-/// Receives until the run ends, or a signal requests a stop.
 pub fn receive(
     options: &ReceiveOptions,
     remote: RemoteRun,
@@ -106,7 +104,7 @@ pub fn receive(
     let RemoteRun { session, offer } = remote;
     let mut mirror = Mirror {
         session: session.clone(),
-        link: options.network.name.clone(),
+        link: options.link.name.clone(),
         receiver: receiver(&options.out, &session)?,
         topics: Vec::new(),
         journal,

@@ -19,7 +19,6 @@ pub(crate) struct Message {
     pub seq: u64,
     /// See [`Item::generation`](gyre_messages::Item::generation).
     pub generation: u32,
-    /// The bytes, shared by all receivers.
     pub bytes: Arc<[u8]>,
 }
 
@@ -58,9 +57,7 @@ impl Place {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     Message(Message),
-    /// There is no message yet.
     Nothing,
-    /// There will be none.
     Ended,
 }
 
@@ -70,7 +67,6 @@ pub(crate) trait ReplayBuffer: Send + Sync {
 
     fn add(&self, message: &RecordedMessage);
 
-    /// Ends the stream: no message follows.
     fn end(&self) -> Result<(), LinkError>;
 }
 
@@ -89,7 +85,6 @@ struct Held {
 }
 
 impl MemoryBuffer {
-    /// Creates a buffer of at most so many messages.
     pub fn of(messages: usize) -> Self {
         Self::bounded(messages, usize::MAX)
     }
@@ -268,7 +263,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits until `find` returns a value, at most `limit`.
 fn wait<T, U>(
     mutex: &Mutex<T>,
     changed: &Condvar,

@@ -9,7 +9,6 @@ use zenoh::{
 
 use crate::LinkError;
 
-/// Time for an answer. Without one the question is asked again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A question that is asked again until it is answered: the action, as in "ask for a run", and the
@@ -17,7 +16,6 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 #[derive(Clone, Copy)]
 pub(crate) struct Question(pub &'static str, pub &'static str);
 
-/// The answers to a question, as far as they have arrived.
 pub(crate) type Answers = FifoChannelHandler<Reply>;
 
 impl Question {

@@ -16,17 +16,17 @@ use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    LinkError, Network,
+    LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     request,
     serve::{LAST_ANSWERS, Offer, Server},
+    session,
     waker::Waker,
 };
 
-/// Runs the robot's side until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
@@ -34,7 +34,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = Network::from(&config).open(sleep)? else {
+    let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
     let mut robot = Robot {

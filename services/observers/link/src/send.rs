@@ -18,6 +18,7 @@ use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
+use gyre_run::LinkConfig;
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, TopicObserver, wait_for_any},
@@ -27,13 +28,14 @@ use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
-    LinkError, Network,
+    LinkError,
+    network::check,
     replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
     serve::{Offer, Server},
+    session,
 };
 
-/// The name of this process in the log of the run.
 const NAME: &str = "link";
 /// The topics that are sent unless others are named, of those that the run has.
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
@@ -47,8 +49,7 @@ const MAX_SCANS: usize = 2;
 #[derive(Clone, Debug)]
 pub struct SendOptions {
     pub out: PathBuf,
-    /// The endpoints and certificates for receivers.
-    pub network: Network,
+    pub link: LinkConfig,
     /// The topics; empty: all that the run has but scans and rasters.
     pub topics: Vec<String>,
     /// Time to wait, after the end of the run, for receivers that have not everything yet.
@@ -59,7 +60,6 @@ pub struct SendOptions {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
     pub topics: BTreeMap<String, (u64, u64)>,
-    /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,
 }
 
@@ -85,7 +85,6 @@ pub(crate) struct RunOffer {
     pub refines: bool,
     pub rate: Option<f64>,
     pub configuration: String,
-    /// The identity of the sender, a part of the keys.
     pub sender: String,
     /// The time of the first pose, ns since 1970, if there is one: it identifies the drive.
     pub began_ns: Option<i64>,
@@ -113,14 +112,13 @@ pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
     Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }
 
-/// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
-    options.network.check()?;
+    check(&options.link)?;
     let run = ObservedRun::writing_to(&options.out)?;
     let _log = launch::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
     let pause = || Ok(signals.sleep(MAX_WAIT)?);
-    let Some(session) = options.network.open(pause)? else {
+    let Some(session) = session::open(&options.link, pause)? else {
         return Ok(Sent::default());
     };
     let sending = Sending::begin(&run, options, &session)?;
@@ -150,7 +148,7 @@ impl<'run> Sending<'run> {
         session: &Session,
     ) -> Result<Self, LinkError> {
         let manifest = run.manifest();
-        let prefix = prefix(&options.network.name, &session.zid().to_string());
+        let prefix = prefix(&options.link.name, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
         let logs = Logs::of(manifest)?;
         let names = topics(&options.topics, manifest)?;
@@ -297,7 +295,6 @@ fn no_topic(name: &str) -> LinkError {
     ))
 }
 
-/// Offers the run to receivers.
 fn offer(
     session: &Session,
     options: &SendOptions,
@@ -321,7 +318,7 @@ fn offer(
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
-    let key = offer_key(&options.network.name);
+    let key = offer_key(&options.link.name);
     let out = manifest.out.clone();
     request::answer(session, key, "offer a run", move || RunOffer {
         began_ns: began_ns(&out).ok().flatten(),

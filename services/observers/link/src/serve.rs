@@ -69,7 +69,6 @@ pub(crate) struct Offer {
 
 struct ReceiverState {
     request: u64,
-    /// True once the receiver has declined more messages.
     is_done: bool,
 }
 
@@ -120,7 +119,6 @@ impl Drop for Server {
 }
 
 impl Offer {
-    /// Returns the highest number that was requested: all messages before it have arrived.
     pub fn asked(&self) -> u64 {
         self.asked.load(Ordering::Relaxed)
     }

@@ -1,4 +1,4 @@
-//! The session of zenoh: opened with the endpoints and certificates of a [`Network`] alone.
+//! The session of zenoh: opened with the endpoints and certificates of a link alone.
 
 use std::{
     path::Path,
@@ -6,10 +6,11 @@ use std::{
     thread,
 };
 
+use gyre_run::LinkConfig;
 use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};
 
-use crate::{LinkError, Network, ONE_THREAD};
+use crate::{LinkError, ONE_THREAD, network::check};
 
 /// Time without a sign of life after which a connection is given up, ms. Messages wait meanwhile.
 const LEASE_MS: u64 = 3000;
@@ -17,92 +18,90 @@ const LEASE_MS: u64 = 3000;
 /// the lease; on a slow network the buffers of the system may take nothing for seconds.
 const MAX_BLOCKED_US: u64 = 900_000_000;
 
-impl Network {
-    /// Opens the session. A side that connects tries again until the other is there, with pauses
-    /// that grow to 4 s; meanwhile `pause` is called, which returns true on a request to stop.
-    /// `None` after one.
-    pub(crate) fn open(
-        &self,
-        mut pause: impl FnMut() -> Result<bool, LinkError>,
-    ) -> Result<Option<Session>, LinkError> {
-        self.check()?;
-        self.require_one_thread()?;
-        let config = Config::from_json5(&self.settings().to_string())
-            .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
-        let (sender, opened) = channel();
-        // The call does not return before it is connected, whatever signal arrives.
-        thread::spawn(move || sender.send(zenoh::open(config).wait()));
-        loop {
-            match opened.try_recv() {
-                Ok(session) => {
-                    let failed = |e| LinkError::zenoh("open the link", &e);
-                    return session.map(Some).map_err(failed);
-                }
-                Err(TryRecvError::Disconnected) => {
-                    return Err(LinkError::zenoh("open the link", &"it has failed"));
-                }
-                Err(TryRecvError::Empty) if pause()? => return Ok(None),
-                Err(TryRecvError::Empty) => {}
+/// Opens the session. A side that connects tries again until the other is there, with pauses
+/// that grow to 4 s; meanwhile `pause` is called, which returns true on a request to stop.
+/// `None` after one.
+pub(crate) fn open(
+    link: &LinkConfig,
+    mut pause: impl FnMut() -> Result<bool, LinkError>,
+) -> Result<Option<Session>, LinkError> {
+    check(link)?;
+    require_one_thread(link)?;
+    let config = Config::from_json5(&settings(link).to_string())
+        .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
+    let (sender, opened) = channel();
+    // The call does not return before it is connected, whatever signal arrives.
+    thread::spawn(move || sender.send(zenoh::open(config).wait()));
+    loop {
+        match opened.try_recv() {
+            Ok(session) => {
+                let failed = |e| LinkError::zenoh("open the link", &e);
+                return session.map(Some).map_err(failed);
             }
+            Err(TryRecvError::Disconnected) => {
+                return Err(LinkError::zenoh("open the link", &"it has failed"));
+            }
+            Err(TryRecvError::Empty) if pause()? => return Ok(None),
+            Err(TryRecvError::Empty) => {}
         }
     }
+}
 
-    fn require_one_thread(&self) -> Result<(), LinkError> {
-        let (name, value) = ONE_THREAD;
-        let is_set = std::env::var_os(name).is_some_and(|set| set == value);
-        match is_set || self.certificate.as_os_str().is_empty() {
-            true => Ok(()),
-            false => Err(LinkError::Refused(format!(
-                "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
-            ))),
-        }
+fn require_one_thread(link: &LinkConfig) -> Result<(), LinkError> {
+    let (name, value) = ONE_THREAD;
+    let is_set = std::env::var_os(name).is_some_and(|set| set == value);
+    match is_set || link.certificate.as_os_str().is_empty() {
+        true => Ok(()),
+        false => Err(LinkError::Refused(format!(
+            "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
+        ))),
     }
+}
 
-    fn settings(&self) -> Value {
-        // A client reaches the others through the side or the router that it connects to.
-        let mode = match self.listen.is_empty() {
-            true => "client",
-            false => "peer",
-        };
-        json!({
-            "mode": mode,
-            "connect": {
-                "endpoints": self.connect,
-                "timeout_ms": -1,
-                "exit_on_failure": false,
-                "retry": { "period_init_ms": 250, "period_max_ms": 4000, "period_increase_factor": 2 },
-            },
-            "listen": { "endpoints": self.listen },
-            // No discovery: the endpoints are named.
-            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
-            "transport": {
-                "unicast": { "compression": { "enabled": false } },
-                "link": {
-                    "protocols": ["tcp", "tls"],
-                    "tls": self.tls(),
-                    "tx": {
-                        "lease": LEASE_MS,
-                        "queue": { "congestion_control": { "block": { "wait_before_close": MAX_BLOCKED_US } } },
-                    },
+fn settings(link: &LinkConfig) -> Value {
+    // A client reaches the others through the side or the router that it connects to.
+    let mode = match link.listen.is_empty() {
+        true => "client",
+        false => "peer",
+    };
+    json!({
+        "mode": mode,
+        "connect": {
+            "endpoints": link.connect,
+            "timeout_ms": -1,
+            "exit_on_failure": false,
+            "retry": { "period_init_ms": 250, "period_max_ms": 4000, "period_increase_factor": 2 },
+        },
+        "listen": { "endpoints": link.listen },
+        // No discovery: the endpoints are named.
+        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "transport": {
+            "unicast": { "compression": { "enabled": false } },
+            "link": {
+                "protocols": ["tcp", "tls"],
+                "tls": tls(link),
+                "tx": {
+                    "lease": LEASE_MS,
+                    "queue": { "congestion_control": { "block": { "wait_before_close": MAX_BLOCKED_US } } },
                 },
             },
-        })
-    }
+        },
+    })
+}
 
-    fn tls(&self) -> Value {
-        if self.certificate.as_os_str().is_empty() {
-            return json!({});
-        }
-        let file = |path: &Path| path.to_string_lossy().into_owned();
-        json!({
-            "root_ca_certificate": file(&self.ca),
-            "listen_private_key": file(&self.key),
-            "listen_certificate": file(&self.certificate),
-            "connect_private_key": file(&self.key),
-            "connect_certificate": file(&self.certificate),
-            "enable_mtls": true,
-            "verify_name_on_connect": true,
-            "close_link_on_expiration": true,
-        })
+fn tls(link: &LinkConfig) -> Value {
+    if link.certificate.as_os_str().is_empty() {
+        return json!({});
     }
+    let file = |path: &Path| path.to_string_lossy().into_owned();
+    json!({
+        "root_ca_certificate": file(&link.ca),
+        "listen_private_key": file(&link.key),
+        "listen_certificate": file(&link.certificate),
+        "connect_private_key": file(&link.key),
+        "connect_certificate": file(&link.certificate),
+        "enable_mtls": true,
+        "verify_name_on_connect": true,
+        "close_link_on_expiration": true,
+    })
 }

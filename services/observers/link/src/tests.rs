@@ -13,14 +13,15 @@ use std::{
 };
 
 use gyre_messages::{Item, flag};
+use gyre_run::LinkConfig;
 use gyre_stage::source::RecordedMessage;
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    Network,
     fetch::{Fetcher, Request},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     serve::{Offer, Server},
+    session,
     waker::Waker,
 };
 
@@ -50,29 +51,29 @@ fn endpoint() -> String {
     format!("tcp/{}", listener.local_addr().unwrap())
 }
 
-fn open(network: Network) -> Session {
+fn open(link: LinkConfig) -> Session {
     let pause = || {
         thread::sleep(Duration::from_millis(5));
         Ok(false)
     };
-    network.open(pause).unwrap().unwrap()
+    session::open(&link, pause).unwrap().unwrap()
 }
 
-fn network(listen: &[&str], connect: &[&str]) -> Network {
+fn network(listen: &[&str], connect: &[&str]) -> LinkConfig {
     let [listen, connect] = [listen, connect].map(|all| all.iter().map(|&it| it.into()).collect());
-    Network {
+    LinkConfig {
         name: "test".to_owned(),
         listen,
         connect,
-        ..Network::default()
+        ..LinkConfig::default()
     }
 }
 
-fn listening(endpoint: &str) -> Network {
+fn listening(endpoint: &str) -> LinkConfig {
     network(&[endpoint], &[])
 }
 
-fn connecting(endpoint: &str) -> Network {
+fn connecting(endpoint: &str) -> LinkConfig {
     network(&[], &[endpoint])
 }
 
@@ -152,29 +153,6 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     until("the receiver knows the end", || fetcher.has_ended());
     assert!(offer.is_done(), "the receiver has said so before");
     assert_eq!(offer.sent().0, 3);
-}
-
-#[test]
-fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
-    let address = endpoint();
-    let mut there = None;
-    for (first, end) in [(0, 3), (2, 6)] {
-        let here = open(listening(&address));
-        let (_, fetcher) = there.get_or_insert_with(|| {
-            let session = open(connecting(&address));
-            let fetcher = fetcher(&session, 0);
-            (session, fetcher)
-        });
-        let buffer = Arc::new(MemoryBuffer::of(100));
-        (first..end).for_each(|seq| add(&buffer, seq));
-        let mut server = Server::new(&here, "gyre/test", None);
-        server.offer("topic", buffer).unwrap();
-        let taken = take(fetcher, 3);
-        assert_eq!(taken, [end - 3, end - 2, end - 1], "each once");
-        drop(server);
-        here.close().wait().unwrap();
-        until("the sender has gone", || !fetcher.is_connected());
-    }
 }
 
 /// A sender of a topic, and a receiver that has its first message.

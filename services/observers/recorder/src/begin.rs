@@ -11,10 +11,8 @@ use crate::{
     options::{HEALTH, LOG, Options},
 };
 
-/// A recording that is begun, or continued in its next part.
 pub(crate) struct Begun {
     pub head: Head,
-    /// The ledger of the run that has started the recorder.
     pub ledger: Option<Ledger>,
     /// The positions behind the parts of earlier recorders of this run, if there were any.
     pub earlier: Option<Positions>,

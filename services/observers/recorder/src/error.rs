@@ -10,7 +10,6 @@ use thiserror::Error;
 pub enum RecorderError {
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// The file cannot be written, or one that is there not be read.
     #[error("cannot record: {0}; the run goes on without")]
     Recording(#[from] RecordingError),
     #[error("{0} exists, and a recording is never overwritten: name another file, or remove it")]

@@ -4,9 +4,6 @@
 //! compresses and writes. Between them is a queue with a limit in bytes. So a slow disk costs
 //! memory first, and then messages, which are counted. Nothing that the recorder does reaches the
 //! run: see [`gyre_stage::observer`].
-//!
-//! Reading order: `options`, `recorder` (the loop), `begin`, `tap` (the observers), `queue`,
-//! `writing` (the other thread), `health`.
 
 mod begin;
 mod error;

@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use gyre_recording::Split;
 
-/// The topic of log lines, which is no topic of the transport.
 pub(crate) const LOG: &str = "log";
-/// The topic of the run's health.
 pub(crate) const HEALTH: &str = "health";
 
 #[derive(Clone, Debug)]
@@ -15,7 +13,6 @@ pub struct Options {
     pub to: PathBuf,
     /// The topics, `log` and `health` among them; empty: the default ones that the run has.
     pub topics: Vec<String>,
-    /// When a file is ended and the next part begun.
     pub split: Split,
     /// True if an existing recording belongs to this run, begun by another recorder: it continues
     /// in its next part.

@@ -4,7 +4,7 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicUsize, Ordering},
-        mpsc,
+        mpsc::{self, RecvTimeoutError},
     },
     time::Duration,
 };
@@ -47,14 +47,6 @@ pub(crate) struct Receiver {
     waiting: Arc<AtomicUsize>,
 }
 
-pub(crate) enum Taken {
-    Entry(Entry),
-    Idle,
-    /// There is no sender any more, and the queue is empty.
-    Ended,
-}
-
-/// Makes a queue for so many bytes.
 pub(crate) fn queue(limit: usize) -> (Sender, Receiver) {
     let (sender, receiver) = mpsc::channel();
     let waiting = Arc::new(AtomicUsize::new(0));
@@ -83,16 +75,10 @@ impl Sender {
 }
 
 impl Receiver {
-    /// Takes the next entry, and waits for it at most so long.
-    pub fn take(&self, limit: Duration) -> Taken {
-        match self.entries.recv_timeout(limit) {
-            Ok(entry) => {
-                self.waiting.fetch_sub(entry.bytes(), Ordering::Relaxed);
-                Taken::Entry(entry)
-            }
-            Err(mpsc::RecvTimeoutError::Timeout) => Taken::Idle,
-            Err(mpsc::RecvTimeoutError::Disconnected) => Taken::Ended,
-        }
+    pub fn take(&self, limit: Duration) -> Result<Entry, RecvTimeoutError> {
+        let entry = self.entries.recv_timeout(limit)?;
+        self.waiting.fetch_sub(entry.bytes(), Ordering::Relaxed);
+        Ok(entry)
     }
 }
 
@@ -118,12 +104,13 @@ mod tests {
         assert!(!sender.put(message(41)));
         assert!(sender.put(message(40)));
         assert!(sender.put(Entry::Missed("scan", 1)), "counts always fit");
-        assert!(matches!(receiver.take(Duration::ZERO), Taken::Entry(_)));
+        assert!(receiver.take(Duration::ZERO).is_ok());
         assert!(sender.put(message(60)));
         drop(sender);
         for _ in 0..3 {
-            assert!(matches!(receiver.take(Duration::ZERO), Taken::Entry(_)));
+            assert!(receiver.take(Duration::ZERO).is_ok());
         }
-        assert!(matches!(receiver.take(Duration::ZERO), Taken::Ended));
+        let ended = receiver.take(Duration::ZERO).err();
+        assert_eq!(ended, Some(RecvTimeoutError::Disconnected));
     }
 }

@@ -27,9 +27,7 @@ use crate::{
     writing,
 };
 
-/// The name of the recorder in the log and among the processes of a run.
 const NAME: &str = "recorder";
-/// The topics that are recorded unless others are named.
 const DEFAULT: [&str; 8] = [
     "scan",
     "motion",
@@ -59,22 +57,21 @@ impl fmt::Display for Recorded {
         let list = |number: fn(&Counts) -> u64| {
             let counts = self.counts.iter().filter(|counts| number(counts) > 0);
             let counts = counts.map(|it| format!("{} {}", number(it), it.topic));
-            let counts: Vec<String> = counts.collect();
-            match counts.is_empty() {
-                true => "nothing".to_owned(),
-                false => counts.join(", "),
+            match &counts.collect::<Vec<String>>()[..] {
+                [] => "nothing".to_owned(),
+                counts => counts.join(", "),
             }
         };
         let (recorded, missed) = (list(|it| it.recorded), list(|it| it.missed));
-        write!(f, "recorded {recorded} in {}", self.path.display())?;
+        let path = self.path.display();
+        write!(f, "recorded {recorded} in {path}; missed {missed}")?;
         match self.is_complete() {
-            true => write!(f, "; missed nothing"),
-            false => write!(f, "; missed {missed}: the recording is not complete"),
+            true => Ok(()),
+            false => write!(f, ": the recording is not complete"),
         }
     }
 }
 
-/// Records a run until it ends, or a signal requests a stop.
 pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
@@ -154,7 +151,6 @@ struct Recorder<'run> {
     queue: Sender,
     is_of_run: bool,
     reported: u64,
-    /// The time of the next message about missed messages.
     due: Instant,
 }
 

@@ -19,13 +19,11 @@ pub struct Counts {
     pub missed: u64,
 }
 
-/// The observer of a topic, and the counts of its messages.
 pub(crate) struct Tap<'run> {
     observer: Box<dyn TopicObserver + 'run>,
     recorded: u64,
     dropped: u64,
     reported: u64,
-    /// The generation of the newest message that was recorded.
     generation: u32,
 }
 
@@ -63,7 +61,6 @@ impl<'run> Tap<'run> {
         overwritten + self.dropped
     }
 
-    /// Puts the messages that are there into the queue.
     pub(crate) fn drain(&mut self, queue: &Sender) -> Result<(), StageError> {
         loop {
             match self.observer.take() {

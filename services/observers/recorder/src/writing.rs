@@ -1,10 +1,10 @@
 //! The thread that compresses and writes.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::mpsc::RecvTimeoutError, time::Duration};
 
 use gyre_recording::{RecordingError, SplitWriter};
 
-use crate::queue::{Entry, Receiver, Taken};
+use crate::queue::{Entry, Receiver};
 
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 
@@ -15,12 +15,12 @@ pub(crate) fn write(
 ) -> Result<BTreeMap<String, u64>, RecordingError> {
     loop {
         match queue.take(POLL_PERIOD) {
-            Taken::Entry(Entry::Message(message)) => recording.add(&message)?,
-            Taken::Entry(Entry::Missed(topic, missed)) => recording.missed(topic, missed),
-            Taken::Entry(Entry::Log(line)) => recording.add_log(line)?,
-            Taken::Entry(Entry::Health(json, now_ns)) => recording.add_health(&json, now_ns)?,
-            Taken::Idle => recording.flush_if_due()?,
-            Taken::Ended => return recording.finish(),
+            Ok(Entry::Message(message)) => recording.add(&message)?,
+            Ok(Entry::Missed(topic, missed)) => recording.missed(topic, missed),
+            Ok(Entry::Log(line)) => recording.add_log(line)?,
+            Ok(Entry::Health(json, now_ns)) => recording.add_health(&json, now_ns)?,
+            Err(RecvTimeoutError::Timeout) => recording.flush_if_due()?,
+            Err(RecvTimeoutError::Disconnected) => return recording.finish(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The threads that follow the run, and the next one in the same folder after its end.
+//! The threads that follow a run, and the next one in the same folder after its end.
 
 use std::{thread, time::Duration};
 
@@ -12,16 +12,23 @@ use gyre_ros2_messages::{
     visualization_msgs::MarkerArray,
 };
 use gyre_stage::{
-    StageError,
+    Manifest, StageError,
     observer::{Next, ObservedRun},
 };
 
 use crate::{
+    live_map::MapTopic,
     outlet::Outlet,
-    run_state::{RunPhase, RunState, Shared, SharedRunState},
+    run_state::{RunPhase, RunState, Shared},
 };
 
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
+
+pub struct Topics {
+    pub poses: PoseTopics,
+    pub objects: ObjectTopics,
+    pub map: Option<MapTopic>,
+}
 
 pub struct PoseTopics {
     pub odometry: Outlet<Odometry>,
@@ -34,12 +41,7 @@ pub struct ObjectTopics {
     pub markers: Outlet<MarkerArray>,
 }
 
-/// Calls `follow` for each run, with its state, until the bridge stops. A run that could not be
-/// followed is tried again until it ends.
-pub fn each_run(
-    shared: &Shared,
-    mut follow: impl FnMut(&ObservedRun, &SharedRunState) -> Result<(), StageError>,
-) {
+pub fn follow_runs(shared: &Shared, mut topics: Topics, say: fn(&str)) {
     while !shared.is_stopping() {
         let Ok(run) = ObservedRun::writing_to(&shared.out) else {
             // There is no run yet.
@@ -47,43 +49,96 @@ pub fn each_run(
             continue;
         };
         let manifest = run.manifest();
-        let state = shared.begin(&manifest.prefix, manifest.window.slam);
-        match follow(&run, &state) {
-            Ok(()) => await_end(shared, &run),
-            Err(StageError::NotRunning { .. }) => {}
+        shared.begin(manifest.window.slam);
+        follow_run(shared, manifest, &mut topics, say);
+        if run.has_ended() {
+            shared.state().phase = RunPhase::Ended;
+            let sentence = sentence(&shared.state());
+            say(&sentence);
+        }
+    }
+}
+
+/// Follows the topics of a run in a thread each, until the run has ended or the bridge stops.
+fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut Topics, say: fn(&str)) {
+    let (name, window) = (manifest.prefix.as_str(), &manifest.window);
+    let Topics {
+        poses,
+        objects,
+        map,
+    } = topics;
+    thread::scope(|threads| {
+        threads.spawn(move || {
+            until_end(shared, name, |run| follow_poses(shared, run, poses, say));
+        });
+        if window.objects {
+            threads.spawn(move || {
+                until_end(shared, name, |run| {
+                    each_message::<Objects>(shared, run, |header| {
+                        objects.publish(shared, header, say);
+                    })
+                });
+            });
+        }
+        if window.slam {
+            threads.spawn(move || {
+                until_end(shared, name, |run| {
+                    each_message::<Correction>(shared, run, |correction| {
+                        shared.state().map_from_odometry = Some(correction.map_from_odometry());
+                    })
+                });
+            });
+            if let Some(map) = map {
+                threads.spawn(move || {
+                    until_end(shared, name, |run| {
+                        map.follow(shared, run);
+                        Ok(())
+                    });
+                });
+            }
+        }
+    });
+}
+
+/// Calls `follow` with the run of this name, again after a failure, and waits for the end of the
+/// run: until the results are written.
+fn until_end(
+    shared: &Shared,
+    name: &str,
+    mut follow: impl FnMut(&ObservedRun) -> Result<(), StageError>,
+) {
+    while !shared.is_stopping() {
+        let followed = match ObservedRun::writing_to(&shared.out) {
+            Ok(run) if run.manifest().prefix != name => return,
+            Ok(run) => follow(&run).map(|()| await_end(shared, &run)),
+            Err(error) => Err(error),
+        };
+        match followed {
+            Ok(()) | Err(StageError::NotRunning { .. }) => return,
             Err(error) => {
-                state.lock().notice = Some(error.to_string());
+                shared.state().notice = Some(error.to_string());
                 thread::sleep(POLL_INTERVAL);
             }
         }
     }
 }
 
-/// Waits until the results are written and the run is gone.
 fn await_end(shared: &Shared, run: &ObservedRun) {
     while !shared.is_stopping() && !run.has_ended() {
         thread::sleep(POLL_INTERVAL);
     }
 }
 
-pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
-    each_run(shared, |run, state| {
-        shared.show(state);
-        state.lock().notice = None;
-        let followed = each_message::<Pose>(shared, run, |pose| {
-            publish(shared, state, pose, &mut topics, say);
-        });
-        if followed.is_ok() {
-            state.lock().phase = RunPhase::Finishing;
-            await_end(shared, run);
-        }
-        if run.has_ended() {
-            state.lock().phase = RunPhase::Ended;
-            let sentence = sentence(&state.lock());
-            say(&sentence);
-        }
-        followed
-    });
+fn follow_poses(
+    shared: &Shared,
+    run: &ObservedRun,
+    topics: &mut PoseTopics,
+    say: fn(&str),
+) -> Result<(), StageError> {
+    shared.state().notice = None;
+    each_message::<Pose>(shared, run, |pose| topics.publish(shared, pose, say))?;
+    shared.state().phase = RunPhase::Finishing;
+    Ok(())
 }
 
 fn sentence(state: &RunState) -> String {
@@ -113,46 +168,42 @@ fn each_message<M: Message>(
     Ok(())
 }
 
-/// Publishes a pose as odometry and as transforms; the map's transform comes from the loops of
-/// SLAM.
-fn publish(
-    shared: &Shared,
-    state: &SharedRunState,
-    pose: &PoseHeader,
-    topics: &mut PoseTopics,
-    say: fn(&str),
-) {
-    let (stamp_ns, map_from_odometry) = {
-        let mut state = state.lock();
-        // The pose was published before the stream was interrupted.
-        if !state.poses.count(pose.item.seq) {
-            return;
+impl PoseTopics {
+    /// Publishes a pose as odometry and as transforms; the map's transform comes from the loops of
+    /// SLAM.
+    fn publish(&mut self, shared: &Shared, pose: &PoseHeader, say: fn(&str)) {
+        let (stamp_ns, map_from_odometry) = {
+            let mut state = shared.state();
+            // The pose was published before the stream was interrupted.
+            if !state.poses.count(pose.item.seq) {
+                return;
+            }
+            let stamp_ns = stamp_ns(&mut state, pose.item.stamp_ns, say);
+            (stamp_ns, state.map_from_odometry)
+        };
+        let (frames, mounting) = (&shared.frames, &shared.mounting);
+        let vehicle = mounting.of_vehicle_uncertain(&pose.pose());
+        let since = Interval {
+            motion: mounting.of_vehicle_uncertain(&pose.motion.motion().alone()),
+            duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
+        };
+        let mut unsent = 0;
+        if let Some(transforms) = &mut self.transforms {
+            let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
+            let corrected = map_from_odometry.map(|correction| {
+                let corrected = mounting.of_vehicle(&correction);
+                frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
+            });
+            let is_sent = transforms.send(TFMessage {
+                transforms: corrected.into_iter().chain([base]).collect(),
+            });
+            unsent += u64::from(!is_sent);
         }
-        let stamp_ns = stamp_ns(&mut state, pose.item.stamp_ns, say);
-        (stamp_ns, state.map_from_odometry)
-    };
-    let (frames, mounting) = (&shared.frames, &shared.mounting);
-    let vehicle = mounting.of_vehicle_uncertain(&pose.pose());
-    let since = Interval {
-        motion: mounting.of_vehicle_uncertain(&pose.motion.motion().alone()),
-        duration_ns: pose.motion.interval_ns,
-        is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
-    };
-    let mut unsent = 0;
-    if let Some(transforms) = &mut topics.transforms {
-        let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
-        let corrected = map_from_odometry.map(|correction| {
-            let corrected = mounting.of_vehicle(&correction);
-            frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
-        });
-        let is_sent = transforms.send(TFMessage {
-            transforms: corrected.into_iter().chain([base]).collect(),
-        });
-        unsent += u64::from(!is_sent);
+        let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
+        unsent += u64::from(!self.odometry.send(odometry));
+        shared.state().unsent += unsent;
     }
-    let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
-    unsent += u64::from(!topics.odometry.send(odometry));
-    state.lock().unsent += unsent;
 }
 
 /// Returns a time of the run as a time of ROS, and reports the first difference between the two.
@@ -166,39 +217,11 @@ fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
     stamp_ns
 }
 
-pub fn follow_corrections(shared: &Shared) {
-    each_run(shared, |run, state| {
-        if !run.manifest().window.slam {
-            return Ok(());
-        }
-        each_message::<Correction>(shared, run, |correction| {
-            state.lock().map_from_odometry = Some(correction.map_from_odometry());
-        })
-    });
-}
-
-pub fn follow_objects(shared: &Shared, mut topics: ObjectTopics, say: fn(&str)) {
-    each_run(shared, |run, state| {
-        if !run.manifest().window.objects {
-            return Ok(());
-        }
-        each_message::<Objects>(shared, run, |objects| {
-            topics.publish(shared, state, objects, say);
-        })
-    });
-}
-
 impl ObjectTopics {
     /// Publishes the objects of a scan, even an empty list.
-    fn publish(
-        &mut self,
-        shared: &Shared,
-        state: &SharedRunState,
-        header: &ObjectsHeader,
-        say: fn(&str),
-    ) {
+    fn publish(&mut self, shared: &Shared, header: &ObjectsHeader, say: fn(&str)) {
         let stamp_ns = {
-            let mut state = state.lock();
+            let mut state = shared.state();
             // They were published before the stream was interrupted.
             if !state.objects.count(header.item.seq) {
                 return;
@@ -209,6 +232,6 @@ impl ObjectTopics {
         let detections = objects::detections(stamp_ns, frames, mounting, listed);
         let markers = objects::markers(stamp_ns, frames, mounting, listed);
         let sent = [self.detections.send(detections), self.markers.send(markers)];
-        state.lock().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
+        shared.state().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
     }
 }

@@ -27,14 +27,13 @@ struct LastCounts {
     lost: u64,
 }
 
-/// Reports once a second until the bridge stops.
 pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
     let (mut before, mut due) = (LastCounts::default(), Instant::now());
     while !shared.is_stopping() {
         if Instant::now() >= due {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
-            let state = shared.shown().lock().clone();
+            let state = shared.state().clone();
             let out = shared.out.display().to_string();
             diagnostics.send(array(&out, &state, answer.ok(), &mut before));
         }
@@ -42,7 +41,6 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
     }
 }
 
-/// Returns the diagnostics of the run and its processes.
 fn array(
     out: &str,
     state: &RunState,

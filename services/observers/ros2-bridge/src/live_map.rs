@@ -13,10 +13,7 @@ use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_stage::{clock, observer::ObservedRun};
 
 use crate::{
-    MapSettings, MapSettingsOf,
-    following::{POLL_INTERVAL, each_run},
-    outlet::Outlet,
-    run_state::{Shared, SharedRunState},
+    MapSettings, MapSettingsOf, following::POLL_INTERVAL, outlet::Outlet, run_state::Shared,
 };
 
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -25,7 +22,6 @@ const PAUSE_FACTOR: u32 = 9;
 
 type LiveMapError = Box<dyn Error>;
 
-/// The keyframes of a run, drawn at their corrected poses.
 struct LiveMap {
     settings: MapSettings,
     keyframes: RecordReader<Keyframe>,
@@ -35,32 +31,31 @@ struct LiveMap {
     /// ignores the rotation of a grid.
     radar: Pose,
     evidence: Evidence,
-    /// The number of each keyframe's scan in the run.
     seqs: Vec<u64>,
     closed: usize,
 }
 
-/// Publishes the map of each run with SLAM, when it has new keyframes, until the bridge stops.
-pub fn follow_maps(shared: &Shared, settings: MapSettingsOf, mut maps: Outlet<OccupancyGrid>) {
-    each_run(shared, |run, state| {
-        if !run.manifest().window.slam {
-            return Ok(());
-        }
-        let settings = settings(&shared.out).map_err(LiveMapError::from);
-        let followed =
-            settings.and_then(|settings| follow(shared, run, state, &settings, &mut maps));
-        // Not tried again: that would read all keyframes each time.
-        if let Err(error) = followed {
-            state.lock().notice = Some(format!("the map is not published: {error}"));
-        }
-        Ok(())
-    });
+pub struct MapTopic {
+    pub settings: MapSettingsOf,
+    pub maps: Outlet<OccupancyGrid>,
 }
 
-fn follow(
+impl MapTopic {
+    /// Publishes the map of a run when it has new keyframes, until the run ends.
+    pub fn follow(&mut self, shared: &Shared, run: &ObservedRun) {
+        let settings = (self.settings)(&shared.out).map_err(LiveMapError::from);
+        let followed =
+            settings.and_then(|settings| publish(shared, run, &settings, &mut self.maps));
+        // Not tried again: that would read all keyframes each time.
+        if let Err(error) = followed {
+            shared.state().notice = Some(format!("the map is not published: {error}"));
+        }
+    }
+}
+
+fn publish(
     shared: &Shared,
     run: &ObservedRun,
-    state: &SharedRunState,
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {
@@ -85,7 +80,7 @@ fn follow(
                 grid.corner_m,
                 grid.values,
             ));
-            state.lock().maps += u64::from(is_sent);
+            shared.state().maps += u64::from(is_sent);
         }
         due = Instant::now() + INTERVAL.max(begun.elapsed() * PAUSE_FACTOR);
     }

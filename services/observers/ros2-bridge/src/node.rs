@@ -29,7 +29,6 @@ pub struct Node {
     context: Context,
 }
 
-/// The messages of a topic that are kept for its readers.
 #[derive(Clone, Copy, Debug)]
 pub enum Keep {
     /// The last messages, for readers that are behind.

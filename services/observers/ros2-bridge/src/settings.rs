@@ -10,7 +10,6 @@ use crate::Mounting;
 
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The folder of the results of the run, and of the next one.
     pub out: PathBuf,
     pub domain: Domain,
     /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
@@ -28,6 +27,5 @@ pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
     pub options: MapOptions,
-    /// The estimator that corrects the poses of keyframes by loops.
     pub estimator: EstimatorKind,
 }

@@ -29,15 +29,12 @@ const ODOMETRY: &str = "/odom";
 /// The topic of a GNSS receiver, as `nmea_navsat_driver` names it.
 const FIX: &str = "/fix";
 
-/// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
-    /// The topic of an inertial sensor, if there is one.
     pub gyro_topic: Option<String>,
-    /// The topic of the odometry of the wheels, if it is used.
     pub wheels_topic: Option<String>,
     pub fixes: Option<FixSettings>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
@@ -75,7 +72,6 @@ impl Settings {
     }
 }
 
-/// Receives the scans of a radar until SIGTERM, or until there are enough.
 pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, StageError> {
     let gyro: GyroConfig = launch.section("gyro")?;
     let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());

@@ -12,7 +12,6 @@ use axum::http::{HeaderMap, Uri, header};
 use subtle::ConstantTimeEq;
 
 const TOKEN_BYTES: usize = 16;
-/// The minimum length of a token in a file.
 const MIN_TOKEN: usize = 16;
 
 /// The origins of viewers' pages: Foxglove's site, and the files of an application, which no site
@@ -23,7 +22,6 @@ const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 pub struct Token(String);
 
 pub struct Access {
-    /// The token; `None`: only this machine has access.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
@@ -34,7 +32,6 @@ pub struct Access {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It may read.
     Granted,
     /// It may read, and gave the token in its address: a cookie replaces it from here on.
     GrantedByAddress,
@@ -42,7 +39,6 @@ pub enum Verdict {
     /// It names a host that is not this machine: another site's name may have been pointed here
     /// (DNS rebinding).
     ForeignHost,
-    /// A page of another site has sent it.
     ForeignOrigin,
 }
 

@@ -43,7 +43,6 @@ impl Default for Limits {
 /// Time until the next try where the system refuses a connection, as for want of descriptors.
 const RETRY: Duration = Duration::from_millis(100);
 
-/// Serves until `stop` holds; requests that are being answered then have their answers.
 pub async fn serve(
     listener: TcpListener,
     router: Router,

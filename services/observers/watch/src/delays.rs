@@ -26,7 +26,6 @@ struct DelaySample {
     delays_us: [Option<u32>; KINDS],
 }
 
-/// Median and 99th percentile, ms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percentiles {
     p50_ms: f64,

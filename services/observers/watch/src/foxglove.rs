@@ -1,14 +1,9 @@
 //! The topics of a run for Foxglove and Lichtblick, by their WebSocket protocol (`foxglove.sdk.v1`,
 //! once `foxglove.websocket.v1`).
 //!
-//! A viewer subscribes to channels. A topic of the run is observed only while a viewer wants one of
-//! its channels. Messages are encoded once, by the encoders of recordings
-//! ([`gyre_recording::view`]), and wait for each viewer in a `viewer_queue` of bounded size: a slow
-//! viewer loses messages, and nothing waits for it.
-//!
-//! Reading order: `channels`, `viewer_queue`, `hub` (between the threads that observe and the
-//! viewers), `following` (those threads), `measurements` (latency and health), `viewer` (one
-//! connection).
+//! A topic of the run is observed only while a viewer has subscribed to one of its channels.
+//! Messages are encoded once ([`gyre_recording::view`]), and wait for each viewer in a
+//! `viewer_queue` of bounded size: a slow viewer loses messages, and nothing waits for it.
 
 mod channels;
 mod following;

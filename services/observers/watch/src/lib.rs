@@ -1,15 +1,9 @@
 //! A page that shows a run in a browser, and metrics for Prometheus; on request also topics for
-//! Foxglove.
+//! Foxglove. The process is an observer: the run does not wait for it, and missed messages are
+//! counted.
 //!
-//! The process is an observer: the run does not wait for it, and missed messages are counted.
-//! Reading order:
-//!
-//! 1. `server`: listens, and ends with a signal; `connections`: how many at once; `access`: who may
-//!    read; `page`: the files of the page.
-//! 2. `observing`: the threads that follow the run, and write to the `run_view`.
-//! 3. `track`, `delays`, `pictures`, `processes`: the parts of the view, in bounded memory.
-//! 4. `stream`: one browser, which receives `messages`; `metrics`: one scrape of Prometheus.
-//! 5. `foxglove`: the topics for Foxglove.
+//! `server` listens, the threads of `observing` write to the `run_view`, and a `stream` sends it to
+//! one browser.
 
 mod access;
 mod connections;

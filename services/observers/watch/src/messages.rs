@@ -28,15 +28,11 @@ pub struct Missed {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
-    /// The run has not started yet.
     #[default]
     Waiting,
     Working,
-    /// The last scan has its pose; results are being written.
     Finishing,
-    /// It has ended, and the recording with it.
     Complete,
-    /// It has ended before the recording.
     Interrupted,
 }
 
@@ -65,7 +61,6 @@ pub struct RunInfo {
 pub struct HealthReport {
     #[serde(flatten)]
     pub counts: RunCounts,
-    /// Poses a second since the last report.
     pub scans_per_s: f64,
     pub distance_m: f64,
     pub delays: DelayReport,
@@ -80,7 +75,6 @@ pub struct HealthReport {
 pub struct RunCounts {
     pub published: u64,
     pub poses: u64,
-    /// Scans that live mode has dropped.
     pub dropped: u64,
     /// Scans that were published and have no pose yet.
     pub in_flight: u64,
@@ -131,7 +125,6 @@ pub struct CurrentPose {
 }
 
 impl CurrentPose {
-    /// The newest pose of the run.
     pub fn of(pose: &PoseHeader) -> Self {
         let interval_s = pose.motion.interval_ns as f64 * 1e-9;
         // The chain starts with a motion of no duration.

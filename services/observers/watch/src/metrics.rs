@@ -4,10 +4,7 @@ use std::fmt;
 
 use prometheus_client::{
     collector::Collector,
-    encoding::{
-        DescriptorEncoder, EncodeCounterValue, EncodeGaugeValue, EncodeMetric, MetricEncoder,
-        text::encode,
-    },
+    encoding::{DescriptorEncoder, EncodeMetric, MetricEncoder, text::encode},
     metrics::{MetricType, counter::ConstCounter, gauge::ConstGauge, info::Info},
     registry::{Registry, Unit},
 };
@@ -16,7 +13,6 @@ use gyre_messages::Basis;
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
-/// The type of the answer.
 pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 #[derive(Debug)]
@@ -57,142 +53,97 @@ pub fn scrape(view: &RunView) -> String {
 
 impl Collector for Snapshot {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
-        let encoder = &mut encoder;
-        for (name, help, kind, value) in self.numbers() {
-            let metric = encoder.encode_descriptor(name, help, None, kind)?;
-            encode_value(kind, value, metric)?;
+        for (name, help, unit, kind, values) in self.metrics() {
+            let mut metric = encoder.encode_descriptor(name, help, unit.as_ref(), kind)?;
+            match values {
+                Values::One(value) => encode_value(kind, value, metric)?,
+                Values::By(label, values) => {
+                    for (of, value) in values {
+                        encode_value(kind, value, metric.encode_family(&[(label, of)])?)?;
+                    }
+                }
+            }
         }
-        for (name, help, label, values) in self.labelled() {
-            let description = (name, help, None, MetricType::Counter);
-            family(encoder, description, label, values)?;
-        }
-        self.encode_rates(encoder)?;
-        self.encode_processes(encoder)
+        Ok(())
     }
 }
 
-type Description<'a> = (&'a str, &'a str, Option<Unit>, MetricType);
-
-fn family<'a, N: EncodeCounterValue + EncodeGaugeValue>(
-    encoder: &mut DescriptorEncoder<'_>,
-    (name, help, unit, kind): Description<'_>,
-    label: &str,
-    values: impl IntoIterator<Item = (&'a str, N)>,
-) -> fmt::Result {
-    let mut family = encoder.encode_descriptor(name, help, unit.as_ref(), kind)?;
-    for (of, value) in values {
-        encode_value(kind, value, family.encode_family(&[(label, of)])?)?;
-    }
-    Ok(())
-}
-
-fn encode_value<N: EncodeCounterValue + EncodeGaugeValue>(
-    kind: MetricType,
-    value: N,
-    metric: MetricEncoder<'_>,
-) -> fmt::Result {
+fn encode_value(kind: MetricType, value: f64, metric: MetricEncoder<'_>) -> fmt::Result {
     match kind {
         MetricType::Counter => ConstCounter::new(value).encode(metric),
         _ => ConstGauge::new(value).encode(metric),
     }
 }
 
-/// A name, a help, a label, and a count for each value of the label.
-type Labelled = (Name, Name, Name, Vec<(Name, u64)>);
+type Metric<'a> = (Name, Name, Option<Unit>, MetricType, Values<'a>);
 type Name = &'static str;
 
+enum Values<'a> {
+    One(f64),
+    /// A label, and a value for each of its values.
+    By(Name, Vec<(&'a str, f64)>),
+}
+
+fn one(count: u64) -> Values<'static> {
+    Values::One(count as f64)
+}
+
+fn by<const N: usize>(label: Name, counts: [(Name, u64); N]) -> Values<'static> {
+    Values::By(label, counts.map(|(of, count)| (of, count as f64)).to_vec())
+}
+
+const COUNTER: MetricType = MetricType::Counter;
+const GAUGE: MetricType = MetricType::Gauge;
+
 impl Snapshot {
-    /// Returns the metrics without labels: a name, a help, a type and a value of each. Those of
-    /// samples and of a live radar are missing in a run without them.
+    /// Returns the metrics. Those of samples and of a live radar are missing in a run without them.
     #[rustfmt::skip]
-    fn numbers(&self) -> Vec<(&'static str, &'static str, MetricType, u64)> {
-        const COUNTER: MetricType = MetricType::Counter;
-        const GAUGE: MetricType = MetricType::Gauge;
-        let counts = &self.counts;
-        let mut numbers = vec![
-            ("scans_published", "Scans that the source has published.", COUNTER, counts.published),
-            ("poses", "Poses of the trajectory.", COUNTER, counts.poses),
-            ("scans_dropped", "Scans that live mode has dropped.", COUNTER, counts.dropped),
-            ("up", "1 while a run works, else 0.", GAUGE, u64::from(self.is_up)),
-            ("scans_in_flight", "Scans that were published and have no pose yet.", GAUGE, counts.in_flight),
+    fn metrics(&self) -> Vec<Metric<'_>> {
+        let (counts, of, missed) = (&self.counts, &self.counts.witnesses, &self.counts.missed);
+        let by_basis = Basis::ALL.iter().zip(of.by_basis);
+        let by_basis = by_basis.map(|(basis, count)| (basis.name(), count as f64));
+        let mut metrics = vec![
+            ("scans_published", "Scans that the source has published.", None, COUNTER, one(counts.published)),
+            ("poses", "Poses of the trajectory.", None, COUNTER, one(counts.poses)),
+            ("scans_dropped", "Scans that live mode has dropped.", None, COUNTER, one(counts.dropped)),
+            ("up", "1 while a run works, else 0.", None, GAUGE, one(self.is_up.into())),
+            ("scans_in_flight", "Scans that were published and have no pose yet.", None, GAUGE, one(counts.in_flight)),
+            ("motions", "Motions by what they rest on.", None, COUNTER, Values::By("basis", by_basis.collect())),
+            ("gyro_turns", "Turns that the gyro has measured: used, or refused since the radar contradicts.", None, COUNTER, by("state", [("used", of.gyro_used), ("refused", of.gyro_refused)])),
+            ("wheel_distances", "Distances that the wheels have measured: used, or slipping.", None, COUNTER, by("state", [("used", of.wheels_used), ("slip", of.wheel_slips)])),
+            ("doppler_velocities", "Velocities by Doppler: used, or refused since the matches contradict.", None, COUNTER, by("state", [("used", of.doppler_used), ("refused", of.doppler_refused)])),
+            ("observer_missed", "Messages that this observer has missed. Delays lack those of missed poses.", None, COUNTER, by("topic", [("pose", missed.pose), ("scan", missed.scan), ("masked", missed.masked), ("objects", missed.objects)])),
+            ("process_restarts", "Restarts of a process of the run.", None, COUNTER, self.by_process(|it| Some(it.restarts as f64))),
+            ("process_cpu", "Processor time of a process since its start.", Some(Unit::Seconds), COUNTER, self.by_process(|it| it.cpu_s)),
+            ("process_memory", "Memory of a process's own.", Some(Unit::Bytes), GAUGE, self.by_process(|it| it.own_bytes.map(|bytes| bytes as f64))),
         ];
-        if self.has_samples() {
-            let help = "Samples that were left out, since they came late or were unusable.";
-            numbers.push(("samples_left_out", help, COUNTER, counts.samples.left_out));
-        }
-        if let Some(it) = self.processes.iter().find_map(|it| it.received) {
-            numbers.extend([
-                ("radar_scans_left_out", "Turns of the radar of which there is no scan.", COUNTER, it.scans_left_out),
-                ("radar_missing_azimuths", "Azimuths that are missing from the scans.", COUNTER, it.missing_azimuths),
-                ("radar_damaged_messages", "Messages of the radar that could not be read.", COUNTER, it.damaged_messages),
-                ("radar_foreign_messages", "Datagrams of others, and descriptions that do not fit into the run.", COUNTER, it.foreign_messages),
-                ("radar_reconnections", "Connections to the radar after the first.", COUNTER, it.reconnections()),
-                ("radar_receiving", "1 while azimuths arrive from the radar, else 0.", GAUGE, u64::from(it.is_receiving)),
+        let samples = &counts.samples;
+        if samples.gyro_hz.is_some() || samples.wheels_hz.is_some() {
+            let rates = [("gyro", samples.gyro_hz), ("wheels", samples.wheels_hz)];
+            let rates = rates.map(|(sensor, rate_hz)| (sensor, rate_hz.unwrap_or(0.0))).to_vec();
+            metrics.extend([
+                ("samples", "Samples that came with the scans.", None, COUNTER, by("sensor", [("gyro", samples.gyro), ("wheels", samples.wheels)])),
+                ("samples_left_out", "Samples that were left out, since they came late or were unusable.", None, COUNTER, one(samples.left_out)),
+                ("sample_rate", "Samples a second by their stamps, over the last scans.", Some(Unit::Other("hertz".to_owned())), GAUGE, Values::By("sensor", rates)),
             ]);
         }
-        numbers
-    }
-
-    #[rustfmt::skip]
-    fn labelled(&self) -> Vec<Labelled> {
-        let (of, missed, samples) = (&self.counts.witnesses, &self.counts.missed, &self.counts.samples);
-        let by_basis = Basis::ALL.iter().zip(of.by_basis).map(|(basis, count)| (basis.name(), count));
-        let used = |used, other, count| vec![("used", used), (other, count)];
-        let missed = [("pose", missed.pose), ("scan", missed.scan), ("masked", missed.masked), ("objects", missed.objects)];
-        let mut labelled: Vec<Labelled> = vec![
-            ("motions", "Motions by what they rest on.", "basis", by_basis.collect()),
-            ("gyro_turns", "Turns that the gyro has measured: used, or refused since the radar contradicts.", "state", used(of.gyro_used, "refused", of.gyro_refused)),
-            ("wheel_distances", "Distances that the wheels have measured: used, or slipping.", "state", used(of.wheels_used, "slip", of.wheel_slips)),
-            ("doppler_velocities", "Velocities by Doppler: used, or refused since the matches contradict.", "state", used(of.doppler_used, "refused", of.doppler_refused)),
-            ("observer_missed", "Messages that this observer has missed. Delays lack those of missed poses.", "topic", missed.to_vec()),
-        ];
-        if self.has_samples() {
-            let counts = vec![("gyro", samples.gyro), ("wheels", samples.wheels)];
-            labelled.push(("samples", "Samples that came with the scans.", "sensor", counts));
+        if let Some(it) = self.processes.iter().find_map(|it| it.received) {
+            metrics.extend([
+                ("radar_scans_left_out", "Turns of the radar of which there is no scan.", None, COUNTER, one(it.scans_left_out)),
+                ("radar_missing_azimuths", "Azimuths that are missing from the scans.", None, COUNTER, one(it.missing_azimuths)),
+                ("radar_damaged_messages", "Messages of the radar that could not be read.", None, COUNTER, one(it.damaged_messages)),
+                ("radar_foreign_messages", "Datagrams of others, and descriptions that do not fit into the run.", None, COUNTER, one(it.foreign_messages)),
+                ("radar_reconnections", "Connections to the radar after the first.", None, COUNTER, one(it.reconnections())),
+                ("radar_receiving", "1 while azimuths arrive from the radar, else 0.", None, GAUGE, one(it.is_receiving.into())),
+            ]);
         }
-        labelled
+        metrics
     }
 
-    fn has_samples(&self) -> bool {
-        let samples = &self.counts.samples;
-        samples.gyro_hz.is_some() || samples.wheels_hz.is_some()
-    }
-
-    fn encode_rates(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
-        if !self.has_samples() {
-            return Ok(());
-        }
-        let samples = &self.counts.samples;
-        let rates = [("gyro", samples.gyro_hz), ("wheels", samples.wheels_hz)];
-        let rates = rates.map(|(sensor, rate_hz)| (sensor, rate_hz.unwrap_or(0.0)));
-        let help = "Samples a second by their stamps, over the last scans.";
-        let unit = Some(Unit::Other("hertz".to_owned()));
-        let description = ("sample_rate", help, unit, MetricType::Gauge);
-        family(encoder, description, "sensor", rates)
-    }
-
-    fn encode_processes(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
-        let help = "Restarts of a process of the run.";
-        let restarts = self.of_processes(|it| Some(it.restarts as f64));
-        let description = ("process_restarts", help, None, MetricType::Counter);
-        family(encoder, description, "process", restarts)?;
-        let help = "Processor time of a process since its start.";
-        let cpu = self.of_processes(|it| it.cpu_s);
-        let unit = Some(Unit::Seconds);
-        let description = ("process_cpu", help, unit, MetricType::Counter);
-        family(encoder, description, "process", cpu)?;
-        let help = "Memory of a process's own.";
-        let memory = self.of_processes(|it| it.own_bytes.map(|bytes| bytes as f64));
-        let description = ("process_memory", help, Some(Unit::Bytes), MetricType::Gauge);
-        family(encoder, description, "process", memory)
-    }
-
-    fn of_processes(
-        &self,
-        value: fn(&Process) -> Option<f64>,
-    ) -> impl Iterator<Item = (&str, f64)> {
+    fn by_process(&self, value: fn(&Process) -> Option<f64>) -> Values<'_> {
         let processes = self.processes.iter();
-        processes.filter_map(move |it| Some((it.name.as_str(), value(it)?)))
+        let values = processes.filter_map(|it| Some((it.name.as_str(), value(it)?)));
+        Values::By("process", values.collect())
     }
 }
 
@@ -274,21 +225,21 @@ mod tests {
         let mut text = String::new();
         assert!(encode(&mut text, &registry).is_ok());
         for line in [
-            "gyre_motions_total{basis=\"dead reckoning\"} 1",
-            "gyre_motions_total{basis=\"radar only\"} 0",
-            "gyre_gyro_turns_total{state=\"refused\"} 1",
-            "gyre_gyro_turns_total{state=\"used\"} 0",
-            "gyre_wheel_distances_total{state=\"used\"} 1",
-            "gyre_wheel_distances_total{state=\"slip\"} 0",
-            "gyre_doppler_velocities_total{state=\"used\"} 0",
-            "gyre_radar_missing_azimuths_total 3",
-            "gyre_radar_scans_left_out_total 5",
-            "gyre_radar_damaged_messages_total 0",
-            "gyre_radar_foreign_messages_total 0",
-            "gyre_radar_reconnections_total 7",
-            "gyre_radar_receiving 1",
-            "gyre_samples_total{sensor=\"gyro\"} 2080",
-            "gyre_samples_left_out_total 3",
+            "gyre_motions_total{basis=\"dead reckoning\"} 1.0",
+            "gyre_motions_total{basis=\"radar only\"} 0.0",
+            "gyre_gyro_turns_total{state=\"refused\"} 1.0",
+            "gyre_gyro_turns_total{state=\"used\"} 0.0",
+            "gyre_wheel_distances_total{state=\"used\"} 1.0",
+            "gyre_wheel_distances_total{state=\"slip\"} 0.0",
+            "gyre_doppler_velocities_total{state=\"used\"} 0.0",
+            "gyre_radar_missing_azimuths_total 3.0",
+            "gyre_radar_scans_left_out_total 5.0",
+            "gyre_radar_damaged_messages_total 0.0",
+            "gyre_radar_foreign_messages_total 0.0",
+            "gyre_radar_reconnections_total 7.0",
+            "gyre_radar_receiving 1.0",
+            "gyre_samples_total{sensor=\"gyro\"} 2080.0",
+            "gyre_samples_left_out_total 3.0",
             "gyre_sample_rate_hertz{sensor=\"gyro\"} 208.0",
             "gyre_sample_rate_hertz{sensor=\"wheels\"} 0.0",
         ] {

@@ -37,7 +37,6 @@ pub struct Followed {
     pub view: Arc<RunView>,
 }
 
-/// Starts the threads. They end when the view is stopped.
 pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
     let start = |name: &str, follow: fn(&Followed)| {
         let followed = Arc::clone(followed);
@@ -61,7 +60,6 @@ pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
     ])
 }
 
-/// Follows the run, and the next one in the same folder after its end.
 fn follow_runs(followed: &Followed) {
     while !followed.view.is_stopping() {
         match ObservedRun::writing_to(&followed.out) {
@@ -141,7 +139,6 @@ fn follow_poses(
     Ok(())
 }
 
-/// Follows a topic as long as a browser wants one of these layers.
 fn follow_pictures<M: Message>(
     followed: &Followed,
     layers: &[Layer],
@@ -204,7 +201,6 @@ pub fn follow_topic<M: Message>(
     }
 }
 
-/// Sends the picture of a scan; without memory for it, none.
 fn scan(view: &RunView, message: &Received<Scan>) {
     let item = message.item();
     let scan = message.header().view(message.values());
@@ -234,7 +230,6 @@ fn masked(view: &RunView, message: &Received<Masked>) {
     }
 }
 
-/// Reports once a second.
 fn report(followed: &Followed) {
     let mut meter = ProcessMeter::default();
     let mut reported = Instant::now();

@@ -10,7 +10,6 @@ const STYLE: &str = "text/css; charset=utf-8";
 const ICON: &str = "image/svg+xml";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// Returns the path, the type and the content of each file.
 macro_rules! files {
     ($($path:literal $kind:ident $file:literal),* $(,)?) => {
         [$(($path, $kind, include_str!(concat!("../page/", $file)))),*]

@@ -13,7 +13,6 @@ use crate::frame;
 const MAX_AZIMUTHS: usize = 400;
 /// The most range bins of a picture: a display has about as many pixels from middle to edge.
 const MAX_BINS: usize = 256;
-/// The most cells on each side of a raster.
 const MAX_SIDE: usize = 256;
 /// Bits of a power that are dropped: 32 shades remain, and a scan compresses to a third.
 const DROPPED_BITS: u32 = 3;

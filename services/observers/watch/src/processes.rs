@@ -11,7 +11,6 @@ use serde::Serialize;
 
 const SUPERVISOR: &str = "supervisor";
 
-/// Reads the states of a run's processes, and measures their usage between two reads.
 #[derive(Debug, Default)]
 pub struct ProcessMeter {
     before: BTreeMap<u32, (Instant, Usage)>,
@@ -63,7 +62,6 @@ impl ProcessMeter {
         Some((status, processes))
     }
 
-    /// Sets the usage of each process that still runs.
     fn measure(&mut self, processes: &mut [Process]) {
         let now = Instant::now();
         let mut after = BTreeMap::new();
@@ -83,7 +81,6 @@ impl ProcessMeter {
 }
 
 impl Process {
-    /// Marks it as ended, with the run.
     pub fn end(&mut self) {
         (self.state, self.level) = ("ended", "off");
         (self.processor_share, self.cpu_s, self.own_bytes) = (None, None, None);

@@ -43,7 +43,6 @@ impl RecentDrift {
         }
     }
 
-    /// Returns the drift; `None` before the first motion.
     pub fn drift(&self) -> Option<Drift> {
         let first = ComposedMotion::of(self.motions.front()?);
         let rest = self.motions.iter().skip(1);

@@ -72,7 +72,6 @@ struct ViewState {
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
-    /// Time and number of poses at the last report.
     reported: Option<(i64, u64)>,
     notice: Option<String>,
     processes: Vec<Process>,
@@ -203,7 +202,6 @@ impl RunView {
         }
     }
 
-    /// Shows the objects of a scan.
     pub fn set_objects(&self, header: &ObjectsHeader) {
         send_json(self.updates.of(Layer::Objects), &messages::objects(header));
     }
@@ -322,7 +320,6 @@ impl RunView {
     }
 }
 
-/// Returns the part of gyro, wheels and Doppler in the last motions, and their rates, in words.
 fn others(state: &ViewState) -> Option<String> {
     let used = WitnessCounts::of(&state.last_motions).in_words();
     let samples = state.counts.samples.in_words();

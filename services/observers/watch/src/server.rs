@@ -59,17 +59,15 @@ pub enum WatchError {
     Stage(#[from] StageError),
 }
 
-/// An address that is listened at, and the token of its readers.
 pub struct Endpoint {
     listener: TcpListener,
     address: SocketAddr,
     token: Option<Token>,
 }
 
-/// The server of a page, and on request of Foxglove.
 pub struct Server {
-    page: Endpoint,
-    foxglove: Option<Endpoint>,
+    pub page: Endpoint,
+    pub foxglove: Option<Endpoint>,
 }
 
 #[derive(Clone)]
@@ -117,17 +115,6 @@ impl Endpoint {
 }
 
 impl Server {
-    pub fn new(page: Endpoint) -> Self {
-        Self {
-            page,
-            foxglove: None,
-        }
-    }
-
-    pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
-        Self { foxglove, ..self }
-    }
-
     /// Shows the runs that write to `out`, one after the other, until a signal arrives.
     /// `is_complete` returns whether a run that has ended there has reached the end of its
     /// recording.
@@ -236,7 +223,6 @@ const REFUSALS: [[&str; 3]; 2] = [
     ],
 ];
 
-/// Answers only requests that may read, whatever the path.
 async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let access = &shared.access;
     let [no_token, foreign_host, foreign_origin] = REFUSALS[usize::from(access.of_viewers)];
@@ -287,7 +273,6 @@ async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Resp
     })
 }
 
-/// Bounds the bytes of a received message and of a frame.
 fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
     upgrade.max_message_size(bytes).max_frame_size(bytes)
 }

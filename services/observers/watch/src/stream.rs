@@ -15,7 +15,6 @@ use crate::{
 };
 
 const POSES_INTERVAL: Duration = Duration::from_millis(200);
-/// The longest time that a browser may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
 /// The layers by the names that a browser gives them, in the order of their numbers.
 const LAYERS: [(&str, Layer); 4] = [
@@ -53,7 +52,6 @@ impl Drop for Wanted {
     }
 }
 
-/// Sends updates to a browser until it disconnects, is too slow, or the program ends.
 pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
     let updates = &view.updates;
     let subscribe = |to: &Newest| {
@@ -102,7 +100,6 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
     }
 }
 
-/// Returns the newest message of a channel; `None` if nothing was ever sent.
 fn newest(updates: &mut Receiver<Option<Message>>) -> Option<Message> {
     updates.borrow_and_update().clone()
 }

@@ -23,7 +23,6 @@ pub struct Track {
     version: u64,
 }
 
-/// The vertices of a track that a reader has received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cursor {
     version: u64,
@@ -77,7 +76,6 @@ impl Track {
         }
     }
 
-    /// Returns the driven distance, m: the sum of all motions.
     pub fn length_m(&self) -> f64 {
         self.length_m
     }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_datasets::read_trajectory;
-use gyre_evaluation::{Evaluation, Options};
+use gyre_evaluation::Evaluation;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_results::{SUMMARY, judgement::judge, require_results};
@@ -39,7 +39,7 @@ impl Subject {
         };
         let trajectory = read_trajectory(&file)?;
         let evaluation = truth.and_then(|truth| {
-            judge(&trajectory, truth, Options::default())
+            judge(&trajectory, truth)
                 .inspect_err(|reason| {
                     print::note(format_args!(
                         "{} is not evaluated: {reason}",

@@ -11,13 +11,10 @@ pub fn first(begun: &Table, now: &Table) -> Option<String> {
 
 fn of_key(key: &str, begun: Option<&Value>, now: Option<&Value>) -> Option<String> {
     let empty = Table::new();
-    let table = |value: Option<&Value>| match value {
-        Some(Value::Table(table)) => Some(table.clone()),
-        _ => None,
-    };
-    match (table(begun), table(now)) {
-        (None, None) if begun == now => None,
-        (None, None) => {
+    let tables = [begun, now].map(|value| value.and_then(Value::as_table));
+    match tables {
+        [None, None] if begun == now => None,
+        [None, None] => {
             let shown = |value: Option<&Value>| value.map_or("unset".to_owned(), Value::to_string);
             Some(format!(
                 "{key} was {} and is now {}",
@@ -25,11 +22,8 @@ fn of_key(key: &str, begun: Option<&Value>, now: Option<&Value>) -> Option<Strin
                 shown(now)
             ))
         }
-        (begun, now) => first(
-            begun.as_ref().unwrap_or(&empty),
-            now.as_ref().unwrap_or(&empty),
-        )
-        .map(|difference| format!("{key}.{difference}")),
+        [begun, now] => first(begun.unwrap_or(&empty), now.unwrap_or(&empty))
+            .map(|difference| format!("{key}.{difference}")),
     }
 }
 

@@ -17,7 +17,6 @@ use crate::{
     strict::{value, within},
 };
 
-/// Refuses the first of these sections whose condition holds, with a reason.
 macro_rules! refuse {
     ($($section:literal if $contradicts:expr => $reason:literal;)*) => {
         $(if $contradicts {
@@ -27,16 +26,8 @@ macro_rules! refuse {
 }
 
 impl Configuration {
-    /// Checks every section, then all together.
     pub(super) fn validate(&self) -> Result<(), ConfigurationError> {
-        let method = MethodConfig {
-            dataset: self.dataset,
-            odometry: self.odometry.clone(),
-            slam: self.slam.clone(),
-            gnss: self.gnss.clone(),
-            objects: self.objects.clone(),
-        };
-        method.validate()?;
+        MethodConfig::check(&self.odometry, &self.gnss)?;
         within("run", self.window(None, 1).validate())?;
         if let Some(simulation) = &self.simulation {
             within("simulation", simulation.validate())?;
@@ -50,7 +41,6 @@ impl Configuration {
         self.validate_parts()
     }
 
-    /// Times and limits are 0 or more.
     fn validate_numbers(&self) -> Result<(), ConfigurationError> {
         let (run, source) = (&self.run, &self.source);
         for (section, key, number) in [
@@ -142,7 +132,6 @@ impl Configuration {
         Ok(())
     }
 
-    /// Checks that no two live sensors receive at one address.
     fn validate_listen(&self) -> Result<(), ConfigurationError> {
         let odometry = &self.odometry;
         let (gyro, wheels, gnss) = (&odometry.gyro, &odometry.wheels, &self.gnss);
@@ -236,7 +225,6 @@ impl Configuration {
         Ok(())
     }
 
-    /// Returns why the run has no such topic.
     fn lacks(&self, topic: PlayedFrom) -> Option<&'static str> {
         match topic {
             PlayedFrom::Rotation if !self.has(StageId::RotationSearch) => {

@@ -37,11 +37,8 @@ pub struct ObjectBand {
     pub recall: f64,
     /// Share of the tracked ones that were matched.
     pub precision: f64,
-    /// Root mean square of the distance of the centres, m.
     pub position_rmse_m: f64,
-    /// Root mean square of the difference of the velocities, m/s.
     pub velocity_rmse_mps: f64,
-    /// Root mean square of the difference of the headings, degrees.
     pub heading_rmse_deg: f64,
 }
 

@@ -50,7 +50,6 @@ pub(super) struct Compared {
 }
 
 impl Compared {
-    /// Compares the objects of a scan.
     pub fn new(truth: &[TrueObject], tracked: &[&TrackedObject], gate_m: f64) -> Self {
         let similar = |truth: &TrueObject, found: &TrackedObject| {
             (1.0 - distance_m(truth, found) / gate_m).max(0.0)
@@ -128,7 +127,6 @@ impl Identities {
 }
 
 impl Hota {
-    /// Evaluates a drive.
     pub(super) fn of(scans: &[Compared]) -> Self {
         let identities = Identities::of(scans);
         // For each two identities, the number of scans that pair them at each level.

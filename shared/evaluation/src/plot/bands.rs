@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::{PlotError, canvas::*};
+use super::{EvaluationError, canvas::*, no_pose};
 use crate::{BandSample, Bands, TruthSigma};
 
 /// Size of the document, px: the header and three panels of equal height, the last with the time
@@ -21,9 +21,9 @@ const BAND: RGBColor = RGBColor(205, 226, 243);
 
 /// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma
 /// band.
-pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
+pub fn bands_svg(bands: &Bands) -> Result<String, EvaluationError> {
     let times_s = bands.chains.iter().flatten().map(|sample| sample.time_s);
-    let last = times_s.reduce(f64::max).ok_or(PlotError::Empty)?;
+    let last = times_s.reduce(f64::max).ok_or_else(no_pose)?;
     let error = ("estimate - ground truth", Symbol::Line(line(ESTIMATE, 2.0)));
     let legend = [error, ("+-3 sigma", Symbol::Area(BAND))];
     let title = "Error over time with 3-sigma bands";
@@ -76,7 +76,7 @@ fn draw_panel(
     time_s: Range<f64>,
     x_desc: Option<&str>,
     y_desc: &str,
-) -> Result<(), PlotError> {
+) -> Result<(), EvaluationError> {
     let size = |[_, error, band]: &Point| error.abs().max(*band);
     let largest = chains.iter().flatten().map(size).fold(0.0, f64::max);
     let top = match largest > 1e-9 {

@@ -9,7 +9,7 @@ use plotters::{
     style::text_anchor,
 };
 
-use super::PlotError;
+use super::EvaluationError;
 
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -52,7 +52,7 @@ pub fn chart<'a, 'b>(
     [bottom, below]: [u32; 2],
     x: Range<f64>,
     y: Range<f64>,
-) -> Result<Chart<'a, 'b>, PlotError> {
+) -> Result<Chart<'a, 'b>, EvaluationError> {
     ChartBuilder::on(area)
         .margin_left(px(20.0))
         .margin_right(px(20.0))
@@ -69,7 +69,7 @@ pub fn axes(
     [x_ticks, y_ticks]: [usize; 2],
     x_desc: Option<&str>,
     y_desc: &str,
-) -> Result<(), PlotError> {
+) -> Result<(), EvaluationError> {
     let mut mesh = chart.configure_mesh();
     mesh.max_light_lines(0)
         .bold_line_style(line(GRID, 1.0))
@@ -92,15 +92,15 @@ pub fn curve(
     chart: &mut Chart<'_, '_>,
     points: impl IntoIterator<Item = (f64, f64)>,
     style: ShapeStyle,
-) -> Result<(), PlotError> {
+) -> Result<(), EvaluationError> {
     let series = LineSeries::new(points, style);
     chart.draw_series(series).map(drop).map_err(drawing)
 }
 
 pub fn document(
     size: (u32, u32),
-    draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
-) -> Result<String, PlotError> {
+    draw: impl FnOnce(&Area<'_>) -> Result<(), EvaluationError>,
+) -> Result<String, EvaluationError> {
     let fine = (size.0 * UNITS_PER_PX, size.1 * UNITS_PER_PX);
     let mut svg = String::new();
     {
@@ -133,7 +133,7 @@ pub fn header(
     title: &str,
     caption: &str,
     legend: &[Entry<'_>],
-) -> Result<(), PlotError> {
+) -> Result<(), EvaluationError> {
     let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
     let write = |text: &str, at: (i32, i32), font: TextStyle<'static>| {
         area.draw(&Text::new(text.to_owned(), at, font))
@@ -180,6 +180,8 @@ fn entry_width(entry: &Entry<'_>) -> f64 {
     33.0 + 7.6 * entry.0.len() as f64 + 14.0
 }
 
-pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
-    PlotError::Draw(error.to_string())
+pub fn drawing<E: std::error::Error + Send + Sync>(
+    error: DrawingAreaErrorKind<E>,
+) -> EvaluationError {
+    EvaluationError(format!("failed to draw: {error}"))
 }

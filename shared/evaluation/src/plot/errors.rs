@@ -4,12 +4,11 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::{PlotError, canvas::*};
+use super::{EvaluationError, canvas::*, no_pose};
 use crate::{Evaluation, Kitti, Rpe};
 
 /// Size of the document, px: two panels of equal height below the header.
 const SIZE: (u32, u32) = (900, 640);
-/// Margin above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
 
 /// The errors of translation and of rotation, each with a description, points and a mean, which is
@@ -18,15 +17,15 @@ type Panels = [(&'static str, Vec<(f64, f64)>, f64); 2];
 
 /// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the
 /// RPE over the distance travelled.
-pub fn errors_svg(evaluation: &Evaluation) -> Result<String, PlotError> {
+pub fn errors_svg(evaluation: &Evaluation) -> Result<String, EvaluationError> {
     match (&evaluation.kitti, &evaluation.rpe) {
         (Some(kitti), _) => by_length(kitti),
         (None, Some(rpe)) => by_pair(rpe),
-        (None, None) => Err(PlotError::Empty),
+        (None, None) => Err(no_pose()),
     }
 }
 
-fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
+fn by_length(kitti: &Kitti) -> Result<String, EvaluationError> {
     let (translation, rotation) = (kitti.translation_percent, kitti.rotation_deg_per_100m);
     let caption = format!(
         "mean over {} segments, step {}: {translation:.2} %, {rotation:.2} deg/100 m (dashed)",
@@ -47,7 +46,7 @@ fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
     )
 }
 
-fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
+fn by_pair(rpe: &Rpe) -> Result<String, EvaluationError> {
     let (translation, rotation) = (rpe.translation_rmse_m, rpe.rotation_rmse_deg);
     let caption = format!(
         "{} pairs, path too short for segments of 100 m; rmse {translation:.3} m, {rotation:.3} deg (dashed)",
@@ -72,7 +71,7 @@ fn draw(
     [title, caption, x_desc]: [&str; 3],
     x: Range<f64>,
     panels: Panels,
-) -> Result<String, PlotError> {
+) -> Result<String, EvaluationError> {
     document(SIZE, |area| {
         header(area, title, caption, &[])?;
         let below_header = area.split_vertically(px(f64::from(HEADER))).1;

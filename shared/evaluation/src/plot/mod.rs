@@ -13,15 +13,6 @@ pub use trajectory::{path_svg, paths_svg, trajectory_svg};
 
 use crate::EvaluationError;
 
-#[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    /// There is no pose to draw.
-    #[error("there is no pose to plot")]
-    Empty,
-    /// The poses cannot be compared.
-    #[error(transparent)]
-    Poses(#[from] EvaluationError),
-    /// The error message of the drawing library.
-    #[error("failed to draw: {0}")]
-    Draw(String),
+fn no_pose() -> EvaluationError {
+    EvaluationError("there is no pose to plot".to_owned())
 }

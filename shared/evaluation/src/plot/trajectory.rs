@@ -3,12 +3,8 @@
 use gyre_geometry::Pose;
 use plotters::prelude::*;
 
-use super::{PlotError, canvas::*};
-use crate::{
-    MatchedPoses, ate,
-    error::ESTIMATE as NAME,
-    matched::{path_m, require_poses},
-};
+use super::{EvaluationError, canvas::*, no_pose};
+use crate::{MatchedPoses, ate, error::ESTIMATE as NAME, matched::require_poses};
 
 const LARGEST: (f64, f64) = (900.0, 720.0);
 /// Smallest plotting area, px: the header needs the width.
@@ -21,24 +17,23 @@ const MARGIN: u32 = 20;
 const BORDER: f64 = 0.06;
 const MIN_EXTENT_M: f64 = 1.0;
 
-/// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or
-/// `estimate` alone in its own frame.
-pub fn trajectory_svg(
-    estimate: &[Pose],
-    matched: Option<&MatchedPoses>,
-) -> Result<String, PlotError> {
-    match matched {
-        Some(matched) => {
-            require_poses(NAME, estimate)?;
-            scene_svg(&Scene::matched(matched))
-        }
-        None => path_svg(estimate, estimate.len(), path_m(estimate)),
-    }
+/// Returns the plot as an SVG document: the aligned estimate over its ground truth.
+pub fn trajectory_svg(matched: &MatchedPoses) -> Result<String, EvaluationError> {
+    let ate = ate(matched);
+    let rmse_m = ate.rmse_m;
+    let align = |pose: &Pose| ate.truth_from_estimate * pose;
+    let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
+    scene_svg(&Scene {
+        paths: vec![("estimate", positions(&aligned))],
+        truth: Some(positions(matched.truth())),
+        title: "Trajectory and ground truth",
+        caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
+    })
 }
 
 /// Returns the plot of a trajectory with this number of poses and this length; only the poses
 /// `drawn` are plotted.
-pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
+pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, EvaluationError> {
     require_poses(NAME, drawn)?;
     scene_svg(&Scene {
         paths: vec![("estimate", positions(drawn))],
@@ -50,7 +45,10 @@ pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, P
 
 /// Returns the plot of trajectories by their names, in the frame of the ground truth if there is
 /// one.
-pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<String, PlotError> {
+pub fn paths_svg(
+    paths: &[(&str, Vec<Pose>)],
+    truth: Option<&[Pose]>,
+) -> Result<String, EvaluationError> {
     for (_, poses) in paths {
         require_poses(NAME, poses)?;
     }
@@ -73,9 +71,9 @@ pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<
     })
 }
 
-fn scene_svg(scene: &Scene<'_>) -> Result<String, PlotError> {
+fn scene_svg(scene: &Scene<'_>) -> Result<String, EvaluationError> {
     let paths = scene.paths.iter().flat_map(|(_, path)| path);
-    let view = View::around(paths.chain(scene.truth.iter().flatten())).ok_or(PlotError::Empty)?;
+    let view = View::around(paths.chain(scene.truth.iter().flatten())).ok_or_else(no_pose)?;
     let size = (
         view.width_px + LEFT + 2 * MARGIN,
         view.height_px + BELOW + HEADER + MARGIN,
@@ -94,19 +92,6 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn matched(matched: &MatchedPoses) -> Self {
-        let ate = ate(matched);
-        let rmse_m = ate.rmse_m;
-        let align = |pose: &Pose| ate.truth_from_estimate * pose;
-        let aligned: Vec<Pose> = matched.estimate().iter().map(align).collect();
-        Self {
-            paths: vec![("estimate", positions(&aligned))],
-            truth: Some(positions(matched.truth())),
-            title: "Trajectory and ground truth",
-            caption: format!("estimate after SE(2) alignment; ATE {rmse_m:.2} m rmse"),
-        }
-    }
-
     fn legend(&self) -> Vec<Entry<'_>> {
         let entry = |label, style| (label, Symbol::Line(style));
         let truth = self.truth.iter();
@@ -154,7 +139,6 @@ struct View {
 }
 
 impl View {
-    /// The view of all `points`; `None` without points.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
         let grow = |b: [f64; 4], p: &(f64, f64)| {
             [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]
@@ -180,7 +164,7 @@ impl View {
     }
 }
 
-fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), PlotError> {
+fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), EvaluationError> {
     let below_header = area.split_vertically(px(f64::from(HEADER))).1;
     let (x_m, y_m) = (view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1);
     let mut chart = chart(&below_header, [MARGIN, BELOW], x_m, y_m)?;

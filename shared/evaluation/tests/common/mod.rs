@@ -3,17 +3,13 @@
 
 use std::num::NonZeroUsize;
 
-use gyre_evaluation::{Association, Evaluation, Options, TimedPoses, evaluate};
+use gyre_evaluation::{Evaluation, TimedPoses, evaluate};
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
 
 pub fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
     let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
-    let options = Options {
-        step: NonZeroUsize::new(step).unwrap(),
-        association: Association::Index,
-    };
-    evaluate(estimate, truth, &options).unwrap()
+    evaluate(estimate, truth, NonZeroUsize::new(step).unwrap()).unwrap()
 }
 
 /// Returns the poses of motions from `start`.

@@ -10,28 +10,11 @@ use gyre_evaluation::Part;
 pub struct EvaluateArguments {
     /// The trajectory to evaluate: the folder of a run's results, or a file in TUM, KITTI, or a
     /// dataset's own format.
-    #[arg(required_unless_present = "named_estimate")]
-    pub estimate: Option<PathBuf>,
+    pub estimate: PathBuf,
     /// The ground truth: the folder of a recording that has one, or a file in TUM, KITTI, Oxford
     /// radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv. Default: that of the
     /// run.
     pub ground_truth: Option<PathBuf>,
-    /// The trajectory, in another place on the command line.
-    #[arg(
-        long = "estimate",
-        value_name = "FILE",
-        hide = true,
-        conflicts_with = "estimate"
-    )]
-    pub named_estimate: Option<PathBuf>,
-    /// The ground truth, in another place on the command line.
-    #[arg(
-        long = "ground-truth",
-        value_name = "FILE",
-        hide = true,
-        conflicts_with = "ground_truth"
-    )]
-    pub named_ground_truth: Option<PathBuf>,
     /// Evaluate the objects of a run against those of the recording that is named in the place of
     /// the ground truth, a simulated one: its objects.csv and its ground_truth.tum.
     #[arg(long, conflicts_with_all = ["find_time_offset", "plots", "odometry"])]
@@ -90,20 +73,5 @@ fn part(text: &str) -> Result<Part, String> {
         _ => range().ok_or_else(|| {
             "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()
         }),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_are_all_or_a_range_of_percent() {
-        assert_eq!(part("all"), Ok(Part::ALL));
-        assert_eq!(part("0..100"), Ok(Part::ALL));
-        assert_eq!(part("12.5..50").ok(), Part::new(0.125, 0.5));
-        for text in ["", "half", "50", "50..", "60..50", "0..101", "nan..50"] {
-            assert!(part(text).is_err(), "{text}");
-        }
     }
 }

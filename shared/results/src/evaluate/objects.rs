@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::{
-    ObjectErrors, ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors,
-};
+use gyre_evaluation::{ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
 use gyre_terminal::Failure;
@@ -93,7 +91,7 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
             tracked: found.map(|row| row.seen_from(&own)).collect(),
         });
     }
-    Ok(object_errors(&scans, &ObjectOptions::default()))
+    Ok(object_errors(&scans))
 }
 
 fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {

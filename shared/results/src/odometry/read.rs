@@ -167,15 +167,9 @@ mod tests {
     }
 
     #[test]
-    fn other_files_and_damaged_rows_are_named() {
-        let refused = |text: &str| parse(text.as_bytes()).unwrap_err().to_string();
-        let text = csv(&poses());
-        assert!(refused("").contains("no column stamp_ns"));
-        assert!(refused(&text.replacen("cov_yyaw", "c", 1)).contains("no column cov_yyaw"));
-        let far = refused(&text.replacen("1.500000000", "far", 1));
-        assert!(far.contains("line: 2") && far.contains("invalid float"));
-        assert!(refused(&text[..text.len() - 40]).contains("line: 4"));
-        let out_of_range = text.replace(",250000000,", ",-9223372036854775808,");
-        assert!(refused(&out_of_range).contains("interval_ns"));
+    fn an_interval_before_the_beginning_of_time_is_refused() {
+        let text = csv(&poses()).replace(",250000000,", ",-9223372036854775808,");
+        let refused = parse(text.as_bytes()).unwrap_err().to_string();
+        assert!(refused.contains("interval_ns"), "{refused}");
     }
 }

@@ -11,7 +11,6 @@ use crate::odometry;
 /// hours at 10 Hz.
 const MOST: usize = 1_000_000;
 
-/// The poses of a run, up to [`MOST`].
 #[derive(Debug, Default)]
 pub struct Estimate {
     pub trajectory: Trajectory,

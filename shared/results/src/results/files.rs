@@ -14,7 +14,6 @@ pub struct Files<'a> {
 }
 
 impl<'a> Files<'a> {
-    /// Starts without any.
     pub fn new(out: &'a Out) -> Self {
         Self {
             out,

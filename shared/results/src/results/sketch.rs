@@ -1,6 +1,6 @@
 //! The path to be drawn, reduced to the number of poses that a picture needs.
 
-use gyre_evaluation::{PlotError, plot::path_svg};
+use gyre_evaluation::{EvaluationError, plot::path_svg};
 use gyre_geometry::Pose;
 
 /// Up to twice as many poses are drawn.
@@ -44,7 +44,7 @@ impl Sketch {
     }
 
     /// Returns the plot as an SVG document; `None` without poses.
-    pub fn svg(&self) -> Result<Option<String>, PlotError> {
+    pub fn svg(&self) -> Result<Option<String>, EvaluationError> {
         let drawn = self.path();
         match drawn.is_empty() {
             true => Ok(None),
@@ -56,7 +56,7 @@ impl Sketch {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_evaluation::plot::trajectory_svg;
+    use gyre_evaluation::path_m;
     use gyre_geometry::pose;
 
     use super::*;
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn a_path_of_usual_length_is_drawn_whole() {
         let whole: Vec<Pose> = poses(500).collect();
-        let expected = trajectory_svg(&whole, None).unwrap();
+        let expected = path_svg(&whole, 500, path_m(&whole)).unwrap();
         assert_eq!(sketch(500).svg().unwrap().unwrap(), expected);
         assert!(sketch(0).svg().unwrap().is_none());
     }

@@ -21,7 +21,6 @@ const MOTIONS_OF_PERIOD: usize = 1 << 16;
 pub struct Counts {
     pub published: u64,
     pub processed: u64,
-    /// Scans published and not processed: what live mode dropped.
     pub dropped: u64,
     pub unreadable: u64,
     /// Scans that the recording lacks, by the gaps in its times.
@@ -170,9 +169,7 @@ impl DopplerCounts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
     pub refined: u64,
-    /// Accepted with a wider covariance because of little support.
     pub weak: u64,
-    /// Predicted from the motions before, because nothing matched.
     pub predicted: u64,
     pub doubtful: u64,
     /// Weak ones, and predicted ones whose distance neither wheels nor Doppler measured.
@@ -293,7 +290,6 @@ impl Counter {
     }
 }
 
-/// Counts the scans that a recording lacks, by the intervals between those that it has.
 #[derive(Debug, Default)]
 struct Gaps {
     first: Vec<Motion>,

@@ -8,10 +8,8 @@ use gyre_terminal::{WIDTH, wrap};
 use super::Summary;
 use crate::figures::all_unusual;
 
-/// Columns of the names of the lines.
 const NAMES: usize = 12;
 
-/// The text at the end of a run.
 impl Summary {
     /// Returns a line each for the path, its accuracy, the latency, unusual events and the files;
     /// with SLAM one for the loops, and one for a problem.

@@ -11,13 +11,11 @@ use serde_json::{Value, json};
 /// Fixes with a smaller weight count as refused: they pull less than a quarter as hard.
 const LEAST_WEIGHT: f64 = 0.25;
 
-/// The fixes of GNSS in the summary, and the place of the run on the earth.
 #[derive(Debug, Serialize)]
 pub struct GnssSummary {
     log: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     topic: Option<String>,
-    /// Fixes of the log without the faulty ones.
     fixes: usize,
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
@@ -26,7 +24,6 @@ pub struct GnssSummary {
     thinned: usize,
     /// Fixes too far from a keyframe for odometry to predict the place of the vehicle.
     far: usize,
-    /// Fixes that the corrected trajectory is made with.
     used: usize,
     /// Fixes that contradict the others, the odometry or the loops.
     refused: usize,

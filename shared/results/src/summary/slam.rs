@@ -6,7 +6,6 @@ use serde::Serialize;
 #[derive(Debug, Default, Serialize)]
 pub struct SlamSummary {
     pub keyframes: usize,
-    /// Loops that the corrected trajectory is made with.
     pub loops_used: usize,
     /// Verified loops that contradict odometry or other loops.
     pub loops_rejected: usize,

@@ -6,7 +6,6 @@ use crate::{Failure, WIDTH, print, wrap};
 use clap::Args;
 use gyre_configuration::paths;
 
-/// Columns of the names.
 const NAMES: usize = 18;
 
 /// The arguments of `gyre config`.
@@ -28,23 +27,8 @@ pub fn config(arguments: &ConfigArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a name with its purpose beside it.
 fn entry((name, purpose): (&str, String)) -> String {
     let indent = format!("\n{:NAMES$}", "");
     let lines = wrap(&purpose, WIDTH - NAMES).join(&indent);
     format!("{name:NAMES$}{lines}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_list_fits_a_terminal() {
-        for it in gyre_shipped::configurations() {
-            let entry = entry(it);
-            let widest = entry.lines().map(|line| line.chars().count()).max();
-            assert!(widest <= Some(WIDTH), "{entry}");
-        }
-    }
 }

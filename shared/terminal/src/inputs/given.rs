@@ -26,7 +26,6 @@ pub struct Given {
     /// The configuration: a file, or the name of one in the program.
     pub configuration: Option<PathBuf>,
     pub data: Option<PathBuf>,
-    /// The address of a radar.
     pub radar: Option<String>,
 }
 

@@ -18,9 +18,7 @@ const START: u64 = 4096;
 pub enum Kind {
     /// A configuration: a file, or the name of one in the program.
     Configuration,
-    /// A recording: a folder, or a file of scans.
     Data,
-    /// The folder of a run's results.
     Results,
     Radar,
     Unknown,

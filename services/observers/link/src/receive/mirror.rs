@@ -98,7 +98,6 @@ impl Mirror<'_> {
         }
     }
 
-    /// Continues with another sender of the same drive.
     fn continue_with(&mut self, other: RunOffer) -> Result<(), LinkError> {
         if other.sender == self.offer.sender {
             return Ok(());

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
 
-use super::{add, add_item, item};
+use super::{add, item};
 use crate::replay_buffer::{
     LogBuffer, MemoryBuffer, Message, MotionBuffer, Next, Place, ReplayBuffer,
 };
@@ -41,34 +41,6 @@ fn a_memory_buffer_keeps_the_newest_messages() {
     let buffer = MemoryBuffer::bounded(100, 2 * bytes);
     (0..5).for_each(|seq| add(&buffer, seq));
     assert_eq!(next_of(&buffer, 0), Next::Message(message(3)));
-}
-
-#[test]
-fn a_memory_buffer_has_one_message_of_a_number_that_was_given_anew() {
-    let buffer = MemoryBuffer::of(10);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    add(&buffer, 2);
-    let next = |seq| next_of(&buffer, seq);
-    assert_eq!(next(2), Next::Message(message(2)));
-    assert_eq!(next(3), Next::Nothing);
-    add(&buffer, 3);
-    assert_eq!(next(3), Next::Message(message(3)));
-}
-
-#[test]
-fn a_memory_buffer_drops_void_messages_whose_successors_it_has_not_seen() {
-    let buffer = MemoryBuffer::of(10);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    let anew = Item {
-        generation: 1,
-        numbered_from: 2,
-        ..item(4)
-    };
-    add_item(&buffer, &anew);
-    let Next::Message(next) = next_of(&buffer, 2) else {
-        panic!("there is no message");
-    };
-    assert_eq!((next.seq, next.generation), (4, 1));
 }
 
 #[test]

@@ -6,7 +6,6 @@ use super::driver::PacketMessage;
 
 /// The most azimuths that are used: some ten turns.
 const MAX_AZIMUTHS: usize = 4_000;
-/// Whole turns that are needed.
 const TURNS: usize = 2;
 
 #[derive(Clone, Debug, Default)]

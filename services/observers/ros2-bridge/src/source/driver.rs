@@ -23,10 +23,8 @@ const NODE: &str = "gyre_source";
 const AZIMUTHS: usize = 4_000;
 /// Samples of a gyro that are kept: ten seconds of 400 a second.
 const SAMPLES: usize = 4_000;
-/// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
 
-/// The types of azimuths that are read.
 fn names() -> [String; 3] {
     [
         RadarFftDataMsg::DEFINITION,
@@ -81,7 +79,6 @@ enum Azimuths {
     Turn(Subscription<RadarBScanMsg>),
 }
 
-/// The topics of a driver, as far as they are subscribed to.
 pub struct Driver {
     node: Node,
     topic: String,
@@ -111,18 +108,21 @@ impl Driver {
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
-        let (gyro, wheels) = (&settings.gyro_topic, &settings.wheels_topic);
+        let gyro = settings.gyro_topic.as_deref();
+        let gyro = gyro.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let wheels = settings.wheels_topic.as_deref();
+        let wheels = wheels.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
         let fixes = settings.fixes.as_ref();
         let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
             configuration_dds_name: node.dds_name(&topic)?,
-            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
-            older: subscribe(&mut node, &mut wakeups, &topic, TURNS)?,
+            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
+            older: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
             azimuths: None,
-            gyro: sensor(&mut node, &mut sample_wakeups, gyro.as_deref())?,
-            wheels: sensor(&mut node, &mut sample_wakeups, wheels.as_deref())?,
+            gyro: gyro.transpose()?,
+            wheels: wheels.transpose()?,
             fixes: fixes.transpose()?,
             node,
             wakeups,
@@ -154,21 +154,19 @@ impl Driver {
         let [azimuth, turn, _] = names();
         let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
         self.azimuths = Some(if found == azimuth {
-            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS)?)
+            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
         } else if found == turn {
-            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS)?)
+            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS, false)?)
         } else {
-            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS)?)
+            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
         });
         Ok(true)
     }
 
-    /// Returns the descriptor that becomes readable when there is a message.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.wakeups.descriptor()
     }
 
-    /// Clears the descriptor: take all messages after this.
     pub fn clear(&mut self) -> io::Result<()> {
         self.wakeups.clear()
     }
@@ -237,23 +235,11 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     wakeups: &mut Wakeups,
     topic: &str,
     depth: usize,
+    is_lossy: bool,
 ) -> Result<Subscription<M>, NodeError> {
-    let mut subscription = node.subscribe(topic, depth, false)?;
+    let mut subscription = node.subscribe(topic, depth, is_lossy)?;
     wakeups.add(&mut subscription)?;
     Ok(subscription)
-}
-
-fn sensor<M: Ros2Message + Send + 'static>(
-    node: &mut Node,
-    wakeups: &mut Wakeups,
-    topic: Option<&str>,
-) -> Result<Option<Subscription<M>>, NodeError> {
-    let Some(topic) = topic else {
-        return Ok(None);
-    };
-    let mut subscription = node.subscribe(topic, SAMPLES, true)?;
-    wakeups.add(&mut subscription)?;
-    Ok(Some(subscription))
 }
 
 fn take<M: Ros2Message + 'static>(

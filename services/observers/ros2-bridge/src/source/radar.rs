@@ -23,7 +23,6 @@ use super::{
 };
 use crate::NodeError;
 
-/// The most messages between two checks for signals and new readers.
 const MAX_MESSAGES: usize = 512;
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time after which a configuration is estimated: the driver sends it every four turns.
@@ -92,7 +91,6 @@ impl Radar {
         }
     }
 
-    /// Adds a message; true if a scan is complete.
     fn add(
         &mut self,
         packet: Packet,

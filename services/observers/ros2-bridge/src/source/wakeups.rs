@@ -14,7 +14,6 @@ use ros2_client::{
 /// Events that are taken at once: one for each topic.
 const CAPACITY: usize = 4;
 
-/// Becomes readable when one of its topics has a message.
 pub struct Wakeups {
     poll: Poll,
     events: Events,
@@ -22,7 +21,6 @@ pub struct Wakeups {
 }
 
 impl Wakeups {
-    /// Creates one without a topic.
     pub fn new() -> io::Result<Self> {
         Ok(Self {
             poll: Poll::new()?,

@@ -22,7 +22,6 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// Limits the time for the bytes of one write.
     pub fn new(stream: TcpStream, limit: Duration) -> Self {
         Self {
             stream,

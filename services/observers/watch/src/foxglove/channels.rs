@@ -15,7 +15,6 @@ pub struct Channel {
     pub topic: Option<&'static str>,
     /// True if a slow viewer is sent the newest message only.
     pub is_bulky: bool,
-    /// The entry in the message `advertise`.
     pub advertised: Value,
 }
 

@@ -38,7 +38,6 @@ struct Publisher {
     drawn: Option<Instant>,
 }
 
-/// Starts the threads. They end when the view is stopped.
 pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHandle<()>>> {
     let report = {
         let (followed, hub) = (Arc::clone(followed), Arc::clone(hub));

@@ -12,13 +12,11 @@ use super::{
     viewer_queue::{EncodedMessage, ViewerQueue},
 };
 
-/// The channels, and the viewers that have subscribed to them.
 pub struct Hub {
     pub channels: Vec<Channel>,
     pub of_run: watch::Sender<Vec<usize>>,
     /// The newest sentence about a topic that is not shown.
     pub notice: watch::Sender<String>,
-    /// The number of subscriptions to each channel.
     wanted: Vec<AtomicUsize>,
     viewers: Mutex<Vec<Arc<ViewerQueue>>>,
 }
@@ -56,13 +54,11 @@ impl Hub {
         self.position(name).is_some_and(has)
     }
 
-    /// Returns whether a viewer has subscribed to a channel that is made of a topic.
     pub fn wants_topic(&self, topic: &str) -> bool {
         let mut of_topic = self.channels.iter().filter(|it| it.topic == Some(topic));
         of_topic.any(|channel| self.is_wanted(channel.name))
     }
 
-    /// Queues a message for the viewers that have subscribed to the channel.
     pub fn publish(&self, name: &str, stamp_ns: i64, data: Vec<u8>) {
         let Some(channel) = self.position(name) else {
             return;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use gyre_messages::{Item, StageId};
 use serde_json::{Value, json};
 
-/// The channel of the delays of each pose.
 pub const LATENCY: &str = "/latency";
 /// The channel of the report that the page shows once a second.
 pub const HEALTH: &str = "/health";
@@ -43,7 +42,6 @@ pub fn latency_schema() -> Value {
     object(own.chain([("stages".to_owned(), object(stages))]))
 }
 
-/// Returns the schema of the report that the page shows.
 pub fn health_schema() -> Value {
     let counts = ["published", "poses", "dropped", "in_flight"];
     let missed = object(numbers(["pose", "scan", "masked", "objects"]));

@@ -11,7 +11,6 @@ use tokio::time::{self, Instant};
 use super::{Hub, hub::HubMember, viewer_queue::EncodedMessage};
 use crate::run_view::RunView;
 
-/// The names of the protocol, the present one first.
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 /// The longest time that a viewer may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
@@ -19,7 +18,6 @@ const SENTENCE_PERIOD: Duration = Duration::from_secs(2);
 /// The first byte of a message of a channel, and of one that sets the viewer's clock.
 const MESSAGE_DATA: u8 = 1;
 const TIME: u8 = 2;
-/// Levels of a status.
 const WARNING: u8 = 1;
 const ERROR: u8 = 2;
 
@@ -58,7 +56,6 @@ struct Viewer {
 
 struct Disconnected;
 
-/// Serves a viewer until it disconnects, is too slow, or the program ends.
 pub async fn serve(socket: WebSocket, hub: Arc<Hub>, view: Arc<RunView>) {
     let member = hub.join();
     let mut viewer = Viewer {

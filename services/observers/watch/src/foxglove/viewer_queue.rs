@@ -13,7 +13,6 @@ const LIMIT_BYTES: usize = 8 << 20;
 /// Bytes that a queue message takes beside its content.
 const OVERHEAD_BYTES: usize = 64;
 
-/// The messages that wait for one viewer, and its subscriptions.
 #[derive(Default)]
 pub struct ViewerQueue {
     queue: Mutex<Queue>,
