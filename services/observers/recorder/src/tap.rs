@@ -21,7 +21,7 @@ pub struct Counts {
 
 /// The observer of a topic, and the counts of its messages.
 pub(crate) struct Tap<'run> {
-    observer: Box<dyn TopicObserver + 'run>,
+    observer: TopicObserver<'run>,
     recorded: u64,
     dropped: u64,
     reported: u64,

@@ -10,6 +10,7 @@ use crate::{
     check::Violation,
     item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
+    topics::Topic,
 };
 
 /// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
@@ -52,7 +53,7 @@ impl Sender {
     }
 }
 
-pub trait Message: 'static {
+pub trait Message: Sized + 'static {
     const TOPIC: &'static str;
     const SENDER: Sender;
     /// Number of processes that subscribe to the topic.
@@ -61,6 +62,9 @@ pub trait Message: 'static {
     type Header: Header;
     /// The element that the payload is a slice of.
     type Element: Element;
+
+    /// The same for programs that know the topic by its name alone.
+    const ENTRY: &'static Topic = &Topic::of::<Self>();
 
     /// The longest payload, in elements. A topic without a payload still has one element.
     fn max_elements(_limits: &Limits) -> usize {

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
+    check::Violation,
     follower::{Correction, Fix, Loop, Objects},
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
@@ -44,6 +45,19 @@ pub struct Topic {
     pub max_elements: fn(&Limits) -> usize,
     pub header: WireType,
     pub element: WireType,
+    /// [`Message::check`] of the bytes of a header and of a payload.
+    pub check: fn(&[u8], &[u8], &Limits) -> Result<(), Violation>,
+    /// [`Message::content_bytes`] of the bytes of a header.
+    pub content_bytes: fn(&[u8]) -> Option<usize>,
+}
+
+fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+    let payload = bytemuck::cast_slice(payload);
+    M::check(bytemuck::from_bytes(header), payload, limits)
+}
+
+fn content_bytes<M: Message>(header: &[u8]) -> Option<usize> {
+    M::content_bytes(bytemuck::from_bytes(header))
 }
 
 impl Topic {
@@ -55,6 +69,8 @@ impl Topic {
             max_elements: M::max_elements,
             header: WireType::of::<M::Header>(M::Header::TYPE_NAME),
             element: WireType::of::<M::Element>(M::Element::TYPE_NAME),
+            check: check::<M>,
+            content_bytes: content_bytes::<M>,
         }
     }
 

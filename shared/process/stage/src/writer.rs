@@ -35,7 +35,7 @@ pub struct TopicWriter {
 impl<M: Message> Writer<M> {
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         Ok(Self {
-            untyped: TopicWriter::open(node, manifest, &Topic::of::<M>())?,
+            untyped: TopicWriter::open(node, manifest, M::ENTRY)?,
             message: PhantomData,
         })
     }
@@ -62,11 +62,6 @@ impl<M: Message> Writer<M> {
     pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         self.untyped.send(draft.loan, Some(hop))
     }
-
-    /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
-    pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
-        self.untyped.send(draft.loan, None)
-    }
 }
 
 impl<M: Message> Deref for Writer<M> {
@@ -84,11 +79,7 @@ impl<M: Message> AsRef<[TopicWriter]> for Writer<M> {
 }
 
 impl TopicWriter {
-    pub(crate) fn open(
-        node: &Node,
-        manifest: &Manifest,
-        topic: &Topic,
-    ) -> Result<Self, StageError> {
+    pub fn open(node: &Node, manifest: &Manifest, topic: &Topic) -> Result<Self, StageError> {
         let handshake = Listener::open(node, &services::handshake_event(topic.name))?;
         let data = Notifier::open(node, &services::data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
@@ -113,6 +104,24 @@ impl TopicWriter {
         }
         self.publisher.send(loan)?;
         self.data.notify()
+    }
+
+    /// Publishes a message as it is, without stamping it: of its payload as much as there is room
+    /// for.
+    pub fn send_unchanged(&self, start: &[u8], payload: &[u8]) -> Result<(), StageError> {
+        let mut loan = self.loan()?;
+        let (header, room) = loan.parts();
+        if start.len() != header.len() {
+            return Err(StageError::Input(format!(
+                "a header of {} bytes is none of topic `{}`",
+                start.len(),
+                self.topic
+            )));
+        }
+        header.copy_from_slice(start);
+        let length = payload.len().min(room.len());
+        room[..length].copy_from_slice(&payload[..length]);
+        self.send(loan, None)
     }
 
     pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
