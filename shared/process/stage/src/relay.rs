@@ -18,7 +18,7 @@ use crate::{
 /// Publishes messages of the first stages, which are on another machine, in the place of the
 /// source. It is never late: the other machine may be out of reach.
 pub struct FirstStages<'a> {
-    feed: Feed<'a, Vec<TopicWriter>>,
+    feed: Feed<'a, AnyMessage>,
     /// The motions that go back to the first stages beside the poses.
     motions: Option<Reader<Motion>>,
     /// The supervisor takes its publisher for a sign that the source has started.

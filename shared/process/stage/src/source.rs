@@ -20,13 +20,13 @@ use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
 
-use crate::{Launch, StageCounters, StageError, writer::Writer};
+use crate::{Launch, StageCounters, StageError};
 pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
 
 pub use crate::writer::RecordedMessage;
-pub use player::{Recorded, run_player};
+pub use player::run_player;
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
@@ -71,7 +71,7 @@ pub fn run(
 ) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let mut playback = Playback {
-        feed: Feed::open(launch, || Writer::open(&launch.node, &launch.manifest))?,
+        feed: Feed::of_scans(launch)?,
         source,
         tolerance,
     };

@@ -142,7 +142,7 @@ impl<'a> Rig<'a> {
     pub fn feed(&self, topic: &str) -> Result<Feed, StageError> {
         let topic = known(topic)?;
         Ok(Feed {
-            writer: TopicWriter::open(&self.node, &self.manifest, topic)?,
+            writer: TopicWriter::to(topic, &self.node, &self.manifest)?,
             topic: Service::open(&self.node, topic)?,
         })
     }

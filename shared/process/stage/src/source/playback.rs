@@ -6,16 +6,11 @@ use gyre_radar::continues;
 use super::{
     Attempts, Feed, PAUSE, Source, Tolerance, Unreadable, hop, pace::Pace, position::Position,
 };
-use crate::{
-    StageError, clock,
-    counters::Work,
-    wake,
-    writer::{Draft, Writer},
-};
+use crate::{StageError, clock, counters::Work, wake, writer::Draft};
 
 /// A source that is being played.
 pub(super) struct Playback<'a, S: Source> {
-    pub feed: Feed<'a, Writer<Scan>>,
+    pub feed: Feed<'a, Scan>,
     pub source: &'a mut S,
     pub tolerance: &'a Tolerance,
 }
@@ -45,7 +40,7 @@ impl<S: Source> Playback<'_, S> {
             self.feed
                 .wait_for_admission(position.published, due_ns, live)?;
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
-            self.feed.outputs.send(draft, S::HOP)?;
+            self.feed.scans().send(draft, S::HOP)?;
             self.feed.schedule.has_published(position.published)?;
             before = Some((stamp_ns, complete_ns));
             position.advance();
@@ -114,7 +109,7 @@ impl<S: Source> Playback<'_, S> {
         &mut self,
         position: &mut Position,
     ) -> Result<Option<Draft<Scan>>, StageError> {
-        let mut draft = self.feed.outputs.loan()?;
+        let mut draft = self.feed.scans().loan()?;
         let mut skipped = 0;
         while position.index < self.source.scans().end {
             let Some(reason) = self.read(position, &mut draft)? else {
