@@ -39,7 +39,6 @@ impl Running {
         processes::stages_of(self.pid())
     }
 
-    /// Waits until all of [`STAGES`] live, and returns them with the followers.
     pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
         self.until("six stages", |running| {
             let living = running.stages();
@@ -54,7 +53,6 @@ impl Running {
         self.until(name, |running| running.stages().get(name).copied())
     }
 
-    /// Waits until a stage lives as another process than `not`.
     pub fn await_other_stage(&mut self, name: &str, not: Pid) -> Pid {
         self.until(name, |running| {
             running
@@ -65,20 +63,17 @@ impl Running {
         })
     }
 
-    /// Waits until there is a guardian other than `not`.
     pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
         self.until("a guardian", |running| {
             processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
         })
     }
 
-    /// Waits until so many poses are journalled.
     pub fn await_poses(&mut self, poses: usize) -> &mut Self {
         self.until("poses", |running| (running.poses() >= poses).then_some(()));
         self
     }
 
-    /// Waits until so many poses are journalled, or the run is over.
     pub fn await_poses_or_end(&mut self, poses: usize) {
         while self.poses() < poses && !self.is_over() {
             thread::sleep(LOOK);
@@ -110,7 +105,6 @@ impl Running {
         self
     }
 
-    /// Waits until the run has printed these words on standard error.
     pub fn await_words(&mut self, words: &str) -> &mut Self {
         self.until(words, |running| {
             let said = running.run.said("stderr.txt");

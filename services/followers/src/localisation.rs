@@ -14,7 +14,6 @@ use gyre_stage::{
     follower::{self, LogId, Progress, Step},
 };
 
-/// Runs the follower to the end of the keyframes, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;

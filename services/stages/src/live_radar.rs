@@ -22,7 +22,6 @@ pub use connection::{RadarParser, RadarSocket};
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
 
-/// Receives the scans of a radar until SIGTERM, or until there are enough.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
@@ -40,7 +39,6 @@ pub struct Settings {
     pub encoder_counts: u16,
     /// Time without an azimuth after which the run reconnects.
     pub silence: Duration,
-    /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
     pub constants: Constants,
 }
@@ -63,7 +61,6 @@ impl Settings {
     }
 }
 
-/// Returns the encoder counts per turn of a radar that does not report them.
 pub fn encoder_counts(options: &DatasetOptions) -> u16 {
     options.encoder_counts.unwrap_or(ENCODER_COUNTS)
 }

@@ -169,7 +169,6 @@ impl Masking {
     }
 }
 
-/// Views a received scan, with the velocity for its motion compensation.
 fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, StageError> {
     let scan = received.header().view(received.values());
     let scan =
@@ -186,7 +185,6 @@ fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, S
 #[derive(Default)]
 struct Azimuths {
     finder: LostAzimuthFinder,
-    /// The scan that it has found them in last.
     last: Option<(u64, LostAzimuths)>,
 }
 

@@ -64,7 +64,6 @@ struct Integration {
     points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
-    /// Of a run with objects, likewise.
     scans: Option<Scans>,
     /// Wake the followers of the logs that the run has.
     keyframes_grown: Option<Growth>,

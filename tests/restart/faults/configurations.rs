@@ -25,7 +25,6 @@ const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
 const OBJECTS: &str = FollowerId::Objects.name();
 
-/// Results of a run with SLAM.
 const CORRECTED: &[&str] = &[
     "trajectory_slam.tum",
     "loops.csv",
@@ -60,7 +59,6 @@ pub struct Configuration {
     differs_from: Option<fn() -> Run>,
 }
 
-/// A run that nothing disturbs.
 pub struct Undisturbed {
     pub results: Results,
     /// The size of its folder of results.
@@ -73,7 +71,6 @@ pub struct Undisturbed {
 pub struct Results(BTreeMap<&'static str, Vec<u8>>);
 
 impl Results {
-    /// Returns the first name whose content is different.
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         let mut names = self.0.keys();
         names
@@ -88,7 +85,6 @@ impl Configuration {
         (self.can)()
     }
 
-    /// A run, with results of its own.
     pub fn run(&self) -> Run {
         self.run_of(&(self.recording)(), self.rate)
     }
@@ -274,7 +270,6 @@ pub fn gap() -> Configuration {
     }
 }
 
-/// The image that cannot be read.
 const UNREADABLE: usize = 6;
 
 pub fn unreadable() -> Configuration {
@@ -311,7 +306,6 @@ pub fn lost_azimuths() -> Configuration {
     }
 }
 
-/// A vehicle that stops, stands and drives off.
 pub fn standstill() -> Configuration {
     Configuration {
         name: "standstill",

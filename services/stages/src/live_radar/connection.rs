@@ -42,7 +42,6 @@ pub struct Connection {
     socket: Option<RadarSocket>,
     /// The time of the last azimuth, or of the opening.
     last_azimuth: Instant,
-    /// True from the first azimuth after the opening on.
     pub receives_azimuths: bool,
     retry_at: Instant,
     pause: Duration,
@@ -164,7 +163,6 @@ impl Connection {
         }
     }
 
-    /// Closes the connection, to be opened again after a pause.
     pub fn close(&mut self, reason: impl Display) -> ReadResult {
         let pause = self.pause;
         tracing::warn!(
@@ -199,7 +197,6 @@ pub enum RadarSocket {
 }
 
 impl RadarSocket {
-    /// Connects and sends requests, or begins to receive.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
             Address::Tcp(address) => connect(address, requests).map(Self::Tcp),
@@ -293,7 +290,6 @@ impl RadarParser {
         }
     }
 
-    /// Adds the bytes that were read into the space, or the one datagram.
     pub fn filled(&mut self, bytes: usize) {
         match self {
             Self::Stream(parser) => parser.filled(bytes),

@@ -16,7 +16,6 @@ pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
     known: KnownMotions,
-    /// Where azimuths of scans with poses were lost, by number.
     lost: BTreeMap<u64, LostAzimuths>,
     /// The item of the newest pose as the sink reported it.
     pub resume_at: Option<Item>,
@@ -69,7 +68,6 @@ impl Motions {
         self.known.before(seq, lag)
     }
 
-    /// Returns where azimuths of an item were lost, if it has a pose.
     pub fn lost(&self, seq: u64) -> Option<LostAzimuths> {
         self.lost.get(&seq).copied()
     }

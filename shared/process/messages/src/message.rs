@@ -16,9 +16,7 @@ use crate::{
 /// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
 /// memory.
 pub trait Header: Pod + Default + Debug {
-    /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
-    /// The scan that the message is about.
     fn item(&self) -> &Item;
     fn item_mut(&mut self) -> &mut Item;
     /// Checks all but the item; the end of the stream has no content.
@@ -26,7 +24,6 @@ pub trait Header: Pod + Default + Debug {
 }
 
 pub trait Element: Pod + Debug {
-    /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
 }
 

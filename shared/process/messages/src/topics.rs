@@ -41,7 +41,6 @@ pub struct Topic {
     pub name: &'static str,
     pub sender: Sender,
     pub sizes: fn(&Window) -> TopicSizes,
-    /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
     pub header: WireType,
     pub element: WireType,
@@ -74,7 +73,6 @@ impl Topic {
         }
     }
 
-    /// Returns the bytes of its largest sample in shared memory.
     fn max_sample_bytes(&self, limits: &Limits) -> usize {
         SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
     }
@@ -163,18 +161,15 @@ crate::named! {
     /// The process that numbers the items of a topic; its name is in the file of the generations.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum NumberedBy {
-        /// The source, on `scan`.
         Source = "source",
         /// Masking in live mode, on the topics of the other stages; otherwise they have the numbers
         /// of the source.
         Masking = "masking",
-        /// A follower, whose results are numbered.
         Follower = "follower",
     }
 }
 
 impl NumberedBy {
-    /// Returns who numbers the items of a topic.
     pub fn of(name: &str) -> Self {
         match topic(name).map(|topic| topic.sender) {
             _ if name == Scan::TOPIC => Self::Source,
@@ -187,9 +182,7 @@ impl NumberedBy {
 /// A generation of numbers: it gives the numbers from `first` on again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GivenAnew {
-    /// See [`Item::generation`](crate::Item::generation).
     pub generation: u32,
-    /// See [`Item::numbered_from`](crate::Item::numbered_from).
     pub first: u64,
 }
 

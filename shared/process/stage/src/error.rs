@@ -14,7 +14,6 @@ use crate::shared_memory::{self, SHARED_MEMORY};
 /// An error that ends a stage. The exit code informs the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// A request to stop: the process ends without a failure.
     #[error("stopped")]
     Stopped,
     #[error("no run is writing to {out}{end}: `gyre run` starts one, and its --out names the folder", out = out.display())]

@@ -258,7 +258,6 @@ impl<M> Observer<'_, M> {
         self.has_ended
     }
 
-    /// Returns the listener that the publisher notifies: see [`wait_for_any`].
     pub fn listener(&self) -> &Listener {
         self.port.listener()
     }

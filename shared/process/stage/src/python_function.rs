@@ -158,7 +158,6 @@ impl Function {
         self.requests.flush()
     }
 
-    /// Reads an array; `None` if the interpreter has ended before its end.
     fn array<T: bytemuck::Pod>(&mut self, shape: (usize, usize)) -> Option<Array2<T>> {
         let mut array = Array2::from_elem(shape, T::zeroed());
         let cells = array.as_slice_mut()?;

@@ -85,7 +85,6 @@ impl<M: Message> Port<M> {
 }
 
 impl<M> Port<M> {
-    /// Subscribes to a topic of messages `M`.
     pub fn to(topic: &'static Topic, node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let subscriber = Subscriber::create(&Service::open(node, topic)?, None)?;
         Self::of(subscriber, topic, node, manifest)

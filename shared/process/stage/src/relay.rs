@@ -53,7 +53,6 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.resume_at.as_ref()
     }
 
-    /// Returns whether the last stage has journalled the end of the stream.
     pub fn has_ended(&self) -> bool {
         self.feed.credit.has_ended
     }
@@ -62,7 +61,6 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.newest
     }
 
-    /// Returns the next motion; `None` if nothing has arrived yet.
     pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }
@@ -172,7 +170,6 @@ impl<'a> LastStages<'a> {
         self.progress.write([items])
     }
 
-    /// Publishes a new pose, the credit for one more scan.
     pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];

@@ -14,7 +14,6 @@ use crate::{
     writer::Writer,
 };
 
-/// The file in the run's root with a sentence about the whole run.
 const NOTICE: &str = "notice";
 
 /// The owner of the trajectory.
@@ -35,7 +34,6 @@ pub trait Sink {
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
     ) -> Result<PoseHeader, StageError>;
-    /// Journals the end of the stream.
     fn end(&mut self, item: &Item) -> Result<(), StageError>;
 }
 
@@ -82,7 +80,6 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     }
 }
 
-/// Returns a stage's sentence about the whole run.
 pub fn notice(manifest: &Manifest) -> Option<String> {
     let notice = fs::read_to_string(manifest.root.join(NOTICE)).ok()?;
     (!notice.is_empty()).then_some(notice)
@@ -117,7 +114,6 @@ pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
     pose
 }
 
-/// The motions in order, each with its scan if the sink takes scans.
 struct Motions<M: Message> {
     motions: Reader<M>,
     scans: Option<Reader<Masked>>,

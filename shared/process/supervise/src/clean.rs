@@ -125,7 +125,6 @@ fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
         .collect()
 }
 
-/// Returns the empty files of the run whose names pass `is_meant`.
 fn empty_files(directory: &Path, prefix: &str, is_meant: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let empty = run::own_files(directory, prefix).filter(|(path, file)| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -27,7 +27,6 @@ use rustix::{
 use crate::{ProcessStat, SuperviseError, end::ends_within};
 
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
-/// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);
 
 pub(crate) struct Guardian {
@@ -158,7 +157,6 @@ fn lives(group: Pid) -> bool {
     ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)
 }
 
-/// Returns when a process was started, in the system's ticks; `None` without such a process.
 fn started(process: RawPid) -> Option<u64> {
     ProcessStat::of(process as u32).map(|stat| stat.started)
 }

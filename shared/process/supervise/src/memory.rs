@@ -31,13 +31,11 @@ impl Room {
         }
     }
 
-    /// Returns the bytes that this process can still get, if anything is known.
     pub fn least(&self) -> Option<u64> {
         self.available.into_iter().chain(self.left).min()
     }
 }
 
-/// Returns the memory that programs can still get, from `/proc/meminfo`.
 fn available(meminfo: &str) -> Option<u64> {
     let line = meminfo
         .lines()

@@ -30,7 +30,6 @@ use crate::{
 
 pub use recorded::Recorded;
 
-/// A run without processes, to start one in it.
 pub struct Rig<'a> {
     manifest: Manifest,
     services: Option<Services>,
@@ -54,7 +53,6 @@ pub struct Feed {
     topic: Service,
 }
 
-/// A reader of a topic.
 pub struct Tap(Port<AnyMessage>);
 
 impl<'a> Rig<'a> {
@@ -147,7 +145,6 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Subscribes to a topic, and asks for its history.
     pub fn tap(&self, topic: &str) -> Result<Tap, StageError> {
         Port::to(known(topic)?, &self.node, &self.manifest).map(Tap)
     }
@@ -184,7 +181,6 @@ impl Process {
         self.child.pid()
     }
 
-    /// Returns how it ended; `None` while it runs.
     pub fn death(&mut self) -> Option<Death> {
         if self.death.is_none() && self.child.has_exited() {
             // Once: it takes the last words.
@@ -198,7 +194,6 @@ impl Process {
         self.child.terminate();
     }
 
-    /// Kills the group and waits for its end.
     pub fn kill(mut self) -> Result<(), SuperviseError> {
         self.child.kill();
         self.child.await_end()
@@ -229,7 +224,6 @@ impl Feed {
 }
 
 impl Tap {
-    /// Receives the next message; `None` if the queue is empty.
     pub fn receive(&self) -> Result<Option<Recorded>, StageError> {
         Ok(self.0.receive()?.map(|received| Recorded {
             header: received.header_bytes().to_vec(),

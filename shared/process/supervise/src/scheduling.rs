@@ -19,7 +19,6 @@ pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
     }
 }
 
-/// Returns a key with its value, for a sentence.
 pub(super) fn describe(scheduling: &Scheduling, key: Key) -> String {
     match key {
         Key::Cpus => format!("cpus = {:?}", scheduling.cpus),

@@ -20,7 +20,6 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 /// Time for a client to send its request, and to take the answer. The supervisor does nothing else
 /// meanwhile, and clients of this user send it at once.
 const LIMIT: Duration = Duration::from_millis(100);
-/// Size of the longest request, bytes.
 const MAX: u64 = 64 << 10;
 
 /// The socket, open to this user alone since it lies in the run's root.
@@ -39,7 +38,6 @@ impl ControlSocket {
         }
     }
 
-    /// Returns the descriptor that is readable when a client has come.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.0.as_fd()
     }
@@ -75,7 +73,6 @@ impl Client {
         Ok(Self(stream))
     }
 
-    /// Reads the request, a line.
     fn request(&self) -> io::Result<Request> {
         let mut line = String::new();
         BufReader::new(&self.0).take(MAX).read_line(&mut line)?;

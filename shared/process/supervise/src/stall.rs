@@ -35,7 +35,6 @@ pub(crate) struct Stalls<'a> {
     stalls_in_a_row: usize,
 }
 
-/// The result of a look at all processes.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Found {
     /// Followers that hang: odometry continues, with them or without.
@@ -57,14 +56,12 @@ impl<'a> Stalls<'a> {
         }
     }
 
-    /// Resets the clock at a new pose.
     pub fn progress(&mut self, pose: &Item) {
         self.poses = pose.published.saturating_add(1);
         self.owed = None;
         self.stalls_in_a_row = 0;
     }
 
-    /// Resets the clock at a restart.
     pub fn restarted(&mut self) {
         self.owed = None;
     }
@@ -119,7 +116,6 @@ impl<'a> Stalls<'a> {
         })
     }
 
-    /// Returns the stall, if something has been owed for too long.
     fn late_message(&mut self) -> Option<Stall> {
         let limit = self.limit?;
         let owed = match remote_progress::owes(self.manifest, self.poses) {
@@ -190,7 +186,6 @@ impl<'a> Stalls<'a> {
 /// When the supervisor has looked for stalls.
 struct Looks {
     last: Instant,
-    /// The last look at the heartbeats.
     at_heartbeats: Instant,
     /// Until then, old heartbeats are no evidence.
     resumes_until: Option<Instant>,

@@ -29,14 +29,12 @@ pub(crate) enum Position {
     Taken,
 }
 
-/// Starts processes that end with this one.
 pub(crate) struct Starter<'a> {
     signals: &'a Signals,
     guardian: &'a Guardian,
 }
 
 impl<'a> Starter<'a> {
-    /// Starts processes that are in the care of this guardian.
     pub fn new(signals: &'a Signals, guardian: &'a Guardian) -> Self {
         Self { signals, guardian }
     }

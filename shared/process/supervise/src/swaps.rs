@@ -36,7 +36,6 @@ pub(crate) struct Swaps {
     pub standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
-    /// The programs that have taken the place of others, in order.
     pub done: Vec<Swapped>,
 }
 
@@ -57,7 +56,6 @@ pub(crate) enum Step {
 }
 
 impl Swaps {
-    /// Returns why no swap can begin now.
     pub fn why_not_now(&self, has_ended: bool) -> Option<&'static str> {
         match () {
             () if has_ended => Some(ENDED),
@@ -192,7 +190,6 @@ impl Standby {
     }
 }
 
-/// When a program that stands by takes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Judged {
     Now,

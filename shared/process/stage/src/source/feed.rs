@@ -23,7 +23,6 @@ pub(crate) struct Feed<'a, M> {
     pub schedule: ScheduleWriter,
     pub outputs: Vec<Writer<M>>,
     pub counters: StageCounters,
-    /// True if readers may have come since the last wait.
     may_have_new_readers: bool,
     /// Time of the last sign of life of a source that is never late, `CLOCK_MONOTONIC`, ns.
     said_ns: Option<i64>,
@@ -147,7 +146,6 @@ impl<'a, M> Feed<'a, M> {
         self.schedule.has_published(item.published)
     }
 
-    /// Returns the counters of a source that was asked to stop.
     pub fn finish(self, ended: Result<(), StageError>) -> Result<StageCounters, StageError> {
         match ended {
             Ok(()) | Err(StageError::Stopped) => Ok(self.counters),
@@ -169,13 +167,11 @@ pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
 /// The progress of the run, from its poses.
 pub(crate) struct Credit {
     pub poses: Port<Pose>,
-    /// Sequence number of the newest pose.
     pub newest: Option<u64>,
     /// The same at the source.
     pub published: Option<u64>,
     /// The newest pose of the trajectory at the last start of the sink.
     pub resume_at: Option<Item>,
-    /// True if the sink has journalled the end of the stream.
     pub has_ended: bool,
 }
 

@@ -11,7 +11,6 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// The pace with this [`origin`](Self::origin).
     pub fn new(rate: f64, (start_ns, first_ns): (i64, i64)) -> Self {
         Self {
             rate,
@@ -25,7 +24,6 @@ impl Pace {
         (self.start_ns, self.first_ns)
     }
 
-    /// Returns when a scan is due.
     pub fn due_ns(&self, complete_ns: i64) -> i64 {
         self.start_ns
             .saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)

@@ -8,7 +8,6 @@ use super::{
 };
 use crate::{StageError, clock, counters::Work, wake, writer::Draft};
 
-/// A source that is being played.
 pub(super) struct Playback<'a, S: Source> {
     pub feed: Feed<'a, Scan>,
     pub source: &'a mut S,
@@ -98,7 +97,6 @@ impl<S: Source> Playback<'_, S> {
         complete_ns.saturating_add(self.source.period_ns().saturating_mul(after))
     }
 
-    /// Returns the number of scans that follow a scan in its burst.
     fn left_in_burst(&self, published: u64) -> u64 {
         let burst = self.source.burst().get() as u64;
         burst - 1 - published % burst

@@ -49,7 +49,6 @@ pub trait Sensor {
     /// Continues to count after a dead source.
     fn resume(&mut self, before: Received);
 
-    /// Returns the deliveries and losses since the start of the run.
     fn received(&self) -> Received;
 }
 
@@ -87,7 +86,6 @@ pub fn run_sensor(
 
 struct Stream<'a> {
     feed: Feed<'a, Scan>,
-    /// The counts of [`Sensor::received`].
     received: Numbers<9>,
     live: Option<LiveSensors>,
 }
@@ -149,7 +147,6 @@ impl Stream<'_> {
         }
     }
 
-    /// Waits for the samples of a complete scan, and adds them.
     fn add_samples(
         &mut self,
         sensor: &mut impl Sensor,

@@ -5,7 +5,6 @@ use gyre_messages::{Message, Pose, flag};
 use super::{Run, WINDOW, reader, send, writer};
 use crate::reader::Reader;
 
-/// Takes all items from the queue and returns their sequence numbers.
 fn take_all(reader: &mut Reader<Pose>) -> Vec<u64> {
     let mut taken = Vec::new();
     while let Some(head) = reader.head().unwrap() {

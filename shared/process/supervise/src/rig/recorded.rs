@@ -50,7 +50,6 @@ impl Recorded {
         &self.header
     }
 
-    /// Returns the scan that the message is about.
     pub fn item(&self) -> Item {
         bytemuck::pod_read_unaligned(&self.header[..size_of::<Item>()])
     }

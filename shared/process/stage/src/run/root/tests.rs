@@ -31,7 +31,6 @@ fn a_run_locks_its_root_and_removes_all_files() {
     assert!(acquire(out.path()).is_ok());
 }
 
-/// Leaves the lock, the root and a segment of a dead run.
 fn dead_run(number: u64) -> (PathBuf, PathBuf) {
     let name = format!("gyre{number:010x}");
     let dead = user_directory().unwrap().join(&name);
