@@ -1,9 +1,6 @@
-//! Removes the transport's resources of dead processes.
-//!
-//! The transport's own cleanup does this, except in two cases, which are handled first. A process
-//! that is killed while it creates a port can leave an empty shared-memory file, and every process
-//! that opens it waits for ever; or an empty tag, and every cleanup fails. A time limit covers
-//! unknown cases.
+//! Removes the transport's resources of dead processes, by the transport's own cleanup. A process that
+//! is killed while it creates a port can leave an empty shared-memory file, for which every process
+//! that opens it waits for ever, or an empty tag, by which every cleanup fails: both go first.
 
 use std::{
     collections::HashSet,

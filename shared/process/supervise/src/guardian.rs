@@ -1,9 +1,6 @@
-//! A process that outlives a killed supervisor, to end the stages' child processes and to remove
-//! the run's shared memory.
-//!
-//! The system ends a stage together with its supervisor, but not the stage's own children, as a
-//! shell has them. Each stage leads a process group, and the guardian knows them all: it reads them
-//! from a pipe, and the end of the pipe is the end of the supervisor.
+//! A process that outlives a killed supervisor, to end the stages' own children, as a shell has them,
+//! and to remove the run's shared memory. Each stage leads a process group; the guardian reads the
+//! groups from a pipe, whose end is the end of the supervisor.
 
 use std::{
     collections::BTreeMap,

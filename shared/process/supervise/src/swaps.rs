@@ -1,10 +1,7 @@
-//! Swaps: a new program replaces a stage's program during the run.
-//!
-//! The new program first stands by: it loads its data while the one before works. It takes over
-//! when no scan is in flight, if there is such a moment, and a restart of the stage is all that the
-//! others see. (Masking in live mode alone knows which scans it has admitted: if there are some
-//! without a pose, the others are restarted with it.) A program that fails before its first pose,
-//! or too often later, is given up, and the one before is started again.
+//! Swaps: a new program replaces a stage's program during the run. It stands by and loads its data
+//! while the one before works, and takes over when no scan is in flight, if there is such a moment: the
+//! others see a restart. (Only masking in live mode knows which scans it has admitted.) A program that
+//! fails before its first pose, or too often later, gives way to the one before.
 
 mod trial;
 
