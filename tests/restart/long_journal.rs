@@ -1,6 +1,6 @@
 //! A journal of a month: restarting, checking and writing results take time and memory that do not
-//! grow with its length. It is short by default. A month, each test in a process of its own, since the
-//! peak of memory is the process's: `GYRE_POSES=26000000 cargo test --release -p gyre --test
+//! grow with its length. It is short by default. A month, each test in a process of its own, since
+//! the peak of memory is the process's: `GYRE_POSES=26000000 cargo test --release -p gyre --test
 //! long_journal NAME -- --nocapture`; 550 bytes to 1 kB of disk a pose, minutes under `eatmydata`.
 
 #![allow(clippy::unwrap_used)]

@@ -1,6 +1,7 @@
-//! Removes the transport's resources of dead processes, by the transport's own cleanup. A process that
-//! is killed while it creates a port can leave an empty shared-memory file, for which every process
-//! that opens it waits for ever, or an empty tag, by which every cleanup fails: both go first.
+//! Removes the transport's resources of dead processes, by the transport's own cleanup. A process
+//! that is killed while it creates a port can leave an empty shared-memory file, for which every
+//! process that opens it waits for ever, or an empty tag, by which every cleanup fails: both go
+//! first.
 
 use std::{
     collections::HashSet,

@@ -1,6 +1,6 @@
-//! A process that outlives a killed supervisor, to end the stages' own children, as a shell has them,
-//! and to remove the run's shared memory. Each stage leads a process group; the guardian reads the
-//! groups from a pipe, whose end is the end of the supervisor.
+//! A process that outlives a killed supervisor, to end the stages' own children, as a shell has
+//! them, and to remove the run's shared memory. Each stage leads a process group; the guardian
+//! reads the groups from a pipe, whose end is the end of the supervisor.
 
 use std::{
     collections::BTreeMap,

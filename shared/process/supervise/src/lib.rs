@@ -3,8 +3,8 @@
 //! demands it. Followers are restarted alone. [`rig`] runs one process alone, to test it.
 //!
 //! Reading order: `supervisor`, the loop; its parts `processes`, `poses`, `stall`, `recovery`,
-//! `followers`, `swaps`, `recorder`; `restarts` and `requests`, which carry out their decisions; `start`
-//! and `child`, a process; `clean`.
+//! `followers`, `swaps`, `recorder`; `restarts` and `requests`, which carry out their decisions;
+//! `start` and `child`, a process; `clean`.
 
 // `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.
 #![allow(unsafe_code)]

@@ -1,7 +1,7 @@
-//! Finds a run that makes no progress although no process has died, and decides what to restart. The
-//! clock runs only while a pose is owed, or a scan by the source's own schedule: neither slow playback
-//! nor a gap in a recording is a stall. A stage that opens its topics, maybe after loading a model, has
-//! a limit of its own; stages on another machine are watched there.
+//! Finds a run that makes no progress although no process has died, and decides what to restart.
+//! The clock runs only while a pose is owed, or a scan by the source's own schedule: neither slow
+//! playback nor a gap in a recording is a stall. A stage that opens its topics, maybe after loading
+//! a model, has a limit of its own; stages on another machine are watched there.
 
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
 //! Swaps: a new program replaces a stage's program during the run. It stands by and loads its data
-//! while the one before works, and takes over when no scan is in flight, if there is such a moment: the
-//! others see a restart. (Only masking in live mode knows which scans it has admitted.) A program that
-//! fails before its first pose, or too often later, gives way to the one before.
+//! while the one before works, and takes over when no scan is in flight, if there is such a moment:
+//! the others see a restart. (Only masking in live mode knows which scans it has admitted.) A
+//! program that fails before its first pose, or too often later, gives way to the one before.
 
 mod trial;
 

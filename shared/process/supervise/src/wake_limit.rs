@@ -1,6 +1,6 @@
-//! A limit on how long processors take to wake, for the whole machine, while the supervisor lives. A
-//! processor without work sleeps, the deeper the longer, and each hop of a scan wakes one: that can
-//! take longer than the hop's message needs.
+//! A limit on how long processors take to wake, for the whole machine, while the supervisor lives.
+//! A processor without work sleeps, the deeper the longer, and each hop of a scan wakes one: that
+//! can take longer than the hop's message needs.
 
 use std::{
     fs::File,
