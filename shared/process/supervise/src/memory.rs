@@ -121,16 +121,4 @@ mod tests {
         assert_eq!(available(meminfo), Some(42 * 1024));
         assert_eq!(available("MemTotal: 100 kB"), None);
     }
-
-    #[test]
-    fn the_least_of_machine_and_groups_is_what_there_is() {
-        let room = |available, left| Room {
-            available,
-            limit: None,
-            left,
-        };
-        assert_eq!(room(Some(5), Some(3)).least(), Some(3));
-        assert_eq!(room(Some(5), None).least(), Some(5));
-        assert_eq!(room(None, None).least(), None);
-    }
 }

@@ -166,18 +166,13 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_finds_no_room_is_started_later() {
+    fn a_process_that_finds_no_room_is_started_later_unless_a_stop_is_requested() {
         let (busy, missing) = (io::ErrorKind::WouldBlock, io::ErrorKind::NotFound);
         let busy = || Err(busy.into());
         assert_eq!(started(false, &[busy(), busy(), Ok(())]), (None, 3));
         let (error, attempts) = started(false, &[busy()]);
         assert_eq!((error, attempts), (Some(io::ErrorKind::WouldBlock), 9));
         assert_eq!(started(false, &[Err(missing.into())]), (Some(missing), 1));
-    }
-
-    #[test]
-    fn a_request_to_stop_ends_the_attempts() {
-        let busy = || Err(io::ErrorKind::WouldBlock.into());
         assert_eq!(started(true, &[busy()]).1, 2);
     }
 }

@@ -225,22 +225,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ready_program_takes_over_between_scans_or_when_there_is_no_such_moment() {
+    fn a_program_takes_over_when_it_is_ready_and_is_not_waited_for_without_end() {
         let (moment, long) = (Duration::from_millis(1), 2 * PATIENCE);
-        let limit = Some(Duration::from_secs(60));
-        let ready = |ready, is_in_flight| judge(Some(ready), long, limit, || is_in_flight);
-        assert_eq!(ready(moment, true), Judged::Later);
-        assert_eq!(ready(moment, false), Judged::Now);
-        assert_eq!(ready(long, true), Judged::Now);
-    }
-
-    #[test]
-    fn a_program_that_does_not_get_ready_is_waited_for_with_the_limit_of_a_start() {
-        let (minute, limit) = (Duration::from_secs(60), Duration::from_secs(30));
-        let waited = |limit| judge(None, minute, limit, || false);
-        assert_eq!(waited(Some(limit)), Judged::TooLate);
-        assert_eq!(waited(Some(2 * minute)), Judged::Later);
-        assert_eq!(waited(None), Judged::Later);
+        for (ready, limit, is_in_flight, expected) in [
+            (Some(moment), Some(moment), true, Judged::Later),
+            (Some(moment), Some(moment), false, Judged::Now),
+            (Some(long), Some(moment), true, Judged::Now),
+            (None, Some(moment), false, Judged::TooLate),
+            (None, Some(2 * long), false, Judged::Later),
+            (None, None, false, Judged::Later),
+        ] {
+            let judged = judge(ready, long, limit, || is_in_flight);
+            assert_eq!(judged, expected, "{ready:?}, {limit:?}, {is_in_flight}");
+        }
     }
 
     #[test]
