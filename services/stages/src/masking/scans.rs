@@ -129,7 +129,7 @@ impl Scans {
     /// depend on the numbers alone, so they are the same after a restart.
     fn find_motions(&mut self, item: &Item) -> bool {
         if item.is(flag::BREAK) {
-            self.motions.start_chain(item.seq);
+            self.motions.known.insert(item.seq, None);
         }
         let previous = item
             .seq
@@ -178,7 +178,7 @@ impl Scans {
     fn motion_for(&self, seq: u64) -> Option<Option<Twist>> {
         match self.window.lag {
             0 => Some(None),
-            lag => self.motions.before(seq, lag as u64),
+            lag => self.motions.known.before(seq, lag as u64),
         }
     }
 }

@@ -72,10 +72,6 @@ impl Topic {
             content_bytes: content_bytes::<M>,
         }
     }
-
-    fn max_sample_bytes(&self, limits: &Limits) -> usize {
-        SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
-    }
 }
 
 const PAGE: usize = 4096;
@@ -132,7 +128,9 @@ impl Footprint {
     pub fn new(window: &Window, limits: &Limits) -> Self {
         let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
-            (topic.name, samples * topic.max_sample_bytes(limits))
+            let payload = (topic.max_elements)(limits) * topic.element.bytes;
+            let sample = SAMPLE_OVERHEAD + topic.header.bytes + payload;
+            (topic.name, samples * sample)
         });
         let bookkeeping = [("bookkeeping", bookkeeping(window))];
         Self {

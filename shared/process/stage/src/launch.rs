@@ -193,7 +193,11 @@ pub fn main(
             let sentence = format!("{name}: {error}");
             // Either fails if the disk is full.
             let _ = writeln!(std::io::stderr(), "{sentence}");
-            leave_last_words(name, &sentence);
+            // For the supervisor, in shared memory: the disk of the logs may be full.
+            if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
+                let path = PathBuf::from(root).join(last_words(name, stands_by()));
+                let _ = run::write(path, &sentence);
+            }
             ExitCode::from(error.exit_code())
         }
     }
@@ -205,15 +209,6 @@ pub fn last_words(stage: &str, stands_by: bool) -> String {
     match stands_by {
         true => format!("{stage}.standby.error"),
         false => format!("{stage}.error"),
-    }
-}
-
-/// Leaves the reason for the stage's end to the supervisor, in shared memory: the disk of the logs
-/// may be full.
-fn leave_last_words(stage: &str, sentence: &str) {
-    if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
-        let name = last_words(stage, stands_by());
-        let _ = run::write(PathBuf::from(root).join(name), sentence);
     }
 }
 

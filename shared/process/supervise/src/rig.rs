@@ -7,7 +7,7 @@
 
 mod recorded;
 
-use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
+use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, time::Duration};
 
 use gyre_messages::{StageId, Topic};
 use gyre_stage::{
@@ -15,7 +15,7 @@ use gyre_stage::{
     reader::{AnyMessage, Port},
     run::{self, RunRoot},
     services::Services,
-    transport::{self, Node, Service, Transport},
+    transport::{self, Listener, Node, Service, Transport},
     wake::Signals,
     writer::TopicWriter,
 };
@@ -126,15 +126,11 @@ impl<'a> Rig<'a> {
 
     /// Returns the names of the files that describe the services which exist.
     pub fn services(&self) -> BTreeSet<String> {
-        let folder = fs::read_dir(self.services_folder());
-        let names = folder.into_iter().flatten().flatten();
+        let folder = self.manifest.root.join(self.transport.services_folder());
+        let names = fs::read_dir(folder).into_iter().flatten().flatten();
         names
             .map(|file| file.file_name().to_string_lossy().into_owned())
             .collect()
-    }
-
-    fn services_folder(&self) -> PathBuf {
-        self.manifest.root.join(self.transport.services_folder())
     }
 
     pub fn feed(&self, topic: &str) -> Result<Feed, StageError> {
@@ -165,8 +161,8 @@ impl<'a> Rig<'a> {
 
     /// True on a request to stop.
     pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<bool, StageError> {
-        let listeners: Vec<_> = taps.iter().map(|tap| tap.0.listener()).collect();
-        self.signals.sleep_until_any(&listeners, limit)
+        let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
+        Ok(self.signals.wait(&listeners, None, limit)?.stop)
     }
 }
 
@@ -230,5 +226,9 @@ impl Tap {
             payload: received.values::<u8>().to_vec(),
             received_ns: received.received_ns,
         }))
+    }
+
+    pub fn listener(&self) -> &Listener {
+        self.0.listener()
     }
 }
