@@ -13,7 +13,7 @@ use std::{
 use gyre_stage::run::SHARED_MEMORY;
 use tempfile::TempDir;
 
-use crate::common::{Ended, OtherUser, Run, leftovers, undisturbed};
+use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};
 
 /// Holds the lock of a file or folder, as another program does, until it is dropped.
 fn locked(path: &Path) -> File {
@@ -149,29 +149,31 @@ fn in_shared_memory_of(pid: u32, script: &str) {
 
 const FILL: &str = "cat /dev/zero >> /dev/shm/filled-by-another-program";
 
-#[test]
-fn a_run_has_its_memory_before_another_program_fills_the_rest() {
-    let run = Run::of_recording().rate("2");
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
-        return;
-    };
+/// Starts a run with little shared memory of its own, and waits for its first pose.
+fn start_with_little_memory(run: &Run) -> Option<Running> {
+    let command = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m")?;
     let mut running = run.start_as(command);
     running.await_poses(1);
+    Some(running)
+}
+
+#[test]
+fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_without_it_ends_it() {
+    let run = Run::of_recording().rate("2");
+    let Some(running) = start_with_little_memory(&run) else {
+        return;
+    };
     in_shared_memory_of(running.pid(), FILL);
     let ended = running.finish();
     ended.succeeded();
     ended.does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
-}
 
-#[test]
-fn a_restart_without_memory_ends_the_run_in_a_sentence() {
     let run = Run::of_recording().rate("2");
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
+    let Some(mut running) = start_with_little_memory(&run) else {
         return;
     };
-    let mut running = run.start_as(command);
-    let source = running.await_poses(1).await_stage("radar-replay");
+    let source = running.await_stage("radar-replay");
     // The next run takes the resources of a dead process at once.
     let script =
         format!("{FILL}; kill -9 {source}; for i in $(seq 100); do {FILL}; sleep 0.01; done");

@@ -255,13 +255,7 @@ mod tests {
             (one.followers, one.stall),
             (vec![(FOLLOWER, follower)], None)
         );
-    }
-
-    #[test]
-    fn heartbeats_are_looked_at_once_a_second() {
-        let plan = plan();
-        let mut stalls = Stalls::of(&plan);
-        found(&mut stalls, &[], LIMIT);
+        // Heartbeats are looked at once a second.
         let now = stalls.looks.last + PERIOD / 2;
         assert_eq!(stalls.look(now, |_, _| true, None), Found::default());
     }
