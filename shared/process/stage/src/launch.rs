@@ -164,6 +164,10 @@ impl Launch {
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
     }
+
+    pub fn node(&self) -> &Node {
+        &self.node
+    }
 }
 
 fn stands_by() -> bool {

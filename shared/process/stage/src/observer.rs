@@ -18,7 +18,7 @@ use crate::{
     Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
     numbers::{self, Numbers},
-    reader::{AnyMessage, Port, Received},
+    reader::{self, AnyMessage, Port, Received},
     run,
     sessions::not_running,
     transport::{self, Node, Service, Subscriber},
@@ -187,7 +187,9 @@ impl ObservedRun {
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
-        Port::of(subscriber, topic, &self.node, &self.manifest)
+        let port = Port::of(subscriber, topic, &self.node, &self.manifest)?;
+        reader::notify_publisher(&self.node, topic.name)?;
+        Ok(port)
     }
 }
 

@@ -86,6 +86,17 @@ impl<M: Message> Port<M> {
 
 impl<M> Port<M> {
     pub fn to(topic: &'static Topic, node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+        let port = Self::silent(topic, node, manifest)?;
+        notify_publisher(node, topic.name)?;
+        Ok(port)
+    }
+
+    /// Subscribes without notifying the publisher, as no stage may.
+    pub fn silent(
+        topic: &'static Topic,
+        node: &Node,
+        manifest: &Manifest,
+    ) -> Result<Self, StageError> {
         let subscriber = Subscriber::create(&Service::open(node, topic)?, None)?;
         Self::of(subscriber, topic, node, manifest)
     }
@@ -97,8 +108,6 @@ impl<M> Port<M> {
         manifest: &Manifest,
     ) -> Result<Self, StageError> {
         let data = Listener::open(node, &services::data_event(topic.name))?;
-        // The publisher then connects to its new readers.
-        Notifier::open(node, &services::handshake_event(topic.name))?.notify()?;
         Ok(Self {
             topic,
             limits: manifest.limits,
@@ -129,6 +138,11 @@ impl<M> Port<M> {
     pub fn listener(&self) -> &Listener {
         &self.data
     }
+}
+
+/// Notifies the publisher of a topic, which then connects to its new readers.
+pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageError> {
+    Notifier::open(node, &services::handshake_event(topic))?.notify()
 }
 
 /// The items of a topic in order, each once: the current and the previous one.

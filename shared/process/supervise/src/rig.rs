@@ -11,7 +11,7 @@ use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, time::Duration};
 
 use gyre_messages::{StageId, Topic};
 use gyre_stage::{
-    Manifest, StageError,
+    Launch, Manifest, StageError,
     reader::{AnyMessage, Port},
     run::{self, RunRoot},
     services::Services,
@@ -134,11 +134,7 @@ impl<'a> Rig<'a> {
     }
 
     pub fn feed(&self, topic: &str) -> Result<Feed, StageError> {
-        let topic = known(topic)?;
-        Ok(Feed {
-            writer: TopicWriter::to(topic, &self.node, &self.manifest)?,
-            topic: Service::open(&self.node, topic)?,
-        })
+        Feed::on(&self.node, &self.manifest, topic)
     }
 
     pub fn tap(&self, topic: &str) -> Result<Tap, StageError> {
@@ -197,6 +193,19 @@ impl Process {
 }
 
 impl Feed {
+    /// Publishes a topic of the run that a process has joined.
+    pub fn of(launch: &Launch, topic: &str) -> Result<Self, StageError> {
+        Self::on(launch.node(), &launch.manifest, topic)
+    }
+
+    fn on(node: &Node, manifest: &Manifest, topic: &str) -> Result<Self, StageError> {
+        let topic = known(topic)?;
+        Ok(Self {
+            writer: TopicWriter::to(topic, node, manifest)?,
+            topic: Service::open(node, topic)?,
+        })
+    }
+
     /// Sends a message as it is, with its time stamps, and notifies its readers.
     pub fn send(&self, message: &Recorded) -> Result<(), StageError> {
         let (header, payload) = (message.header_bytes(), &message.payload);
@@ -220,6 +229,17 @@ impl Feed {
 }
 
 impl Tap {
+    /// Subscribes to a topic of the run that a process has joined; `silently`, it does not ask for
+    /// its history.
+    pub fn of(launch: &Launch, topic: &str, silently: bool) -> Result<Self, StageError> {
+        let (topic, node, manifest) = (known(topic)?, launch.node(), &launch.manifest);
+        let port = match silently {
+            true => Port::silent(topic, node, manifest)?,
+            false => Port::to(topic, node, manifest)?,
+        };
+        Ok(Self(port))
+    }
+
     pub fn receive(&self) -> Result<Option<Recorded>, StageError> {
         Ok(self.0.receive()?.map(|received| Recorded {
             header: received.header_bytes().to_vec(),
