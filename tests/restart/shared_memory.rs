@@ -3,24 +3,15 @@
 
 use std::{
     fs::{self, File},
-    os::unix::fs::{MetadataExt, PermissionsExt, symlink},
+    os::unix::fs::{MetadataExt, symlink},
     path::{Path, PathBuf},
     process::Command,
-    thread,
-    time::Duration,
 };
 
 use gyre_stage::run::SHARED_MEMORY;
 use tempfile::TempDir;
 
 use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};
-
-/// Holds the lock of a file or folder, as another program does, until it is dropped.
-fn locked(path: &Path) -> File {
-    let file = File::open(path).unwrap();
-    file.lock().unwrap();
-    file
-}
 
 /// A run of a short simulation by another user, with a program and results of its own.
 struct Other {
@@ -53,59 +44,9 @@ impl Other {
 
 #[test]
 fn a_lock_that_another_program_holds_on_shared_memory_does_not_delay_a_run() {
-    let _lock = locked(Path::new(SHARED_MEMORY));
+    let directory = File::open(SHARED_MEMORY).unwrap();
+    directory.lock().unwrap();
     Run::of_recording().complete();
-}
-
-#[test]
-fn a_lock_of_the_run_that_does_not_become_free_ends_it_with_the_name_of_its_holder() {
-    let run = Run::of_recording();
-    fs::create_dir(run.out()).unwrap();
-    let path = leftovers::root(run.out()).with_extension("lock");
-    // Another run keeps the user's directory.
-    let other = Run::of_recording().rate("6");
-    let running = other.start();
-    while !path.parent().unwrap().exists() {
-        thread::sleep(Duration::from_millis(2));
-    }
-    // Under its name only once it is held: a free one is removed by any run that starts.
-    let held = path.with_extension("held");
-    fs::write(&held, b"").unwrap();
-    let lock = locked(&held);
-    fs::rename(&held, &path).unwrap();
-    let ended = Ended::of(run.command());
-    let holder = format!("process {}", std::process::id());
-    ended.refused_with(&["another run is writing to", &holder]);
-    drop(lock);
-    running.finish().succeeded();
-    run.complete();
-}
-
-#[test]
-fn files_of_others_in_shared_memory_stay() {
-    let name = format!("iox2x{}", std::process::id());
-    let run = Run::of_recording();
-    fs::create_dir(run.out()).unwrap();
-    let runs = leftovers::root(run.out()).parent().unwrap().to_owned();
-    // The first is where runs were in earlier versions.
-    let folders = [
-        Path::new(SHARED_MEMORY).join("gyre").join(&name),
-        runs.join(&name),
-    ];
-    let segment = Path::new(SHARED_MEMORY).join(format!("{name}_segment"));
-    fs::write(&segment, b"").unwrap();
-    for folder in &folders {
-        fs::create_dir_all(folder).unwrap();
-    }
-    fs::set_permissions(&runs, fs::Permissions::from_mode(0o700)).unwrap();
-    run.complete();
-    assert!(segment.exists());
-    fs::remove_file(segment).unwrap();
-    for folder in &folders {
-        assert!(folder.exists());
-        fs::remove_dir(folder).unwrap();
-        let _ = fs::remove_dir(folder.parent().unwrap());
-    }
 }
 
 #[test]
