@@ -13,7 +13,7 @@ use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 use crate::{
     StagePlan, SuperviseError,
     guardian::{self, Guardian},
-    scheduling::{self, Key},
+    scheduling,
 };
 
 /// Pauses after a failure to start a process for want of processes or memory; the sum is the time
@@ -69,8 +69,8 @@ impl<'a> Starter<'a> {
         let mut key = [0];
         match started {
             Err(source) if refused.read(&mut key).is_ok_and(|length| length > 0) => {
-                let key = Key::ALL[usize::from(key[0]).min(Key::ALL.len() - 1)];
-                let what = scheduling::describe(&plan.scheduling, key);
+                let keys = scheduling::keys(&plan.scheduling);
+                let what = &keys[usize::from(key[0]).min(keys.len() - 1)];
                 Err(SuperviseError::Process(format!(
                     "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
                 )))
@@ -107,7 +107,7 @@ impl<'a> Starter<'a> {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);
             if let Err((key, error)) = scheduling.apply() {
-                let _ = rustix::io::write(&refusals, &[key as u8]);
+                let _ = rustix::io::write(&refusals, &[key]);
                 return Err(error);
             }
             match getppid() == Some(supervisor) {

@@ -73,7 +73,7 @@ impl<S: Source> Playback<'_, S> {
         let pace = pace.get_or_insert_with(|| {
             let before = self.feed.schedule.origin.filter(|_| self.is_sensor());
             let origin = before.unwrap_or_else(|| (clock::now_ns(), complete_ns));
-            Pace::new(rate, origin)
+            Pace { rate, origin }
         });
         if let Some(before_ns) = gap_ns {
             pace.resume(before_ns, complete_ns, self.source.period_ns());
@@ -81,7 +81,7 @@ impl<S: Source> Playback<'_, S> {
         if self.feed.launch.manifest.live && !self.source.drops_missed_scans() {
             self.feed.counters.slipped_ns += pace.slip(complete_ns);
         }
-        self.feed.schedule.is_paced_from(pace.origin())?;
+        self.feed.schedule.is_paced_from(pace.origin)?;
         let burst_ns = self.burst_ns(complete_ns, published);
         Ok(Some(pace.due_ns(burst_ns)))
     }

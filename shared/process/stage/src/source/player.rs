@@ -50,8 +50,8 @@ fn play(
             .collect::<Result<_, _>>()?;
         let mut item = item_of(&messages, seq)?;
         let due_ns = feed.launch.manifest.rate.map(|rate| {
-            let pace =
-                pace.get_or_insert_with(|| Pace::new(rate, (clock::now_ns(), item.stamp_ns)));
+            let origin = (clock::now_ns(), item.stamp_ns);
+            let pace = pace.get_or_insert(Pace { rate, origin });
             pace.due_ns(item.stamp_ns)
         });
         *item.hop_mut(StageId::RadarReplay) = hop(started_ns, clock::now_ns());
