@@ -28,7 +28,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let submap_reach_m = slam.submap_reach_m;
     let new_closer = move || {
         let closer = LoopCloser::new(submap_reach_m, &refinement, points.capacity);
-        closer.map_err(StageError::configuration)
+        closer.map_err(StageError::input)
     };
     let out = &launch.manifest.out;
     let mut closing = LoopClosing {

@@ -36,8 +36,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 
 pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
     let library = Library::find(masking);
-    let library = library.map_err(StageError::configuration)?;
-    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::configuration)
+    let library = library.map_err(StageError::input)?;
+    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::input)
 }
 
 struct Tracking {

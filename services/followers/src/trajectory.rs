@@ -26,7 +26,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
-        StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
+        StageError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
     let out = &launch.manifest.out;
     let config: GnssConfig = launch.section("gnss")?;

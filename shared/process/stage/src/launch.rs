@@ -41,7 +41,7 @@ pub struct Launch {
 impl Launch {
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| {
-            StageError::Configuration(
+            StageError::Input(
                 "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
                     .to_owned(),
             )
@@ -131,7 +131,7 @@ impl Launch {
             return Ok(());
         }
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
-            StageError::Configuration(format!(
+            StageError::Input(format!(
                 "scheduling.lock_memory is set, but the memory cannot be locked: {error}; raise `ulimit -l`, or LimitMEMLOCK of the unit"
             ))
         })
@@ -154,7 +154,7 @@ impl Launch {
         let table = self.configuration.get(section).cloned();
         let table = table.unwrap_or_else(|| toml::Table::new().into());
         table.try_into().map_err(|error: toml::de::Error| {
-            StageError::Configuration(format!(
+            StageError::Input(format!(
                 "[{section}] in the configuration: {}",
                 error.message()
             ))
@@ -219,7 +219,7 @@ pub fn last_words(stage: &str, stands_by: bool) -> String {
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {
-        StageError::Configuration(format!(
+        StageError::Input(format!(
             "GYRE_LOG is `{filter}` ({error}): say `debug`, or `info,zenoh=debug`"
         ))
     })

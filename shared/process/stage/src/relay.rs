@@ -213,9 +213,8 @@ impl<'a> LastStages<'a> {
 }
 
 fn inlet(launch: &Launch, name: &str) -> Result<Reader<AnyMessage>, StageError> {
-    let topic = gyre_messages::topic(name).ok_or_else(|| {
-        StageError::Configuration(format!("no stage publishes the topic `{name}`"))
-    })?;
+    let topic = gyre_messages::topic(name)
+        .ok_or_else(|| StageError::Input(format!("no stage publishes the topic `{name}`")))?;
     // Whichever item comes first: after a restart that is one of the history.
     let port = Port::to(topic, &launch.node, &launch.manifest)?;
     Ok(Reader::of(port, None))

@@ -207,7 +207,7 @@ impl TopicWriter {
                 .filter(|it| matches!(it.sender, Sender::Stage(_)) && it.name != Pose::TOPIC);
             let topic = found.ok_or_else(|| {
                 let reason = format!("a source does not publish the topic `{topic}`");
-                StageError::Configuration(reason)
+                StageError::Input(reason)
             })?;
             Self::to(topic, &launch.node, &launch.manifest)
         };
