@@ -110,7 +110,6 @@ impl Browser {
         text.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Waits until an expression on the page is true.
     pub fn until(&mut self, expression: &str) -> &mut Self {
         let since = Instant::now();
         while self.evaluate(expression) != json!(true) {

@@ -2,7 +2,6 @@
 
 use std::process::{Command, ExitStatus};
 
-/// A run that is over, or another command.
 #[derive(Clone, Debug)]
 pub struct Ended {
     pub status: ExitStatus,
@@ -59,12 +58,10 @@ impl Ended {
         self
     }
 
-    /// Asserts that it printed these words on standard error.
     pub fn says(&self, words: &str) {
         assert!(self.stderr.contains(words), "{}", self.stderr);
     }
 
-    /// Asserts that it did not print these words there.
     pub fn does_not_say(&self, words: &str) {
         assert!(!self.stderr.contains(words), "{}", self.stderr);
     }

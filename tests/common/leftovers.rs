@@ -62,7 +62,6 @@ pub fn shared_memory(out: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Removes the leftovers of a killed run.
 pub fn remove(out: &Path) {
     for file in shared_memory(out) {
         let _ = fs::remove_file(file);

@@ -129,7 +129,6 @@ pub fn runtime_is_installed() -> bool {
 /// time.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Holds the configuration, the results and the output of the run.
     folder: Arc<TempDir>,
     out: PathBuf,
     configuration: PathBuf,
@@ -189,7 +188,6 @@ impl Run {
         Self::of_demo().data(recording::demo())
     }
 
-    /// The same of this recording.
     pub fn data(self, folder: &Path) -> Self {
         self.option(folder.to_str().unwrap())
     }
@@ -207,13 +205,11 @@ impl Run {
             .set(&format!("masking.model='{}'", card.display()))
     }
 
-    /// The same with its results in `out`.
     pub fn into(mut self, out: &Path) -> Self {
         self.out = out.to_owned();
         self
     }
 
-    /// The same with another option.
     pub fn argument(mut self, option: &str, value: &str) -> Self {
         self.arguments.extend([option.to_owned(), value.to_owned()]);
         self
@@ -236,7 +232,6 @@ impl Run {
         self.set(&command)
     }
 
-    /// A place for the test's own files that goes with the run.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }

@@ -2,13 +2,11 @@
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChainRow {
-    /// Number in the chain.
     pub seq: u64,
     pub scan: u64,
     pub previous_scan: u64,
 }
 
-/// The rows below the header.
 pub fn rows(csv: &str) -> Vec<ChainRow> {
     let row = |line: &str| {
         let mut fields = line

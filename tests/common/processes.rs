@@ -21,7 +21,6 @@ pub fn send(pid: Pid, signal: Signal) {
     }
 }
 
-/// The time that a process has spent computing.
 pub fn cpu_time(pid: Pid) -> Duration {
     let fields = stat(pid).unwrap();
     // utime and stime, in hundredths of a second.
@@ -36,7 +35,6 @@ pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
         .collect()
 }
 
-/// Processes whose environment names the run at `root`.
 pub fn of_run(root: &Path) -> Vec<Pid> {
     pids()
         .filter(|pid| run_of(*pid).is_some_and(|run| run == root))
@@ -55,7 +53,6 @@ pub fn child_with(supervisor: Pid, word: &str) -> Option<Pid> {
     children_of(supervisor).find(|pid| words(*pid).iter().any(|it| it == word))
 }
 
-/// Returns whether a process has not ended.
 pub fn is_alive(pid: Pid) -> bool {
     stat(pid).is_some_and(|fields| !["Z", "X"].contains(&fields[0].as_str()))
 }

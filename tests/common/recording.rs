@@ -39,7 +39,6 @@ pub fn with_constants(run: Run) -> Run {
 /// Scans of the recording once around a block and a bit further.
 pub const SCANS_AROUND: usize = 120;
 
-/// The recording that comes back to where it began.
 pub fn around_a_block() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| of_a_block(SCANS_AROUND))
@@ -122,7 +121,6 @@ fn link(recording: &Path, folder: &Path, keep: impl Fn(usize) -> bool) {
     }
 }
 
-/// Copies all but the images.
 fn copy_files(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).unwrap() {
         let path = entry.unwrap().path();
@@ -159,13 +157,11 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.unwrap().path()).collect()
 }
 
-/// Replaces an image by the first `bytes` bytes of it.
 pub fn truncate(image: &Path, bytes: usize) {
     let whole = fs::read(image).unwrap();
     replace(image, &whole[..bytes.min(whole.len())]);
 }
 
-/// Replaces an image by black pixels of another size.
 pub fn resize(image: &Path, width: u32, height: u32) {
     let black = vec![0; (width * height) as usize];
     replace(image, &encoded(width, height, &black));
@@ -191,7 +187,6 @@ pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     });
 }
 
-/// Marks all rows of an image as measured.
 pub fn complete(image: &Path) {
     const VALIDITY: usize = 10;
     rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
@@ -226,7 +221,6 @@ fn replace(image: &Path, bytes: &[u8]) {
     fs::write(image, bytes).unwrap();
 }
 
-/// The recording of a simulated drive.
 pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
     prepared(name, |recording| {
         write_dataset(config, recording, &mut |_, _| ()).unwrap();

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     path::PathBuf,
-    process::{Child, ExitStatus},
+    process::Child,
     thread,
     time::{Duration, Instant},
 };
@@ -14,32 +14,30 @@ use rustix::process::Signal;
 use super::{
     Ended, Pid, Run, STAGES, leftovers,
     processes::{self, send},
+    spawned::{LIMIT, LOOK, Spawned},
 };
-
-/// A run of the small recording takes a second or two, far more only on a loaded machine.
-const LIMIT: Duration = Duration::from_secs(90);
-const LOOK: Duration = Duration::from_millis(2);
 
 /// A running command. Dropped before its end, it is killed.
 pub struct Running {
     run: Run,
-    child: Child,
+    process: Spawned,
 }
 
 impl Running {
     pub(super) fn new(run: Run, child: Child) -> Self {
-        Self { run, child }
+        let said = run.folder().join("stderr.txt");
+        let process = Spawned { child, said };
+        Self { run, process }
     }
 
     pub fn pid(&self) -> Pid {
-        self.child.id()
+        self.process.pid()
     }
 
     pub fn stages(&self) -> BTreeMap<String, Pid> {
         processes::stages_of(self.pid())
     }
 
-    /// Waits until all of [`STAGES`] live, and returns them with the followers.
     pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
         self.until("six stages", |running| {
             let living = running.stages();
@@ -54,7 +52,6 @@ impl Running {
         self.until(name, |running| running.stages().get(name).copied())
     }
 
-    /// Waits until a stage lives as another process than `not`.
     pub fn await_other_stage(&mut self, name: &str, not: Pid) -> Pid {
         self.until(name, |running| {
             running
@@ -65,20 +62,17 @@ impl Running {
         })
     }
 
-    /// Waits until there is a guardian other than `not`.
     pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
         self.until("a guardian", |running| {
             processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
         })
     }
 
-    /// Waits until so many poses are journalled.
     pub fn await_poses(&mut self, poses: usize) -> &mut Self {
         self.until("poses", |running| (running.poses() >= poses).then_some(()));
         self
     }
 
-    /// Waits until so many poses are journalled, or the run is over.
     pub fn await_poses_or_end(&mut self, poses: usize) {
         while self.poses() < poses && !self.is_over() {
             thread::sleep(LOOK);
@@ -86,7 +80,7 @@ impl Running {
     }
 
     pub fn is_over(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_some()
+        self.process.is_over()
     }
 
     pub fn poses(&self) -> usize {
@@ -110,11 +104,9 @@ impl Running {
         self
     }
 
-    /// Waits until the run has printed these words on standard error.
     pub fn await_words(&mut self, words: &str) -> &mut Self {
         self.until(words, |running| {
-            let said = running.run.said("stderr.txt");
-            said.contains(words).then_some(())
+            running.process.said().contains(words).then_some(())
         });
         self
     }
@@ -139,11 +131,11 @@ impl Running {
 
     /// Waits until the run ends, perhaps by a signal, which leaves its files to the next run.
     pub fn end(mut self) -> Ended {
-        let status = self.wait();
+        let status = self.process.wait();
         let ended = Ended {
             status,
             stdout: self.run.said("stdout.txt"),
-            stderr: self.run.said("stderr.txt"),
+            stderr: self.process.said(),
         };
         println!("{status}\n{}", ended.stderr);
         ended
@@ -152,7 +144,7 @@ impl Running {
     /// `kill -9` of the supervisor; returns when its stages have followed it.
     pub fn kill_supervisor(mut self) {
         send(self.pid(), Signal::KILL);
-        self.wait();
+        self.process.wait();
         let root = leftovers::root(self.run.out());
         let deadline = Instant::now() + Duration::from_secs(5);
         while !processes::of_run(&root).is_empty() {
@@ -165,39 +157,15 @@ impl Running {
         }
     }
 
-    fn wait(&mut self) -> ExitStatus {
-        let since = Instant::now();
-        loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                return status;
-            }
-            assert!(
-                since.elapsed() < LIMIT,
-                "it does not end:\n{}",
-                self.run.said("stderr.txt")
-            );
-            thread::sleep(LOOK);
-        }
-    }
-
     fn until<T>(&mut self, what: &str, mut look: impl FnMut(&Self) -> Option<T>) -> T {
         let since = Instant::now();
         loop {
             if let Some(seen) = look(self) {
                 return seen;
             }
-            let ended = self.child.try_wait().unwrap();
-            let said = || self.run.said("stderr.txt");
-            assert!(
-                ended.is_none(),
-                "it ended before there were {what}:\n{}",
-                said()
-            );
-            assert!(
-                since.elapsed() < LIMIT,
-                "waited in vain for {what}:\n{}",
-                said()
-            );
+            let (has_ended, said) = (self.is_over(), || self.process.said());
+            assert!(!has_ended, "it ended before {what}:\n{}", said());
+            assert!(since.elapsed() < LIMIT, "waited for {what}:\n{}", said());
             thread::sleep(LOOK);
         }
     }
@@ -205,9 +173,8 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        if self.child.try_wait().is_ok_and(|status| status.is_none()) {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        if !self.is_over() {
+            self.process.kill();
             leftovers::remove(self.run.out());
         }
     }

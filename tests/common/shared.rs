@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex, Weak};
 pub struct Shared<T>(Mutex<Weak<T>>);
 
 impl<T> Shared<T> {
-    /// Nothing yet.
     pub const fn new() -> Self {
         Self(Mutex::new(Weak::new()))
     }

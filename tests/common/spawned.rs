@@ -12,13 +12,14 @@ use rustix::process::Signal;
 
 use super::{Pid, send};
 
-const LIMIT: Duration = Duration::from_secs(60);
-const LOOK: Duration = Duration::from_millis(2);
+/// A run of the small recording takes a second or two, far more only on a loaded machine.
+pub(super) const LIMIT: Duration = Duration::from_secs(90);
+pub(super) const LOOK: Duration = Duration::from_millis(2);
 
 /// A running command. Dropped, it is killed.
 pub struct Spawned {
-    child: Child,
-    said: PathBuf,
+    pub(super) child: Child,
+    pub(super) said: PathBuf,
 }
 
 impl Spawned {
@@ -41,6 +42,10 @@ impl Spawned {
 
     pub fn said(&self) -> String {
         fs::read_to_string(&self.said).unwrap()
+    }
+
+    pub fn is_over(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_some()
     }
 
     pub fn until<T>(&self, look: impl Fn(&str) -> Option<T>) -> T {

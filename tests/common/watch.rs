@@ -6,16 +6,13 @@ use rustix::process::Signal;
 
 use super::{Run, gyre, spawned::Spawned};
 
-/// A running observer.
 pub struct Watch {
     process: Spawned,
     topic: &'static str,
 }
 
-/// The output of an observer.
 #[derive(Debug)]
 pub struct Watched {
-    /// The sequence numbers of the messages.
     pub seqs: Vec<u64>,
     /// The sum of all `missed` lines.
     pub gaps: u64,
@@ -34,7 +31,6 @@ impl Watch {
         Self { process, topic }
     }
 
-    /// Waits until it has printed a message.
     pub fn await_message(self) -> Self {
         self.process.until(|said| {
             assert!(!said.contains("gyre: "), "{said}");
@@ -47,13 +43,11 @@ impl Watch {
         self.process.signal(signal);
     }
 
-    /// Kills the process and returns its output.
     pub fn kill(mut self) -> Watched {
         self.process.kill();
         self.read(&self.process.said())
     }
 
-    /// Waits until the process ends, and returns its output.
     pub fn finish(mut self) -> Watched {
         self.process.wait();
         self.read(&self.process.said())

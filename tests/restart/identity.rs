@@ -65,7 +65,6 @@ fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun
     assert_eq!(run.odometry(), undisturbed());
 }
 
-/// A copy of a model in a folder.
 fn install_model(name: &str, ours: &Path) {
     fs::copy(card(name), ours).unwrap();
     let file = card(name).with_extension("onnx");

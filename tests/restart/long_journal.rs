@@ -1,11 +1,7 @@
 //! A journal of a month: restarting, checking and writing results take time and memory that do not
-//! grow with the length of the journal.
-//!
-//! The journal is short by default. A month of it, in release: `GYRE_POSES=26000000 cargo test
-//! --release -p gyre --test long_journal NAME -- --nocapture`, each test in a process of its own,
-//! because the peak of memory is the process's; 550 bytes to 1 kB of disk a pose. Run under
-//! `eatmydata`, the journal is made in minutes: the tests do not need the synchronisation of its
-//! records.
+//! grow with its length. It is short by default. A month, each test in a process of its own, since
+//! the peak of memory is the process's: `GYRE_POSES=26000000 cargo test --release -p gyre --test
+//! long_journal NAME -- --nocapture`; 550 bytes to 1 kB of disk a pose, minutes under `eatmydata`.
 
 #![allow(clippy::unwrap_used)]
 

@@ -3,24 +3,15 @@
 
 use std::{
     fs::{self, File},
-    os::unix::fs::{MetadataExt, PermissionsExt, symlink},
+    os::unix::fs::{MetadataExt, symlink},
     path::{Path, PathBuf},
     process::Command,
-    thread,
-    time::Duration,
 };
 
 use gyre_stage::run::SHARED_MEMORY;
 use tempfile::TempDir;
 
-use crate::common::{Ended, OtherUser, Run, leftovers, undisturbed};
-
-/// Holds the lock of a file or folder, as another program does, until it is dropped.
-fn locked(path: &Path) -> File {
-    let file = File::open(path).unwrap();
-    file.lock().unwrap();
-    file
-}
+use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};
 
 /// A run of a short simulation by another user, with a program and results of its own.
 struct Other {
@@ -53,59 +44,9 @@ impl Other {
 
 #[test]
 fn a_lock_that_another_program_holds_on_shared_memory_does_not_delay_a_run() {
-    let _lock = locked(Path::new(SHARED_MEMORY));
+    let directory = File::open(SHARED_MEMORY).unwrap();
+    directory.lock().unwrap();
     Run::of_recording().complete();
-}
-
-#[test]
-fn a_lock_of_the_run_that_does_not_become_free_ends_it_with_the_name_of_its_holder() {
-    let run = Run::of_recording();
-    fs::create_dir(run.out()).unwrap();
-    let path = leftovers::root(run.out()).with_extension("lock");
-    // Another run keeps the user's directory.
-    let other = Run::of_recording().rate("6");
-    let running = other.start();
-    while !path.parent().unwrap().exists() {
-        thread::sleep(Duration::from_millis(2));
-    }
-    // Under its name only once it is held: a free one is removed by any run that starts.
-    let held = path.with_extension("held");
-    fs::write(&held, b"").unwrap();
-    let lock = locked(&held);
-    fs::rename(&held, &path).unwrap();
-    let ended = Ended::of(run.command());
-    let holder = format!("process {}", std::process::id());
-    ended.refused_with(&["another run is writing to", &holder]);
-    drop(lock);
-    running.finish().succeeded();
-    run.complete();
-}
-
-#[test]
-fn files_of_others_in_shared_memory_stay() {
-    let name = format!("iox2x{}", std::process::id());
-    let run = Run::of_recording();
-    fs::create_dir(run.out()).unwrap();
-    let runs = leftovers::root(run.out()).parent().unwrap().to_owned();
-    // The first is where runs were in earlier versions.
-    let folders = [
-        Path::new(SHARED_MEMORY).join("gyre").join(&name),
-        runs.join(&name),
-    ];
-    let segment = Path::new(SHARED_MEMORY).join(format!("{name}_segment"));
-    fs::write(&segment, b"").unwrap();
-    for folder in &folders {
-        fs::create_dir_all(folder).unwrap();
-    }
-    fs::set_permissions(&runs, fs::Permissions::from_mode(0o700)).unwrap();
-    run.complete();
-    assert!(segment.exists());
-    fs::remove_file(segment).unwrap();
-    for folder in &folders {
-        assert!(folder.exists());
-        fs::remove_dir(folder).unwrap();
-        let _ = fs::remove_dir(folder.parent().unwrap());
-    }
 }
 
 #[test]
@@ -149,29 +90,31 @@ fn in_shared_memory_of(pid: u32, script: &str) {
 
 const FILL: &str = "cat /dev/zero >> /dev/shm/filled-by-another-program";
 
-#[test]
-fn a_run_has_its_memory_before_another_program_fills_the_rest() {
-    let run = Run::of_recording().rate("2");
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
-        return;
-    };
+/// Starts a run with little shared memory of its own, and waits for its first pose.
+fn start_with_little_memory(run: &Run) -> Option<Running> {
+    let command = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m")?;
     let mut running = run.start_as(command);
     running.await_poses(1);
+    Some(running)
+}
+
+#[test]
+fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_without_it_ends_it() {
+    let run = Run::of_recording().rate("2");
+    let Some(running) = start_with_little_memory(&run) else {
+        return;
+    };
     in_shared_memory_of(running.pid(), FILL);
     let ended = running.finish();
     ended.succeeded();
     ended.does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
-}
 
-#[test]
-fn a_restart_without_memory_ends_the_run_in_a_sentence() {
     let run = Run::of_recording().rate("2");
-    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
+    let Some(mut running) = start_with_little_memory(&run) else {
         return;
     };
-    let mut running = run.start_as(command);
-    let source = running.await_poses(1).await_stage("radar-replay");
+    let source = running.await_stage("radar-replay");
     // The next run takes the resources of a dead process at once.
     let script =
         format!("{FILL}; kill -9 {source}; for i in $(seq 100); do {FILL}; sleep 0.01; done");

@@ -14,18 +14,17 @@ use gyre_stage::{
     follower::{self, LogId, Progress, Step},
 };
 
-/// Runs the follower to the end of the keyframes, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;
-    let map = Map::open(&slam.map).map_err(StageError::configuration)?;
+    let map = Map::open(&slam.map).map_err(StageError::input)?;
     let localiser = Localiser::new(map, &refinement, points.capacity);
     launch.take_place()?;
     let out = launch.manifest.out.clone();
     let mut places = Fixes {
         keyframes: RecordReader::open(&out)?,
-        localiser: localiser.map_err(StageError::configuration)?,
+        localiser: localiser.map_err(StageError::input)?,
         read: 0,
         out,
     };

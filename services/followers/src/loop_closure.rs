@@ -18,7 +18,6 @@ use gyre_stage::{
     follower::{self, Growth, LogId, Progress, Step},
 };
 
-/// Runs the follower to the end of the keyframes, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let (slam, refinement, points): (SlamConfig, RefinementConfig, PointsConfig) = (
@@ -29,7 +28,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let submap_reach_m = slam.submap_reach_m;
     let new_closer = move || {
         let closer = LoopCloser::new(submap_reach_m, &refinement, points.capacity);
-        closer.map_err(StageError::configuration)
+        closer.map_err(StageError::input)
     };
     let out = &launch.manifest.out;
     let mut closing = LoopClosing {
@@ -60,7 +59,6 @@ struct LoopClosing {
     submap_reach_m: f64,
     loops: u64,
     pending: VecDeque<LoopHeader>,
-    /// True if the closer knows that no keyframes follow.
     has_finished: bool,
 }
 
@@ -200,7 +198,6 @@ impl LoopClosing {
     }
 }
 
-/// Keyframes with their points, read again from the log.
 struct Points<'a>(&'a mut RecordReader<Keyframe>);
 
 impl KeyframeSource for Points<'_> {

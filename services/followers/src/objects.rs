@@ -18,7 +18,6 @@ use gyre_stage::{
     follower::{self, LogId, Progress, Step},
 };
 
-/// Runs the follower to the end of the scans, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let masking: MaskingConfig = launch.section("masking")?;
@@ -35,11 +34,10 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     follower::run(launch, &mut tracking)
 }
 
-/// Returns a tracker whose network is computed by the library of learned masks.
 pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
     let library = Library::find(masking);
-    let library = library.map_err(StageError::configuration)?;
-    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::configuration)
+    let library = library.map_err(StageError::input)?;
+    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::input)
 }
 
 struct Tracking {
@@ -65,7 +63,6 @@ impl Tracking {
         Ok(())
     }
 
-    /// Cuts off the objects of scans that are not there any more, and the end, if scans may follow.
     fn leave_out_what_was_cut(&mut self) -> Result<(), StageError> {
         if !self.scans.has_ended() || self.tracked.len() > self.scans.len() {
             self.tracked.cut(self.scans.len())?;

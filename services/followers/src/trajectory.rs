@@ -22,12 +22,11 @@ use gyre_stage::{
     follower::{self, LogId, Progress, Step},
 };
 
-/// Runs the follower to the end of both logs, or until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
-        StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
+        StageError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
     let out = &launch.manifest.out;
     let config: GnssConfig = launch.section("gnss")?;
@@ -53,7 +52,6 @@ struct Trajectory {
     kind: EstimatorKind,
     /// The fixes that are later than all keyframes.
     fixes: Fixes,
-    /// The fixes that arrive during the run.
     live_fixes: Option<LiveFixes>,
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
@@ -65,7 +63,6 @@ struct Trajectory {
     corrected: Option<UncertainMotion>,
     /// True if the poses equal the results.
     is_final: bool,
-    /// True if something was read since the last correction.
     has_changed: bool,
 }
 
@@ -103,7 +100,6 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Reads the next record; returns false if there is no new record.
     fn advance(&mut self) -> Result<bool, StageError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
@@ -225,7 +221,6 @@ impl Follower for Trajectory {
 /// one in so many is new: after ten hours at 20 Hz that is every 18 s.
 const NEW_SHARE: usize = 2000;
 
-/// Receives fixes, and reads the log of all that have arrived on.
 struct LiveFixes {
     receiver: GnssReceiver,
     config: GnssConfig,
@@ -234,7 +229,6 @@ struct LiveFixes {
 }
 
 impl LiveFixes {
-    /// Begins to receive, in a run with its results in `out`.
     fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
         let log = received_fixes(out);
         Ok(Self {
@@ -245,7 +239,6 @@ impl LiveFixes {
         })
     }
 
-    /// Ends reception. Received fixes survive a power failure.
     fn finish(&mut self) -> Result<(), StageError> {
         self.receiver.finish()
     }

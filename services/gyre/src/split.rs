@@ -62,11 +62,11 @@ pub mod absent {
     pub(super) const PART: &str = "zenoh, which links machines";
 
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Configuration(features::absent(PART)))
+        Err(StageError::Input(features::absent(PART)))
     }
 
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Configuration(features::absent(PART)))
+        Err(StageError::Input(features::absent(PART)))
     }
 
     pub fn link(_: &LinkEnd) -> Result<ExitCode, Failure> {

@@ -95,7 +95,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     let build = program::digest(&path).map_err(|source| StageError::File { path, source })?;
     match build == manifest.build {
         true => Ok(()),
-        false => Err(StageError::Configuration(
+        false => Err(StageError::Input(
             "this is another build of gyre than the one that runs: name that one in the stage's command".to_owned(),
         )),
     }

@@ -23,7 +23,6 @@ pub use intake::{Intake, NoScans};
 
 use connection::RadarParser;
 
-/// Receives the scans of a radar until SIGTERM, or until there are enough.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
@@ -41,7 +40,6 @@ pub struct Settings {
     pub encoder_counts: u16,
     /// Time without an azimuth after which the run reconnects.
     pub silence: Duration,
-    /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
     pub constants: Constants,
 }
@@ -64,7 +62,6 @@ impl Settings {
     }
 }
 
-/// Returns the encoder counts per turn of a radar that does not report them.
 pub fn encoder_counts(options: &DatasetOptions) -> u16 {
     options.encoder_counts.unwrap_or(ENCODER_COUNTS)
 }

@@ -34,7 +34,7 @@ pub fn run_with(
     function: Box<dyn MaskFunction>,
 ) -> Result<StageCounters, StageError> {
     if launch.manifest.limits.rasters != 1 {
-        return Err(StageError::Configuration(
+        return Err(StageError::Input(
             "a function masks one scan at a time, and the network of this run two: name the function when the run is begun, or choose masking.kind `threshold`"
                 .to_owned(),
         ));
@@ -61,7 +61,7 @@ fn work(
     let mut masking = Masking {
         raster,
         config,
-        masker: masker.map_err(StageError::configuration)?,
+        masker: masker.map_err(StageError::input)?,
         azimuths: Azimuths::default(),
         doppler: doppler.is_used().then(DopplerEstimator::default),
         min_range_m: points.min_range_m,
@@ -169,7 +169,6 @@ impl Masking {
     }
 }
 
-/// Views a received scan, with the velocity for its motion compensation.
 fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, StageError> {
     let scan = received.header().view(received.values());
     let scan =
@@ -186,7 +185,6 @@ fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, S
 #[derive(Default)]
 struct Azimuths {
     finder: LostAzimuthFinder,
-    /// The scan that it has found them in last.
     last: Option<(u64, LostAzimuths)>,
 }
 

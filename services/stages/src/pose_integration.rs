@@ -9,9 +9,7 @@ use gyre_journal::{
     keyframes::{Keyframes, KeyframesError},
     scans::{Scans, ScansError},
 };
-use gyre_messages::{
-    Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, compose, flag,
-};
+use gyre_messages::{Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{
@@ -47,10 +45,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         loss: sink::notice(&launch.manifest),
         manifest: launch.manifest.clone(),
     };
-    let counters = match launch.manifest.refines {
-        true => sink::run::<Refined, _>(launch, &mut integration),
-        false => sink::run::<Motion, _>(launch, &mut integration),
-    }?;
+    let counters = sink::run(launch, &mut integration)?;
     integration.sync()?;
     integration.require_kept()?;
     Ok(counters)
@@ -64,7 +59,6 @@ struct Integration {
     points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
-    /// Of a run with objects, likewise.
     scans: Option<Scans>,
     /// Wake the followers of the logs that the run has.
     keyframes_grown: Option<Growth>,

@@ -35,7 +35,6 @@ pub enum Pace {
     OnDemand,
 }
 
-/// Plays the recording of the section `[source]` until SIGTERM.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     if config.from != PlayedFrom::Scan {
@@ -61,7 +60,6 @@ pub fn tolerance(config: &SourceConfig) -> Tolerance {
     }
 }
 
-/// Opens the recording with the files that the supervisor has listed.
 fn open(
     root: &Path,
     config: &SourceConfig,
@@ -112,7 +110,6 @@ pub fn play(
 struct Replay {
     dataset: Box<dyn Dataset>,
     samples: ScanSamples,
-    /// The scans of the stream, counted on through all turns.
     scans: Range<usize>,
     turns: Turns,
     faults: Faults,

@@ -24,7 +24,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let wheels: WheelsConfig = launch.section("wheels")?;
     let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
-        .map_err(StageError::configuration)?
+        .map_err(StageError::input)?
         .with_sensors(&gyro, &wheels, &doppler);
     launch.take_place()?;
     let manifest = &launch.manifest;

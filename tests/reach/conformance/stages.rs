@@ -7,7 +7,7 @@ use gyre_messages::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
 };
 use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY};
-use gyre_supervise::rig::{Feed, Joining, Ports, Recorded, Tap};
+use gyre_supervise::rig::{Feed, Recorded, Tap};
 
 /// The environment variable with the fault of a stage.
 pub const BREACH: &str = "GYRE_TEST_BREACH";
@@ -29,17 +29,13 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
         let ready = launch.manifest.root.join("rotation-search.ready");
         fs::write(ready, "").map_err(|error| StageError::Input(error.to_string()))?;
     }
-    let ports = Ports::of(launch);
-    let joining = match breach {
-        "joins silently" => Joining::Silently,
-        _ => Joining::Asks,
-    };
+    let silently = breach == "joins silently";
     let is_masking = breach.starts_with("masking ");
     let (input, output) = match is_masking {
         true => (Scan::TOPIC, Masked::TOPIC),
         false => (Masked::TOPIC, Rotation::TOPIC),
     };
-    let motions = is_masking.then(|| ports.tap(Motion::TOPIC, joining));
+    let motions = is_masking.then(|| Tap::of(launch, Motion::TOPIC, silently));
     let motions = motions.transpose()?;
     let mut stage = Broken {
         launch,
@@ -48,10 +44,10 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
             true => StageId::Masking,
             false => StageId::RotationSearch,
         },
-        input: ports.tap(input, joining)?,
+        input: Tap::of(launch, input, silently)?,
         motions,
         newest_motion: None,
-        output: ports.feed(output)?,
+        output: Feed::of(launch, output)?,
         next: None,
         waiting: None,
         begun: false,
@@ -66,10 +62,10 @@ struct Broken<'a> {
     launch: &'a Launch,
     breach: &'a str,
     stage: StageId,
-    input: Box<dyn Tap>,
-    motions: Option<Box<dyn Tap>>,
+    input: Tap,
+    motions: Option<Tap>,
     newest_motion: Option<u64>,
-    output: Box<dyn Feed>,
+    output: Feed,
     next: Option<u64>,
     waiting: Option<Recorded>,
     begun: bool,

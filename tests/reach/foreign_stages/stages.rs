@@ -35,7 +35,7 @@ pub fn play(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> 
         "refined" => stage::run(launch, &mut ForeignRefinement(fault)),
         _ => {
             let mut sink = ForeignIntegration { fault, last: None };
-            sink::run::<Refined, _>(launch, &mut sink)
+            sink::run(launch, &mut sink)
         }
     }
 }

@@ -25,7 +25,6 @@ const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
 const OBJECTS: &str = FollowerId::Objects.name();
 
-/// Results of a run with SLAM.
 const CORRECTED: &[&str] = &[
     "trajectory_slam.tum",
     "loops.csv",
@@ -60,7 +59,6 @@ pub struct Configuration {
     differs_from: Option<fn() -> Run>,
 }
 
-/// A run that nothing disturbs.
 pub struct Undisturbed {
     pub results: Results,
     /// The size of its folder of results.
@@ -73,7 +71,6 @@ pub struct Undisturbed {
 pub struct Results(BTreeMap<&'static str, Vec<u8>>);
 
 impl Results {
-    /// Returns the first name whose content is different.
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         let mut names = self.0.keys();
         names
@@ -88,7 +85,6 @@ impl Configuration {
         (self.can)()
     }
 
-    /// A run, with results of its own.
     pub fn run(&self) -> Run {
         self.run_of(&(self.recording)(), self.rate)
     }
@@ -167,7 +163,7 @@ fn size(path: &Path) -> u64 {
 }
 
 const SMALL: Configuration = Configuration {
-    name: "plain",
+    name: "",
     can: || true,
     recording: || recording::small().to_owned(),
     run: |recording| Run::small().data(recording),
@@ -183,103 +179,70 @@ const SMALL: Configuration = Configuration {
     differs_from: None,
 };
 
-pub fn plain() -> Configuration {
-    SMALL
+/// Defines configurations, each by the one that it is like and its other fields.
+macro_rules! configurations {
+    ($($(#[$doc:meta])* $name:ident: $base:expr => { $($field:ident: $value:expr,)* })*) => {
+        $(
+            $(#[$doc])*
+            pub fn $name() -> Configuration {
+                Configuration {
+                    name: stringify!($name),
+                    $($field: $value,)*
+                    ..$base
+                }
+            }
+        )*
+    };
 }
 
-/// A map whose slots of keyframes are used again.
-pub fn small_map() -> Configuration {
-    Configuration {
-        name: "small_map",
+configurations! {
+    plain: SMALL => {}
+    /// A map whose slots of keyframes are used again.
+    small_map: SMALL => {
         run: |recording| {
             let run = Run::small().data(recording).set("run.window=1");
             run.set("refinement.keyframes=2")
         },
         stateful: "refinement",
-        ..SMALL
     }
-}
-
-/// Keyframes every few scans.
-pub fn slam() -> Configuration {
-    Configuration {
-        name: "slam",
+    /// Keyframes every few scans.
+    slam: SMALL => {
         run: |recording| Run::small().data(recording).set("slam.kind=graph"),
         followers: &[LOOP_CLOSURE, TRAJECTORY],
         stateful: "pose-integration",
         results: CORRECTED,
         same_as: Some(Run::of_recording),
-        ..SMALL
     }
-}
-
-fn around_a_block() -> Run {
-    Run::small().data(recording::around_a_block())
-}
-
-pub fn loops() -> Configuration {
-    Configuration {
-        name: "loops",
+    loops: slam() => {
         recording: || recording::around_a_block().to_owned(),
-        run: |recording| Run::small().data(recording).set("slam.kind=graph"),
         poses: recording::SCANS_AROUND,
         rate: "10",
-        followers: &[LOOP_CLOSURE, TRAJECTORY],
         stateful: LOOP_CLOSURE,
-        results: CORRECTED,
         shows: &[("/slam/loops_used", 0.0)],
-        same_as: Some(around_a_block),
-        ..SMALL
+        same_as: Some(|| Run::small().data(recording::around_a_block())),
     }
-}
-
-/// The same with the fixes of a GNSS receiver.
-pub fn gnss() -> Configuration {
-    Configuration {
-        name: "gnss",
+    /// The same with the fixes of a GNSS receiver.
+    gnss: loops() => {
         run: |_| gnss::run(0.0),
         stateful: TRAJECTORY,
-        figures: &[
-            "/gnss/used",
-            "/gnss/refused",
-            "/gnss/faults",
-            "/gnss/origin",
-        ],
+        figures: &["/gnss/used", "/gnss/refused", "/gnss/faults", "/gnss/origin"],
         shows: &[("/gnss/used", 60.0)],
-        ..loops()
     }
-}
-
-/// Once around a block, with objects.
-pub fn objects() -> Configuration {
-    Configuration {
-        name: "objects",
+    /// Once around a block, with objects.
+    objects: loops() => {
         run: |recording| Run::small().data(recording).set("objects.kind=tracks"),
         followers: &[OBJECTS],
         stateful: OBJECTS,
         results: &["objects.csv"],
         shows: &[],
-        ..loops()
     }
-}
-
-/// A gap of a year in the recording.
-pub fn gap() -> Configuration {
-    Configuration {
-        name: "gap",
+    /// A gap of a year in the recording.
+    gap: SMALL => {
         recording: breaks::with_a_gap,
         moments: Some((breaks::BREAK - 1, breaks::BREAK + 4)),
         shows: &[("/breaks", 0.0)],
-        ..SMALL
     }
-}
-
-/// The image that cannot be read.
-const UNREADABLE: usize = 6;
-
-pub fn unreadable() -> Configuration {
-    Configuration {
-        name: "unreadable",
+    unreadable: SMALL => {
         recording: || {
             recording::damaged("unreadable", |images| {
                 recording::truncate(&images[UNREADABLE], 100_000);
@@ -288,55 +251,109 @@ pub fn unreadable() -> Configuration {
         poses: recording::SCANS - 1,
         moments: Some((UNREADABLE - 2, UNREADABLE + 6)),
         shows: &[("/unreadable", 0.0)],
-        ..SMALL
     }
-}
-
-/// Scans that have lost azimuths. The source takes each loss to the next scan.
-pub fn lost_azimuths() -> Configuration {
-    fn run(recording: &Path) -> Run {
-        Run::small().data(recording)
-    }
-    Configuration {
-        name: "lost_azimuths",
+    /// Scans that have lost azimuths. The source takes each loss to the next scan.
+    lost_azimuths: SMALL => {
         recording: || recording::of_radiate(true),
-        run,
         shows: &[("/lost/azimuths", 0.0)],
         differs_from: Some(|| {
-            run(&recording::of_radiate(true)).set("dataset.lost_azimuths=ignore")
+            let run = Run::small().data(&recording::of_radiate(true));
+            run.set("dataset.lost_azimuths=ignore")
         }),
         rate: "2",
         stateful: "masking",
-        ..SMALL
     }
-}
-
-/// A vehicle that stops, stands and drives off.
-pub fn standstill() -> Configuration {
-    Configuration {
-        name: "standstill",
+    /// A vehicle that stops, stands and drives off.
+    standstill: SMALL => {
         recording: standstill::recording,
         poses: standstill::SCANS,
         moments: Some((14, 47)),
         rate: "8",
         stateful: "refinement",
         shows: &[("/motions/stationary", 20.0)],
-        ..SMALL
     }
-}
-
-/// The exhaustive search, which is one process in place of two.
-pub fn joint_search() -> Configuration {
-    Configuration {
-        name: "joint_search",
+    /// The exhaustive search, which is one process in place of two.
+    joint_search: SMALL => {
         run: |recording| {
             let run = Run::small().data(recording).set("raster.n=63");
             run.set("search.kind=exhaustive")
         },
         rate: "3",
-        ..SMALL
+    }
+    /// Samples of a gyro and of wheels, which travel with the scans.
+    gyro_and_wheels: SMALL => {
+        recording: with_logs,
+        run: |_| {
+            let run = with_gyro().set("wheels.kind=auto");
+            run.set(&format!("wheels.delay_s={WHEELS_LATE_S}"))
+        },
+        shows: &[
+            ("/gyro/motions", 15.0),
+            ("/wheels/motions", 15.0),
+            ("/wheels/predicted", 3.0),
+        ],
+        differs_from: Some(with_gyro),
+    }
+    /// Velocities by Doppler, each from one scan.
+    doppler: SMALL => {
+        recording: in_a_tunnel,
+        run: |recording| Run::small().data(recording).set("doppler.kind=auto"),
+        shows: &[("/doppler/motions", 15.0)],
+        differs_from: Some(without_doppler),
+    }
+    /// A network that takes the scan before, too.
+    network_of_two_scans: SMALL => {
+        can: runtime_is_installed,
+        run: |recording| Run::small().data(recording).masked_by(&card("pair-127")),
+        stateful: "masking",
+        differs_from: Some(Run::of_recording),
+    }
+    /// The same, computed by rten.
+    network_in_rten: network_of_two_scans() => {
+        can: || true,
+        run: |recording| (network_of_two_scans().run)(recording).set("masking.backend=rten"),
+    }
+    /// Such a network, and a scan between two that cannot be read.
+    network_at_an_unreadable_scan: unreadable() => {
+        run: network_of_two_scans().run,
+        can: runtime_is_installed,
+        moments: Some((UNREADABLE - 1, UNREADABLE + 3)),
+    }
+    /// A simulation that is rendered while it is played.
+    simulation: SMALL => {
+        run: |_| Run::simulated(24).set("simulation.sensor.profile=cts350x-radiate"),
+    }
+    /// A recording of a run, from its masked scans on.
+    replayed: SMALL => {
+        recording: recorded,
+        run: |recording| Run::small().data(recording).argument("--from", "masked"),
+        stateful: "refinement",
+        same_as: Some(Run::of_recording),
+    }
+    python: SMALL => {
+        can: python_stage::can_start,
+        run: |recording| python_stage::with_python(Run::small().data(recording)),
+        stateful: "masking",
+    }
+    /// A RADIATE sequence with refinement, learned masks and loops, where there is one.
+    radiate: loops() => {
+        can: || real_data("radiate-2019-02-12").is_some() && runtime_is_installed(),
+        recording: || real_data("radiate-2019-02-12").unwrap(),
+        run: |recording| {
+            let project = Path::new(crate::PROJECT);
+            Run::of_file(&project.join("configs/radiate.toml"))
+                .masked_by(&project.join("models/gyre-255.toml"))
+                .data(recording)
+                .set("slam.kind=graph")
+        },
+        poses: 466,
+        rate: "max",
+        same_as: None,
     }
 }
+
+/// The image that cannot be read.
+const UNREADABLE: usize = 6;
 
 /// The delays of the logs of the gyro and of the wheels, s.
 const LATE_S: f64 = 0.75;
@@ -368,25 +385,6 @@ pub fn with_gyro() -> Run {
     run.set(&format!("gyro.delay_s={LATE_S}"))
 }
 
-/// Samples of a gyro and of wheels, which travel with the scans.
-pub fn gyro_and_wheels() -> Configuration {
-    Configuration {
-        name: "gyro_and_wheels",
-        recording: with_logs,
-        run: |_| {
-            let run = with_gyro().set("wheels.kind=auto");
-            run.set(&format!("wheels.delay_s={WHEELS_LATE_S}"))
-        },
-        shows: &[
-            ("/gyro/motions", 15.0),
-            ("/wheels/motions", 15.0),
-            ("/wheels/predicted", 3.0),
-        ],
-        differs_from: Some(with_gyro),
-        ..SMALL
-    }
-}
-
 /// A recording of a radar whose chirps alternate, in a tunnel from the third second on.
 fn in_a_tunnel() -> PathBuf {
     let mut config = SimulationConfig {
@@ -405,107 +403,12 @@ pub fn without_doppler() -> Run {
     Run::small().data(&in_a_tunnel())
 }
 
-/// Velocities by Doppler, each from one scan.
-pub fn doppler() -> Configuration {
-    Configuration {
-        name: "doppler",
-        recording: in_a_tunnel,
-        run: |recording| Run::small().data(recording).set("doppler.kind=auto"),
-        shows: &[("/doppler/motions", 15.0)],
-        differs_from: Some(without_doppler),
-        ..SMALL
-    }
-}
-
-/// A network that takes the scan before, too.
-pub fn network_of_two_scans() -> Configuration {
-    Configuration {
-        name: "network_of_two_scans",
-        can: runtime_is_installed,
-        run: |recording| Run::small().data(recording).masked_by(&card("pair-127")),
-        stateful: "masking",
-        differs_from: Some(Run::of_recording),
-        ..SMALL
-    }
-}
-
-/// The same, computed by rten.
-pub fn network_in_rten() -> Configuration {
-    Configuration {
-        name: "network_in_rten",
-        can: || true,
-        run: |recording| (network_of_two_scans().run)(recording).set("masking.backend=rten"),
-        ..network_of_two_scans()
-    }
-}
-
-/// Such a network, and a scan between two that cannot be read.
-pub fn network_at_an_unreadable_scan() -> Configuration {
-    Configuration {
-        name: "network_at_an_unreadable_scan",
-        run: network_of_two_scans().run,
-        can: runtime_is_installed,
-        moments: Some((UNREADABLE - 1, UNREADABLE + 3)),
-        ..unreadable()
-    }
-}
-
-/// A simulation that is rendered while it is played.
-pub fn simulation() -> Configuration {
-    Configuration {
-        name: "simulation",
-        run: |_| Run::simulated(24).set("simulation.sensor.profile=cts350x-radiate"),
-        ..SMALL
-    }
-}
-
-/// A recording of a run, from its masked scans on.
-pub fn replayed() -> Configuration {
-    fn recorded() -> PathBuf {
-        let folder = recording::prepared("recorded", |folder| {
-            fs::create_dir(folder).unwrap();
-            let file = folder.join("drive.mcap");
-            let run = record::played().argument("--record", file.to_str().unwrap());
-            run.set(record::ALL).complete();
-        });
-        folder.join("drive.mcap")
-    }
-    Configuration {
-        name: "replayed",
-        recording: recorded,
-        run: |recording| Run::small().data(recording).argument("--from", "masked"),
-        stateful: "refinement",
-        same_as: Some(Run::of_recording),
-        ..SMALL
-    }
-}
-
-pub fn python() -> Configuration {
-    Configuration {
-        name: "python",
-        can: python_stage::can_start,
-        run: |recording| python_stage::with_python(Run::small().data(recording)),
-        stateful: "masking",
-        ..SMALL
-    }
-}
-
-/// A RADIATE sequence with refinement, learned masks and loops, where there is one.
-pub fn radiate() -> Configuration {
-    Configuration {
-        name: "radiate",
-        can: || real_data("radiate-2019-02-12").is_some() && runtime_is_installed(),
-        recording: || real_data("radiate-2019-02-12").unwrap(),
-        run: |recording| {
-            let project = Path::new(crate::PROJECT);
-            Run::of_file(&project.join("configs/radiate.toml"))
-                .masked_by(&project.join("models/gyre-255.toml"))
-                .data(recording)
-                .set("slam.kind=graph")
-        },
-        poses: 466,
-        rate: "max",
-        same_as: None,
-        ..loops()
-    }
+fn recorded() -> PathBuf {
+    let folder = recording::prepared("recorded", |folder| {
+        fs::create_dir(folder).unwrap();
+        let file = folder.join("drive.mcap");
+        let run = record::played().argument("--record", file.to_str().unwrap());
+        run.set(record::ALL).complete();
+    });
+    folder.join("drive.mcap")
 }

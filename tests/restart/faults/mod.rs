@@ -32,36 +32,27 @@ type Fault = fn(&mut Scene) -> Option<()>;
 
 /// Faults by name, as the rows have them.
 mod kinds {
-    #![allow(non_upper_case_globals)]
-
-    use super::{Fault, input, kills, limits, results};
-
-    macro_rules! kinds {
-        ($($name:ident: $strike:path;)*) => {
-            $(pub const $name: Fault = $strike;)*
-        };
-    }
-
-    kinds! {
-        each_process_is_killed: kills::each;
-        a_process_is_killed_as_it_starts: kills::at_the_start;
-        a_process_is_killed_as_it_writes: kills::at_a_write;
-        a_process_is_killed_again_and_again: kills::again_and_again;
-        a_process_is_killed_after_the_last_pose: kills::after_the_last_pose;
-        processes_are_killed_in_storms: kills::storms;
-        the_supervisor_is_killed: kills::supervisor;
-        the_supervisor_is_killed_as_it_writes_results: kills::at_the_results;
-        the_run_is_interrupted: kills::interrupt;
-        the_run_is_interrupted_as_it_starts: kills::interrupt_at_the_start;
-        the_disk_is_full: results::disk_full;
-        files_may_not_grow: limits::file_sizes;
-        the_results_are_read_only: results::read_only;
-        the_results_vanish: results::vanish;
-        the_recording_has_gaps: input::gaps;
-        the_recording_vanishes: input::vanishes;
-        memory_runs_out: limits::memory;
-        descriptors_run_out: limits::descriptors;
-    }
+    pub use super::{
+        input::{gaps as the_recording_has_gaps, vanishes as the_recording_vanishes},
+        kills::{
+            after_the_last_pose as a_process_is_killed_after_the_last_pose,
+            again_and_again as a_process_is_killed_again_and_again,
+            at_a_write as a_process_is_killed_as_it_writes,
+            at_the_results as the_supervisor_is_killed_as_it_writes_results,
+            at_the_start as a_process_is_killed_as_it_starts, each as each_process_is_killed,
+            interrupt as the_run_is_interrupted,
+            interrupt_at_the_start as the_run_is_interrupted_as_it_starts,
+            storms as processes_are_killed_in_storms, supervisor as the_supervisor_is_killed,
+        },
+        limits::{
+            descriptors as descriptors_run_out, file_sizes as files_may_not_grow,
+            memory as memory_runs_out,
+        },
+        results::{
+            disk_full as the_disk_is_full, read_only as the_results_are_read_only,
+            vanish as the_results_vanish,
+        },
+    };
 }
 
 /// A test for each fault of each configuration.

@@ -37,7 +37,6 @@ pub fn limit(pid: Pid, resource: &str, value: u64) {
 pub struct Mount(PathBuf);
 
 impl Mount {
-    /// A file system in memory.
     pub fn tmpfs(place: &Path, bytes: u64) -> Self {
         fs::create_dir_all(place).unwrap();
         let mount = Self(place.to_owned());

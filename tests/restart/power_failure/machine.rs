@@ -63,7 +63,6 @@ impl Machine {
         }
     }
 
-    /// Returns the results of a run that nothing disturbs.
     pub fn undisturbed(&self) -> &[Vec<u8>] {
         self.undisturbed.get_or_init(|| {
             let folder = super::folder();
@@ -72,7 +71,6 @@ impl Machine {
         })
     }
 
-    /// Returns the content of the files that must be the same bytes.
     pub fn results(&self, out: &Path) -> Vec<Vec<u8>> {
         let mut paths: Vec<_> = RESULTS.iter().map(|name| out.join(name)).collect();
         if self.configuration.slam.is_on() {

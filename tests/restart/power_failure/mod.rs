@@ -1,10 +1,7 @@
-//! Power failures: every change that a run makes to its folder is recorded, and after any of them
-//! the power fails. Whatever the synchronisations allow to survive, the next run gives the bytes of
-//! the undisturbed one.
-//!
-//! The next run depends on the state of the disk alone, so each state is tried once.
-//!
-//! `GYRE_POWER_FAILURES=N` tries N random outcomes at each change instead of one.
+//! Power failures: after any change that a run makes to its folder, the power fails. Whatever the
+//! synchronisations allow to survive, the next run gives the bytes of the undisturbed one; it
+//! depends on the disk alone, so each state is tried once. `GYRE_POWER_FAILURES=N` tries N random
+//! outcomes at each change instead of one.
 
 mod disk;
 mod machine;

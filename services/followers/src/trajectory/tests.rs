@@ -96,7 +96,6 @@ impl Logs {
     }
 }
 
-/// Steps until there is nothing new; returns the last correction, and whether all was read.
 fn follow(trajectory: &mut Trajectory) -> (Option<CorrectionHeader>, bool) {
     let mut last = None;
     loop {

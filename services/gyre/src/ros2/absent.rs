@@ -29,5 +29,5 @@ pub fn receive(
     _: &SourceConfig,
     _: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    Err(StageError::Configuration(absent(PART)))
+    Err(StageError::Input(absent(PART)))
 }

@@ -136,7 +136,7 @@ struct Sending<'run> {
 
 struct SentTopic<'run> {
     name: &'static str,
-    observer: Box<dyn TopicObserver + 'run>,
+    observer: TopicObserver<'run>,
     buffer: Arc<dyn ReplayBuffer>,
     offer: Arc<Offer>,
 }

@@ -20,7 +20,7 @@ pub struct Counts {
 }
 
 pub(crate) struct Tap<'run> {
-    observer: Box<dyn TopicObserver + 'run>,
+    observer: TopicObserver<'run>,
     recorded: u64,
     dropped: u64,
     reported: u64,

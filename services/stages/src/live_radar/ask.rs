@@ -15,7 +15,6 @@ use crate::live_radar::{Settings, connection::RadarSocket};
 const MAX_WAIT: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(10);
 
-/// A radar that cannot be used: a sentence.
 #[derive(Debug, Error)]
 #[error("{sentence}")]
 pub struct AskError {

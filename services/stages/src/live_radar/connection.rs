@@ -217,7 +217,6 @@ pub enum RadarSocket {
 }
 
 impl RadarSocket {
-    /// Connects and sends requests, or begins to receive.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
             Address::Tcp(address) => connect(address, requests).map(Self::Tcp),
@@ -311,7 +310,6 @@ impl RadarParser {
         }
     }
 
-    /// Adds the bytes that were read into the space, or the one datagram.
     pub fn filled(&mut self, bytes: usize) {
         match self {
             Self::Stream(parser) => parser.filled(bytes),

@@ -9,7 +9,6 @@ use thiserror::Error;
 
 use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
-/// Assembles the scans of a live source, and counts losses.
 pub struct Intake {
     constants: Constants,
     /// `None` until the radar has sent its configuration.
@@ -61,7 +60,6 @@ impl Intake {
         self.scans.is_some()
     }
 
-    /// Discards the configuration and the partial scan, for a new connection.
     pub fn restart(&mut self) {
         self.scans = None;
     }
@@ -98,7 +96,6 @@ impl Intake {
         }
     }
 
-    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
     pub fn pause(&self) -> Option<Duration> {
         self.scans.as_ref().and_then(ScanAssembly::pause)
     }
@@ -109,13 +106,11 @@ impl Intake {
         self.due_ns
     }
 
-    /// Continues the counts of a source process that has died.
     pub fn resume(&mut self, before: Received) {
         self.turns = TurnCounter::resume(before.last_scan, before.scans_left_out);
         self.counts = before;
     }
 
-    /// Returns the counts since the start of the run, connections not included.
     pub fn received(&self) -> Received {
         let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
         Received {

@@ -73,13 +73,11 @@ impl Radar {
         }
     }
 
-    /// Discards the partial message and scan of a connection that was closed.
     fn reset(&mut self) {
         self.messages = self.settings.parser();
         self.intake.restart();
     }
 
-    /// Handles the parsed messages up to the next complete scan; returns whether there is one.
     fn parse(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<bool, StageError> {
         while let Some(event) = self.messages.next() {
             match event {
@@ -166,7 +164,6 @@ struct HealthLog {
 }
 
 impl HealthLog {
-    /// Logs the readings that have become worse or better.
     fn update(&mut self, health: &Health) {
         for (name, reading) in health.readings() {
             let (value, status) = (reading.value, reading.status);

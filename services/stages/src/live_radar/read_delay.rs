@@ -40,7 +40,11 @@ impl ReadDelay {
                 };
             } else {
                 let read = read_ns.saturating_sub(before_read_ns) as f64;
-                self.note_pace(read / elapsed_ns as f64);
+                let pace = read / elapsed_ns as f64;
+                match self.paces.len() {
+                    WINDOW => self.paces[self.scans % WINDOW] = pace,
+                    _ => self.paces.push(pace),
+                }
             }
         }
         if self.scans.is_multiple_of(WINDOW) {
@@ -64,13 +68,6 @@ impl ReadDelay {
         paces.copy_from_slice(&self.paces);
         paces.sort_by(f64::total_cmp);
         (paces.len() >= MIN_PACES).then(|| paces[paces.len() / 2])
-    }
-
-    fn note_pace(&mut self, pace: f64) {
-        match self.paces.len() {
-            WINDOW => self.paces[self.scans % WINDOW] = pace,
-            _ => self.paces.push(pace),
-        }
     }
 }
 

@@ -84,7 +84,6 @@ impl ScanAssembly {
         Some((sweep.missing, due_ns))
     }
 
-    /// Returns when a scan was complete by its last azimuth's stamp, read at `at_ns`.
     fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
         if self.clock.found() == Some(FoundClock::Arrival) {
             return None;
@@ -145,7 +144,6 @@ mod tests {
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
 
-    /// The assembly of scans in the memory of one scan.
     struct Source {
         scans: ScanAssembly,
         turns: TurnCounter,

@@ -26,7 +26,6 @@ pub struct TurnCounter {
 }
 
 impl TurnCounter {
-    /// Continues after an earlier process, whose last scan and count are given.
     pub fn resume(last: Option<LastScan>, left_out: u64) -> Self {
         Self {
             turn_ns: 0.0,
@@ -58,7 +57,6 @@ impl TurnCounter {
         }
     }
 
-    /// Adds a scan, and counts the turns between it and the one before.
     pub fn add(&mut self, scan: LastScan) {
         if let Some(last) = self.last {
             let turns = self.since(last, scan).round().max(1.0) as u64;

@@ -34,13 +34,11 @@ pub struct NewestOnly {
     dropped: Vec<Sample>,
 }
 
-/// The state of the sequence numbers.
 #[derive(Clone, Copy)]
 struct Chain {
     next: u64,
     generation: Generation,
     previous_scan: Option<u64>,
-    /// Time of the previous scan, ns; `None` after a restart.
     previous_ns: Option<i64>,
     /// The source's count at the previous scan: a restarted source repeats the scans after the
     /// newest pose.
@@ -112,7 +110,6 @@ impl NewestOnly {
         }
     }
 
-    /// Returns the number of scans in the queue, without the end of the stream.
     fn scans(&self) -> usize {
         let is_end = |last: &Received<Scan>| last.item().is(flag::END);
         self.queue.len() - usize::from(self.queue.back().is_some_and(is_end))
@@ -218,7 +215,6 @@ impl Queue for NewestOnly {
 }
 
 impl Chain {
-    /// Returns whether a scan precedes the scan of the newest pose.
     fn precedes(item: &Item, newest_pose: &Item) -> bool {
         !newest_pose.is(flag::BASE) && !item.is(flag::END) && item.published < newest_pose.published
     }

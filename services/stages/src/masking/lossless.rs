@@ -8,7 +8,6 @@ use gyre_stage::{
     reader::{Reader, Received},
 };
 
-/// The queue in lossless or in live mode.
 pub trait Queue {
     fn receive(&mut self) -> Result<(), StageError>;
 
@@ -27,15 +26,12 @@ pub trait Queue {
 
     fn advance(&mut self);
 
-    /// Returns the listener that the source notifies.
     fn listener(&self) -> &Listener;
 
-    /// Returns the number of scans that were skipped because they had been received before.
     fn duplicates(&self) -> u64 {
         0
     }
 
-    /// Takes the samples of the scans that were dropped since the last call.
     fn take_dropped(&mut self) -> Vec<Sample> {
         Vec::new()
     }

@@ -15,8 +15,7 @@ const KEPT: usize = 256;
 pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
-    known: KnownMotions,
-    /// Where azimuths of scans with poses were lost, by number.
+    pub known: KnownMotions,
     lost: BTreeMap<u64, LostAzimuths>,
     /// The item of the newest pose as the sink reported it.
     pub resume_at: Option<Item>,
@@ -58,18 +57,6 @@ impl Motions {
         Ok(())
     }
 
-    /// Notes that a chain of motions starts with this scan, before its motion is received.
-    pub fn start_chain(&mut self, seq: u64) {
-        self.known.insert(seq, None);
-    }
-
-    /// Returns the velocity of the item `lag` items before item `seq`: `None` while it is unknown,
-    /// `Some(None)` if the chain starts there or later.
-    pub fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
-        self.known.before(seq, lag)
-    }
-
-    /// Returns where azimuths of an item were lost, if it has a pose.
     pub fn lost(&self, seq: u64) -> Option<LostAzimuths> {
         self.lost.get(&seq).copied()
     }
@@ -87,7 +74,7 @@ fn drop_the_oldest<T>(known: &mut BTreeMap<u64, T>) {
 
 /// The velocities of motions by their numbers; `None` where the chain starts.
 #[derive(Default)]
-struct KnownMotions(BTreeMap<u64, Option<Twist>>);
+pub struct KnownMotions(BTreeMap<u64, Option<Twist>>);
 
 impl KnownMotions {
     fn receive(&mut self, item: &Item, motion: &MotionEstimate) {
@@ -97,12 +84,15 @@ impl KnownMotions {
         }
     }
 
-    fn insert(&mut self, seq: u64, twist: Option<Twist>) {
+    /// Notes a velocity, unless it is known; `None`: a chain of motions starts with this scan.
+    pub fn insert(&mut self, seq: u64, twist: Option<Twist>) {
         self.0.entry(seq).or_insert(twist);
         drop_the_oldest(&mut self.0);
     }
 
-    fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
+    /// Returns the velocity of the item `lag` items before item `seq`: `None` while it is unknown,
+    /// `Some(None)` if the chain starts there or later.
+    pub fn before(&self, seq: u64, lag: u64) -> Option<Option<Twist>> {
         let Some(first) = seq.checked_sub(lag) else {
             return Some(None);
         };

@@ -25,7 +25,6 @@ pub struct Scans {
     window: Window,
     /// The velocities for the current and for the previous scan.
     found: [Option<Twist>; 2],
-    /// Where azimuths of both were lost, if they have poses.
     lost: [Option<LostAzimuths>; 2],
 }
 
@@ -34,12 +33,10 @@ pub struct ScanView<'a> {
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
-    /// The turn and the distance since the scan before.
     pub turn: Option<GyroTurn>,
     pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
     pub lost: Option<LostAzimuths>,
-    /// The previous scan, if the mask takes two; `None` where the chain starts.
     pub previous: Option<PreviousScan<'a>>,
 }
 
@@ -132,7 +129,7 @@ impl Scans {
     /// depend on the numbers alone, so they are the same after a restart.
     fn find_motions(&mut self, item: &Item) -> bool {
         if item.is(flag::BREAK) {
-            self.motions.start_chain(item.seq);
+            self.motions.known.insert(item.seq, None);
         }
         let previous = item
             .seq
@@ -181,13 +178,11 @@ impl Scans {
     fn motion_for(&self, seq: u64) -> Option<Option<Twist>> {
         match self.window.lag {
             0 => Some(None),
-            lag => self.motions.before(seq, lag as u64),
+            lag => self.motions.known.before(seq, lag as u64),
         }
     }
 }
 
-/// Returns the samples that come with a scan, its stamp, and the times of its first and last
-/// azimuth.
 fn samples_of(received: &Received<Scan>) -> Result<(&[Sample], i64, [i64; 2]), StageError> {
     let (header, bytes) = (received.header(), received.values());
     let parts = header.view(bytes).zip(header.samples(bytes));

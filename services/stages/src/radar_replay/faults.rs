@@ -41,7 +41,6 @@ impl Faults {
         }
     }
 
-    /// Returns a sample with the faults of its time; `None` if it is lost.
     fn spoilt(&self, sample: &Sample) -> Option<Sample> {
         let mut spoilt = *sample;
         for fault in self.at(sample.stamp_ns) {
@@ -59,7 +58,6 @@ impl Faults {
         spoilt.is_valid().then_some(spoilt)
     }
 
-    /// Removes the echoes of the radar, if it is blind.
     pub fn blind(&self, header: &ScanHeader, bytes: &mut [u8]) {
         let is_blind = |fault: &PlayedFault| fault.kind == PlayedFaultKind::RadarBlind;
         if !self.at(header.item.stamp_ns).any(is_blind) {

@@ -33,7 +33,6 @@ impl Listing {
         fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))
     }
 
-    /// Reads the listing of a run; `None` if it has none.
     pub fn read(root: &Path) -> io::Result<Option<Self>> {
         let mut bytes = match fs::read(root.join(FILE)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

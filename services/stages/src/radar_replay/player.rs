@@ -6,7 +6,7 @@ use gyre_recording::Recording;
 use gyre_run::SourceConfig;
 use gyre_stage::{
     Launch, StageCounters, StageError,
-    source::{Recorded, RecordedMessage, run_player},
+    source::{RecordedMessage, run_player},
 };
 
 /// Plays the recording of the section `[source]` from its topic on, until SIGTERM.
@@ -15,7 +15,15 @@ pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
     let manifest = &launch.manifest;
     let topics = config.from.topics(manifest.refines, manifest.window.slam);
     let mut player = Player::open(&config, topics).map_err(StageError::Input)?;
-    run_player(launch, &mut player)
+    let (topics, items) = (player.topics.clone(), player.items.clone());
+    run_player(launch, &topics, items, |topic, seq| {
+        let stored = player.recording.read(topic, seq);
+        let stored = stored.map_err(StageError::input)?;
+        Ok(RecordedMessage {
+            header: stored.header,
+            payload: stored.payload,
+        })
+    })
 }
 
 pub struct Player {
@@ -75,25 +83,5 @@ impl Player {
         let entries = self.recording.entries(self.topics[0]);
         let played = entries.take_while(|entry| self.items.contains(&entry.seq));
         played.map(|entry| entry.stamp_ns)
-    }
-}
-
-impl Recorded for Player {
-    fn topics(&self) -> &[&'static str] {
-        &self.topics
-    }
-
-    fn items(&self) -> Range<u64> {
-        self.items.clone()
-    }
-
-    fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError> {
-        match self.recording.read(topic, seq) {
-            Ok(stored) => Ok(RecordedMessage {
-                header: stored.header,
-                payload: stored.payload,
-            }),
-            Err(error) => Err(StageError::Input(error.to_string())),
-        }
     }
 }

@@ -16,7 +16,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;
     let search = ExhaustiveSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(StageError::configuration)?;
+        .map_err(StageError::input)?;
     stage::run(launch, &mut JointStage { search })
 }
 

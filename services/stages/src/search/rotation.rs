@@ -18,8 +18,7 @@ pub type Search =
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
-    let mut rotation =
-        SequentialRotation::new(raster.n, &config).map_err(StageError::configuration)?;
+    let mut rotation = SequentialRotation::new(raster.n, &config).map_err(StageError::input)?;
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
         let turn = input.current.header().turn().map(|turn| turn.yaw_rad);

@@ -21,7 +21,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;
     let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(StageError::configuration)?;
+        .map_err(StageError::input)?;
     let search = move |input: &PairView<'_, Masked>, rotation: &RotationMatch| {
         let pair = input.rasters()?;
         pair.earlier

@@ -63,8 +63,9 @@ impl Candidate {
 pub(crate) struct Harness<'a> {
     // Dropped in this order: process, ports, run.
     process: Option<Process>,
-    pub feeds: BTreeMap<&'static str, Box<dyn Feed>>,
-    pub output: Box<dyn Tap>,
+    /// The publishers of the inputs by topic.
+    pub feeds: BTreeMap<&'static str, Feed>,
+    pub output: Tap,
     pub rig: Rig<'a>,
     stage: StageId,
     pub topics: StageTopics,
@@ -150,7 +151,7 @@ impl<'a> Harness<'a> {
     /// Sleeps until the process has sent something or `limit` has passed; true on a request to
     /// stop.
     pub(crate) fn sleep(&self, limit: Duration) -> Result<bool, StageError> {
-        self.rig.sleep(&[self.output.as_ref()], limit)
+        self.rig.sleep(&[&self.output], limit)
     }
 
     /// Returns the end of the process; `None` while it runs or before it is started.

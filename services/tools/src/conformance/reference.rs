@@ -112,9 +112,9 @@ fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, Failure> {
 struct OwnPipeline<'a> {
     // Dropped in this order: processes, ports, run.
     processes: Vec<(StageId, Process)>,
-    scans: Box<dyn Feed>,
-    poses: Box<dyn Feed>,
-    taps: Vec<(&'static str, Box<dyn Tap>)>,
+    scans: Feed,
+    poses: Feed,
+    taps: Vec<(&'static str, Tap)>,
     rig: &'a Rig<'a>,
     /// Time without progress after which it has failed.
     stall_timeout: Duration,
@@ -169,7 +169,7 @@ impl<'a> OwnPipeline<'a> {
                 progress = Instant::now();
             } else {
                 self.require_living(progress.elapsed())?;
-                let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
+                let taps: Vec<&Tap> = self.taps.iter().map(|(_, tap)| tap).collect();
                 if self.rig.sleep(&taps, POLL_PERIOD)? {
                     return Err(Interrupted.into());
                 }

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         // Gyre's own search, to be replaced by yours.
         let config: TranslationConfig = launch.section("translation")?;
         let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
-            .map_err(|error| StageError::Configuration(error.to_string()))?;
+            .map_err(|error| StageError::Input(error.to_string()))?;
         translation::run_with(
             launch,
             Box::new(move |scans, rotation| {

@@ -59,13 +59,9 @@ impl RefinementRecord {
 pub struct WitnessCounts {
     /// In the order of [`Basis::ALL`].
     pub by_basis: [u64; Basis::ALL.len()],
-    /// Those whose turn the gyro has measured, and which were made with it.
     pub gyro_used: u64,
-    /// Those whose turn it has measured, and which contradict it.
     pub gyro_refused: u64,
-    /// Those whose distance the wheels have measured without slipping.
     pub wheels_used: u64,
-    /// Those whose distance they have measured slipping.
     pub wheel_slips: u64,
     pub doppler_used: u64,
     pub doppler_refused: u64,

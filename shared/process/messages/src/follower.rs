@@ -36,7 +36,6 @@ pub struct LoopHeader {
     pub covariance: covariance::Packed,
     /// Correlation of the two places where they overlap, from -1 to 1.
     pub correlation: f64,
-    /// Number of loops so far, with this one.
     pub loops: u64,
 }
 
@@ -100,7 +99,6 @@ impl CorrectionHeader {
     }
 }
 
-/// Values of [`FixHeader::status`].
 pub mod fix_status {
     /// Nothing is known of the place.
     pub const LOST: u64 = 0;
@@ -113,7 +111,6 @@ pub mod fix_status {
 }
 
 message! {
-    /// The place of a keyframe in the map of an earlier drive.
     Fix: "fix", FixHeader, Sender::Follower(FollowerId::Localisation), 0 readers, Latest
 }
 header!(FixHeader, "gyre_fix_header_v4");
@@ -157,11 +154,9 @@ impl FixHeader {
 /// Objects that a message lists, at most: those nearest to the vehicle. The others are counted, and
 /// in `journal/objects.log`.
 pub const MAX_LISTED: usize = 64;
-/// Largest length and width of an object, m.
 const MAX_SIZE_M: f64 = 1e3;
 
 message! {
-    /// The objects at the time of a scan.
     Objects: "objects", ObjectsHeader, Sender::Follower(FollowerId::Objects), 0 readers, Latest
 }
 header!(ObjectsHeader, "gyre_objects_header_v3");
@@ -185,7 +180,6 @@ pub struct ObjectsHeader {
     pub list: [ListedObject; MAX_LISTED],
 }
 
-/// An object at the time of a scan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ListedObject {

@@ -9,7 +9,6 @@ use crate::{
     limits::Window,
 };
 
-/// Bits of [`Item::flags`].
 pub mod flag {
     /// End of the stream: carries no scan and follows the last one in order.
     pub const END: u32 = 1;
@@ -59,7 +58,6 @@ crate::named! {
 }
 
 impl FollowerId {
-    /// Returns whether a run has this follower.
     pub const fn is_in(self, window: &Window) -> bool {
         match self {
             Self::LoopClosure | Self::Trajectory => window.slam,
@@ -84,14 +82,11 @@ impl FollowerId {
 pub struct Hop {
     /// The last input was taken from its queue.
     pub received_ns: i64,
-    /// `process` began.
     pub started_ns: i64,
-    /// `process` ended.
     pub finished_ns: i64,
     pub published_ns: i64,
 }
 
-/// The durations of one stage's work on a scan, ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HopTimes {
     pub stage: StageId,
@@ -138,7 +133,6 @@ pub struct Item {
 }
 
 impl Item {
-    /// Returns an item that has a number alone.
     pub fn numbered(seq: u64) -> Self {
         Self {
             seq,

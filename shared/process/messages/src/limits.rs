@@ -6,12 +6,10 @@ use serde::{Deserialize, Serialize};
 /// Processes of the run that may have a topic open at once. A dead process counts until its
 /// resources are removed.
 const NODES: usize = 16;
-/// The largest number of observers of a topic.
 const MAX_OBSERVERS: usize = 64;
 /// Samples that a reader may hold: the previous one, the current one, and one that is being
 /// received.
 const BORROWED: usize = 3;
-/// Samples that a publisher may fill at once.
 const LOANED: usize = 1;
 /// Messages of a topic that only observers read which one that comes late still receives.
 const LATEST: usize = 16;
@@ -28,7 +26,6 @@ pub struct Window {
     pub look_back: usize,
     /// Length of the history that the source keeps for masking in live mode; 0 in lossless mode.
     pub live_depth: usize,
-    /// Number of observers that each topic has room for.
     pub observers: usize,
     /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of loops and
     /// corrections exist.
@@ -57,9 +54,7 @@ pub struct TopicSizes {
     pub history: usize,
     /// Length of a reader's queue.
     pub buffer: usize,
-    /// Samples that a reader may hold.
     pub borrowed: usize,
-    /// Samples that the publisher may fill at once.
     pub loaned: usize,
     /// Number of readers, which are stages of the run or its supervisor.
     pub readers: usize,
@@ -79,7 +74,6 @@ impl TopicSizes {
         self.readers + self.observers
     }
 
-    /// Processes that may have the topic open at once.
     pub fn nodes(&self) -> usize {
         NODES + self.observers
     }
@@ -149,9 +143,7 @@ pub struct Limits {
     pub cell_m: f32,
     /// Rasters in a `masked` message: 1 or 2.
     pub rasters: usize,
-    /// Points in a `masked` message.
     pub points: usize,
-    /// Samples of other sensors in a `scan` message.
     pub samples: usize,
 }
 

@@ -27,7 +27,6 @@ impl Message for Masked {
     type Header = MaskedHeader;
     type Element = FloatBlock;
 
-    /// The rasters, and the points after them.
     fn content_bytes(header: &Self::Header) -> Option<usize> {
         let points = (header.points as usize).checked_mul(size_of::<SparsePoint>())?;
         let rasters = header.first_point()?.checked_mul(size_of::<f32>())?;
@@ -68,7 +67,6 @@ pub struct MaskedHeader {
     pub n: u32,
     /// Rasters in the payload: 1 or 2.
     pub rasters: u32,
-    /// Size of a cell, m.
     pub cell_m: f32,
     /// See [`mask_kind`].
     pub mask: u32,
@@ -93,7 +91,6 @@ pub struct MaskedHeader {
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
 #[derive(Debug)]
 pub struct MaskedParts<'a> {
-    /// The raster of this scan, n x n.
     pub later: ArrayViewMut2<'a, f32>,
     /// The raster of the previous scan, n x n, if the mask takes two scans.
     pub earlier: Option<ArrayViewMut2<'a, f32>>,
@@ -103,7 +100,6 @@ pub struct MaskedParts<'a> {
 /// Two rasters to match, n x n each.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// The raster of this scan.
     pub later: ArrayView2<'a, f32>,
     /// The raster of the previous scan; `None` where the chain of motions starts.
     pub earlier: Option<ArrayView2<'a, f32>>,
@@ -237,7 +233,6 @@ impl MaskedHeader {
         ArrayView2::from_shape((n, n), cells).ok()
     }
 
-    /// Returns the number of values before the points.
     fn first_point(&self) -> Option<usize> {
         (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)
     }

@@ -10,14 +10,13 @@ use crate::{
     check::Violation,
     item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
+    topics::Topic,
 };
 
 /// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
 /// memory.
 pub trait Header: Pod + Default + Debug {
-    /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
-    /// The scan that the message is about.
     fn item(&self) -> &Item;
     fn item_mut(&mut self) -> &mut Item;
     /// Checks all but the item; the end of the stream has no content.
@@ -25,7 +24,6 @@ pub trait Header: Pod + Default + Debug {
 }
 
 pub trait Element: Pod + Debug {
-    /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
 }
 
@@ -52,7 +50,7 @@ impl Sender {
     }
 }
 
-pub trait Message: 'static {
+pub trait Message: Sized + 'static {
     const TOPIC: &'static str;
     const SENDER: Sender;
     /// Number of processes that subscribe to the topic.
@@ -61,6 +59,9 @@ pub trait Message: 'static {
     type Header: Header;
     /// The element that the payload is a slice of.
     type Element: Element;
+
+    /// The same for programs that know the topic by its name alone.
+    const ENTRY: &'static Topic = &Topic::of::<Self>();
 
     /// The longest payload, in elements. A topic without a payload still has one element.
     fn max_elements(_limits: &Limits) -> usize {

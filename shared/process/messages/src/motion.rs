@@ -22,7 +22,6 @@ message! {
 }
 header!(RotationHeader, "gyre_rotation_header_v6");
 
-/// An angle with its variance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RotationEstimate {
@@ -111,9 +110,7 @@ pub struct MotionEstimate {
     pub interval_ns: i64,
     /// Height of the correlation peak of the translation, at most 1.
     pub score: f64,
-    /// Height of the second highest peak.
     pub runner_up_score: f64,
-    /// The rotation that the translation was searched with.
     pub rotation: RotationEstimate,
     /// The searched motion: x, y (m), yaw (rad). It is the same on every topic, because motion
     /// compensation uses it.
@@ -148,7 +145,6 @@ impl MotionEstimate {
         self.refinement.check()
     }
 
-    /// Returns the result of a search, with the rotation that it was searched with.
     pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
         Self {
             x_m: found.x_m,

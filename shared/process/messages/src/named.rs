@@ -15,7 +15,6 @@ macro_rules! named {
         }
 
         impl $Named {
-            /// All variants, in the order of their definition.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$Variant),+];
 
             pub const fn name(self) -> &'static str {

@@ -24,7 +24,6 @@ header!(PoseHeader, "gyre_pose_header_v11");
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct PoseHeader {
     pub item: Item,
-    /// The motion from the previous scan.
     pub motion: MotionEstimate,
     pub x_m: f64,
     pub y_m: f64,

@@ -5,7 +5,6 @@ use gyre_scan_matching::{InitialGuess, Outcome, Verdict};
 
 use crate::check::{Violation, code, fields, finite};
 
-/// Values of [`RefinementRecord::outcome`].
 pub mod outcome {
     /// The searched motion: there is no refinement, or the chain starts here.
     pub const SEARCHED: u32 = 0;
@@ -16,7 +15,6 @@ pub mod outcome {
     pub const PREDICTED: u32 = 3;
 }
 
-/// Values of [`RefinementRecord::initial_guess`].
 pub mod initial_guess {
     pub const NONE: u32 = 0;
     /// The prediction at constant velocity.
@@ -29,7 +27,6 @@ pub mod initial_guess {
     pub const ALONG_WALLS: u32 = 4;
 }
 
-/// Values of [`RefinementRecord::gyro`].
 pub mod gyro {
     /// It has not measured the turn.
     pub const NONE: u64 = 0;
@@ -42,7 +39,6 @@ pub mod gyro {
     pub const DOUBTED: u64 = 3;
 }
 
-/// Values of [`RefinementRecord::wheels`].
 pub mod wheels {
     /// They have not measured the distance.
     pub const NONE: u64 = 0;
@@ -52,7 +48,6 @@ pub mod wheels {
     pub const SLIP: u64 = 2;
 }
 
-/// Values of [`RefinementRecord::doppler`].
 pub mod doppler {
     /// One of both scans does not determine its velocity.
     pub const NONE: u64 = 0;
@@ -66,7 +61,6 @@ pub mod doppler {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RefinementRecord {
-    /// See [`outcome`].
     pub outcome: u32,
     /// The initial guess of the accepted motion: see [`initial_guess`].
     pub initial_guess: u32,
@@ -77,7 +71,6 @@ pub struct RefinementRecord {
     pub support: f64,
     /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
     pub stationary: u64,
-    /// See [`gyro`].
     pub gyro: u64,
     /// Turn since the previous scan that the gyro measured, rad; zero without one.
     pub gyro_turn_rad: f64,
@@ -86,14 +79,12 @@ pub struct RefinementRecord {
     /// Bias of the gyro after the scan, rad/s; zero without one.
     pub gyro_bias_radps: f64,
     pub gyro_bias_sigma_radps: f64,
-    /// See [`wheels`].
     pub wheels: u64,
     /// Distance since the previous scan that the wheels measured, m; zero without wheels.
     pub wheel_distance_m: f64,
     /// True distance over the wheels' distance, after the scan; zero without wheels.
     pub wheel_scale: f64,
     pub wheel_scale_sigma: f64,
-    /// See [`doppler`].
     pub doppler: u64,
     /// True velocity over that by Doppler, after the scan; zero without one.
     pub doppler_scale: f64,

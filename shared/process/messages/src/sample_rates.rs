@@ -10,7 +10,6 @@ use crate::scan::ScanHeader;
 const SCANS: usize = 41;
 const KINDS: [SampleKind; 2] = [SampleKind::Gyro, SampleKind::Wheels];
 
-/// Counts the samples that come with scans, and measures their rates.
 #[derive(Clone, Debug, Default)]
 pub struct SampleRates {
     /// The end of each of the last scans, ns, with the new samples of each kind.
@@ -21,7 +20,6 @@ pub struct SampleRates {
     left_out: u64,
 }
 
-/// Counts and rates of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SampleHealth {
     pub gyro: u64,
@@ -30,7 +28,6 @@ pub struct SampleHealth {
     pub left_out: u64,
     /// Samples of the gyro a second by the stamps of the last scans; `None` without samples so far.
     pub gyro_hz: Option<f64>,
-    /// Samples of the wheels a second, likewise.
     pub wheels_hz: Option<f64>,
 }
 
@@ -62,7 +59,6 @@ impl SampleRates {
         new
     }
 
-    /// Returns the counts, and the rates over the last scans.
     pub fn health(&self) -> SampleHealth {
         let rates = [0, 1].map(|kind| self.rate_hz(kind));
         SampleHealth {

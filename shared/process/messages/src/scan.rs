@@ -220,7 +220,6 @@ impl ScanHeader {
         }
     }
 
-    /// Stores the geometry of the scan that a dataset reader put into the slot.
     pub fn set_geometry(&mut self, geometry: &SweepGeometry) {
         self.azimuths = geometry.azimuths as u32;
         self.bins = geometry.bins as u32;

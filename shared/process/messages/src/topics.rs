@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
+    check::Violation,
     follower::{Correction, Fix, Loop, Objects},
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
@@ -40,10 +41,22 @@ pub struct Topic {
     pub name: &'static str,
     pub sender: Sender,
     pub sizes: fn(&Window) -> TopicSizes,
-    /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
     pub header: WireType,
     pub element: WireType,
+    /// [`Message::check`] of the bytes of a header and of a payload.
+    pub check: fn(&[u8], &[u8], &Limits) -> Result<(), Violation>,
+    /// [`Message::content_bytes`] of the bytes of a header.
+    pub content_bytes: fn(&[u8]) -> Option<usize>,
+}
+
+fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+    let payload = bytemuck::cast_slice(payload);
+    M::check(bytemuck::from_bytes(header), payload, limits)
+}
+
+fn content_bytes<M: Message>(header: &[u8]) -> Option<usize> {
+    M::content_bytes(bytemuck::from_bytes(header))
 }
 
 impl Topic {
@@ -55,12 +68,9 @@ impl Topic {
             max_elements: M::max_elements,
             header: WireType::of::<M::Header>(M::Header::TYPE_NAME),
             element: WireType::of::<M::Element>(M::Element::TYPE_NAME),
+            check: check::<M>,
+            content_bytes: content_bytes::<M>,
         }
-    }
-
-    /// Returns the bytes of its largest sample in shared memory.
-    fn max_sample_bytes(&self, limits: &Limits) -> usize {
-        SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
     }
 }
 
@@ -118,7 +128,9 @@ impl Footprint {
     pub fn new(window: &Window, limits: &Limits) -> Self {
         let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
-            (topic.name, samples * topic.max_sample_bytes(limits))
+            let payload = (topic.max_elements)(limits) * topic.element.bytes;
+            let sample = SAMPLE_OVERHEAD + topic.header.bytes + payload;
+            (topic.name, samples * sample)
         });
         let bookkeeping = [("bookkeeping", bookkeeping(window))];
         Self {
@@ -147,18 +159,15 @@ crate::named! {
     /// The process that numbers the items of a topic; its name is in the file of the generations.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum NumberedBy {
-        /// The source, on `scan`.
         Source = "source",
         /// Masking in live mode, on the topics of the other stages; otherwise they have the numbers
         /// of the source.
         Masking = "masking",
-        /// A follower, whose results are numbered.
         Follower = "follower",
     }
 }
 
 impl NumberedBy {
-    /// Returns who numbers the items of a topic.
     pub fn of(name: &str) -> Self {
         match topic(name).map(|topic| topic.sender) {
             _ if name == Scan::TOPIC => Self::Source,
@@ -171,9 +180,7 @@ impl NumberedBy {
 /// A generation of numbers: it gives the numbers from `first` on again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GivenAnew {
-    /// See [`Item::generation`](crate::Item::generation).
     pub generation: u32,
-    /// See [`Item::numbered_from`](crate::Item::numbered_from).
     pub first: u64,
 }
 

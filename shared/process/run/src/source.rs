@@ -127,21 +127,17 @@ impl SourceConfig {
     /// Returns the scans of the stream that is played of a recording that has these, counted on
     /// through all turns. It ends at `usize::MAX` if it is without end.
     pub fn stream(&self, scans: Range<usize>) -> Range<usize> {
-        self.turned(self.played(scans))
+        let once = self.played(scans);
+        match self.repeat && !once.is_empty() {
+            true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
+            false => once,
+        }
     }
 
     /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
     pub fn stream_len(&self, scans: Range<usize>) -> Option<usize> {
         let stream = self.stream(scans);
         (stream.end < usize::MAX).then_some(stream.len())
-    }
-
-    /// Returns the scans of a stream whose first turn is this one.
-    fn turned(&self, once: Range<usize>) -> Range<usize> {
-        match self.repeat && !once.is_empty() {
-            true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
-            false => once,
-        }
     }
 }
 
@@ -252,17 +248,17 @@ mod tests {
 
     #[test]
     fn a_stream_that_repeats_has_no_end_unless_its_scans_are_counted() {
-        let turned = |repeat, scans, once: Range<usize>| {
+        let stream = |repeat, scans, once: Range<usize>| {
             let source = SourceConfig {
                 repeat,
                 scans,
                 ..SourceConfig::default()
             };
-            source.turned(once)
+            source.stream(once)
         };
-        assert_eq!(turned(false, Some(100), 3..10), 3..10);
-        assert_eq!(turned(true, Some(100), 3..10), 3..103);
-        assert_eq!(turned(true, None, 3..10), 3..usize::MAX);
-        assert_eq!(turned(true, None, 3..3), 3..3);
+        assert_eq!(stream(false, Some(100), 3..10), 3..10);
+        assert_eq!(stream(true, Some(100), 3..10), 3..103);
+        assert_eq!(stream(true, None, 3..10), 3..usize::MAX);
+        assert_eq!(stream(true, None, 3..3), 3..3);
     }
 }

@@ -10,13 +10,11 @@ pub fn now_ns() -> i64 {
     now.tv_sec * 1_000_000_000 + now.tv_nsec
 }
 
-/// Returns the time of the host, ns since 1970.
 pub fn since_1970_ns() -> i64 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     now.map_or(0, |now| now.as_nanos() as i64)
 }
 
-/// Returns the duration from now until `due_ns`; zero if that has passed.
 pub fn until(due_ns: i64) -> Duration {
     Duration::from_nanos(due_ns.saturating_sub(now_ns()).max(0) as u64)
 }

@@ -21,7 +21,6 @@ use exchange::Sent;
 pub const SOCKET: &str = "control.sock";
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
-/// Time between two looks at a swap that is waited for.
 const LOOK: Duration = Duration::from_secs(1);
 /// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
@@ -52,7 +51,6 @@ pub struct Swap {
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
     Status(Box<Status>),
-    /// It is done, or has begun.
     Done,
     Refused(String),
     /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a
@@ -64,7 +62,6 @@ pub enum Answer {
 pub struct Status {
     pub pid: u32,
     pub out: PathBuf,
-    /// The current folder of the command that has started the run.
     pub started_in: PathBuf,
     pub live: bool,
     pub phase: Phase,
@@ -79,7 +76,6 @@ pub struct Status {
     #[serde(default)]
     pub notice: Option<String>,
     pub swap: Option<PendingSwap>,
-    /// The processes: the stages in the order of the stream, the followers, the recorder.
     pub processes: Vec<ProcessStatus>,
 }
 
@@ -90,14 +86,11 @@ pub struct PendingSwap {
     /// True if the program has taken over, but no scan has passed through it yet; false if it has
     /// not reported that it is ready to take over.
     pub has_taken_over: bool,
-    /// Time for which that has been waited for, s.
     pub waited_s: f64,
-    /// The most time for which it is waited for, s; `None`: there is no limit.
     pub limit_s: Option<f64>,
 }
 
 gyre_messages::named! {
-    /// Where a run is between its start and its end.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Phase {
@@ -115,7 +108,6 @@ pub struct ProcessStatus {
     pub name: String,
     pub pid: u32,
     pub command: Vec<String>,
-    /// True if the program differs from the one at the run's begin.
     pub is_swapped: bool,
     pub activity: Activity,
     /// For how long it has done that, s; `None` if it does not report it.

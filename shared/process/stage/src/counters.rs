@@ -31,8 +31,7 @@ pub(crate) fn write(
     manifest: &Manifest,
     stage: &str,
 ) -> Result<(), StageError> {
-    let text =
-        serde_json::to_string(counters).map_err(|e| StageError::Configuration(e.to_string()))?;
+    let text = serde_json::to_string(counters).map_err(|e| StageError::Input(e.to_string()))?;
     run::write(path_of(manifest, stage), &text)
 }
 

@@ -10,7 +10,6 @@ use crate::StageError;
 
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
-/// Opens the non-blocking socket for the data of a section.
 pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, StageError> {
     let bound = UdpSocket::bind(address);
     let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
@@ -44,7 +43,6 @@ pub(crate) fn receive(
     }
 }
 
-/// Returns how many datagrams have found no room in the socket since it was opened.
 pub(crate) fn dropped(socket: &UdpSocket) -> u32 {
     // Its last number is `SK_MEMINFO_DROPS` of `linux/sock_diag.h`.
     let mut counts = [0_u32; 9];

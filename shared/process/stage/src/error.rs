@@ -14,7 +14,6 @@ use crate::shared_memory::{self, SHARED_MEMORY};
 /// An error that ends a stage. The exit code informs the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// A request to stop: the process ends without a failure.
     #[error("stopped")]
     Stopped,
     #[error("no run is writing to {out}{end}: `gyre run` starts one, and its --out names the folder", out = out.display())]
@@ -30,9 +29,7 @@ pub enum StageError {
         topic: &'static str,
         observers: usize,
     },
-    #[error("{0}")]
-    Configuration(String),
-    /// The input cannot be used, and a restart would not change that.
+    /// The input or the configuration cannot be used, and a restart would not change that.
     #[error("{0}")]
     Input(String),
     /// Another attempt may help.
@@ -84,10 +81,6 @@ impl StageError {
         }
     }
 
-    pub fn configuration(error: impl Display) -> Self {
-        Self::Configuration(error.to_string())
-    }
-
     pub fn input(error: impl Display) -> Self {
         Self::Input(error.to_string())
     }
@@ -102,7 +95,7 @@ impl StageError {
 
     pub(crate) fn manifest(path: &Path, reason: impl Display) -> Self {
         let path = path.display();
-        Self::Configuration(format!(
+        Self::Input(format!(
             "cannot read {path}: {reason}; is the run still there?"
         ))
     }

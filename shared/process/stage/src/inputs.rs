@@ -187,19 +187,3 @@ fn action_for(item: &Item, has_previous: bool, received_ns: i64) -> Action {
         () => Action::Keep,
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_item_without_a_previous_one_is_only_kept_unless_the_chain_starts_there() {
-        let item = Item::numbered(7);
-        assert_eq!(action_for(&item, false, 1), Action::Keep);
-        assert_eq!(action_for(&item, true, 1), Action::Process(item, 1));
-        let start = item.flagged(flag::BREAK);
-        assert_eq!(action_for(&start, false, 1), Action::Process(start, 1));
-        let end = item.flagged(flag::END);
-        assert_eq!(action_for(&end, true, 1), Action::End(end));
-    }
-}

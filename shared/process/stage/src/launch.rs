@@ -41,7 +41,7 @@ pub struct Launch {
 impl Launch {
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| {
-            StageError::Configuration(
+            StageError::Input(
                 "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
                     .to_owned(),
             )
@@ -131,7 +131,7 @@ impl Launch {
             return Ok(());
         }
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
-            StageError::Configuration(format!(
+            StageError::Input(format!(
                 "scheduling.lock_memory is set, but the memory cannot be locked: {error}; raise `ulimit -l`, or LimitMEMLOCK of the unit"
             ))
         })
@@ -154,7 +154,7 @@ impl Launch {
         let table = self.configuration.get(section).cloned();
         let table = table.unwrap_or_else(|| toml::Table::new().into());
         table.try_into().map_err(|error: toml::de::Error| {
-            StageError::Configuration(format!(
+            StageError::Input(format!(
                 "[{section}] in the configuration: {}",
                 error.message()
             ))
@@ -197,7 +197,11 @@ pub fn main(
             let sentence = format!("{name}: {error}");
             // Either fails if the disk is full.
             let _ = writeln!(std::io::stderr(), "{sentence}");
-            leave_last_words(name, &sentence);
+            // For the supervisor, in shared memory: the disk of the logs may be full.
+            if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
+                let path = PathBuf::from(root).join(last_words(name, stands_by()));
+                let _ = run::write(path, &sentence);
+            }
             ExitCode::from(error.exit_code())
         }
     }
@@ -212,19 +216,10 @@ pub fn last_words(stage: &str, stands_by: bool) -> String {
     }
 }
 
-/// Leaves the reason for the stage's end to the supervisor, in shared memory: the disk of the logs
-/// may be full.
-fn leave_last_words(stage: &str, sentence: &str) {
-    if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
-        let name = last_words(stage, stands_by());
-        let _ = run::write(PathBuf::from(root).join(name), sentence);
-    }
-}
-
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {
-        StageError::Configuration(format!(
+        StageError::Input(format!(
             "GYRE_LOG is `{filter}` ({error}): say `debug`, or `info,zenoh=debug`"
         ))
     })

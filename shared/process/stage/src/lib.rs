@@ -1,8 +1,7 @@
 //! All inter-process communication of Gyre. Only this crate depends on the transport (iceoryx2).
 //!
 //! Reading order: [`Manifest`], [`run`], [`launch`]; `transport`, [`writer`], [`reader`]; [`wake`];
-//! the loops [`source`], [`stage`] with [`inputs`], [`sink`] and [`follower`]; [`observer`],
-//! [`relay`]; and what the supervisor reads: [`schedule`], [`heartbeat`], [`services`].
+//! the loops [`source`], [`stage`], [`sink`] and [`follower`]; [`observer`], [`relay`].
 //!
 //! The protocol: items carry consecutive sequence numbers. The source may have W of them in flight;
 //! each pose is the credit for one more. A stage is a function of its inputs, and a publisher keeps

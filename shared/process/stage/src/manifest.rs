@@ -59,7 +59,7 @@ impl Manifest {
             self.prefix
         );
         let manifest = serde_json::to_string_pretty(self).map_err(|error| {
-            StageError::Configuration(format!("cannot write the run's manifest: {error}"))
+            StageError::Input(format!("cannot write the run's manifest: {error}"))
         })?;
         for (name, text) in [
             ("manifest.json", manifest.as_str()),

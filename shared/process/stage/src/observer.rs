@@ -12,17 +12,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{
-    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, NumberedBy, Objects, Pose,
-    Refined, Rotation, Scan, Sender, Topic,
-};
+use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
 
 use crate::{
     Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
     numbers::{self, Numbers},
-    reader::{self, Received},
-    run, services,
+    reader::{self, AnyMessage, Port, Received},
+    run,
     sessions::not_running,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
@@ -53,10 +50,9 @@ pub struct ObservedRun {
     node: Node,
 }
 
-pub struct Observer<'run, M: Message> {
+pub struct Observer<'run, M> {
     run: &'run ObservedRun,
-    subscriber: Subscriber,
-    data: Listener,
+    port: Port<M>,
     current: Option<Received<M>>,
     sequence: Sequence,
     /// True if the last call of [`next`](Self::next) found the end. After the end of the stream
@@ -65,7 +61,10 @@ pub struct Observer<'run, M: Message> {
     looked: Instant,
 }
 
-pub enum Next<'a, M: Message> {
+/// An observer of a topic that is known by its name, whose messages are taken as bytes.
+pub type TopicObserver<'run> = Observer<'run, AnyMessage>;
+
+pub enum Next<'a, M> {
     /// A message, and the number of items that were missed directly before it. If masking was
     /// started again in live mode, it may have a number that was received before: see
     /// [`Item::generation`](gyre_messages::Item).
@@ -127,19 +126,16 @@ impl ObservedRun {
 
     /// Subscribes to a topic. The first messages come from the publisher's history.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
-        let (subscriber, data) = self.attach(&Topic::of::<M>())?;
-        Ok(Observer {
-            run: self,
-            subscriber,
-            data,
-            current: None,
-            sequence: Sequence::default(),
-            has_ended: false,
-            looked: Instant::now(),
-        })
+        self.attach(M::ENTRY)
     }
 
-    fn attach(&self, topic: &Topic) -> Result<(Subscriber, Listener), StageError> {
+    /// Subscribes to the topic of this name; `None` for an unknown topic.
+    pub fn observe_topic(&self, topic: &str) -> Result<Option<TopicObserver<'_>>, StageError> {
+        let topic = gyre_messages::topic(topic);
+        topic.map(|topic| self.attach(topic)).transpose()
+    }
+
+    fn attach<M>(&self, topic: &'static Topic) -> Result<Observer<'_, M>, StageError> {
         if let Sender::Follower(follower) = topic.sender
             && !follower.is_in(&self.manifest.window)
         {
@@ -153,7 +149,16 @@ impl ObservedRun {
         let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
         loop {
             let failed = match self.try_attach(topic) {
-                Ok(ports) => return Ok(ports),
+                Ok(port) => {
+                    return Ok(Observer {
+                        run: self,
+                        port,
+                        current: None,
+                        sequence: Sequence::default(),
+                        has_ended: false,
+                        looked: Instant::now(),
+                    });
+                }
                 Err(_) if self.has_ended() => {
                     return Err(not_running(self.manifest.out.clone()));
                 }
@@ -166,7 +171,7 @@ impl ObservedRun {
         }
     }
 
-    pub(crate) fn try_attach(&self, topic: &Topic) -> Result<(Subscriber, Listener), StageError> {
+    pub(crate) fn try_attach<M>(&self, topic: &'static Topic) -> Result<Port<M>, StageError> {
         let places = self.manifest.window.observers;
         let no_place = || StageError::NoPlace {
             topic: topic.name,
@@ -182,9 +187,9 @@ impl ObservedRun {
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
-        let data = Listener::open(&self.node, &services::data_event(topic.name))?;
+        let port = Port::of(subscriber, topic, &self.node, &self.manifest)?;
         reader::notify_publisher(&self.node, topic.name)?;
-        Ok((subscriber, data))
+        Ok(port)
     }
 }
 
@@ -203,7 +208,7 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     }
 }
 
-impl<M: Message> Observer<'_, M> {
+impl<M> Observer<'_, M> {
     /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The
     /// message before it is released, and the next call releases this one.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
@@ -211,9 +216,9 @@ impl<M: Message> Observer<'_, M> {
         self.has_ended = false;
         let since = Instant::now();
         loop {
-            while let Some(message) = self.receive()? {
+            while let Some(message) = self.port.receive()? {
                 let item = message.item();
-                let skipped = self.skipped_by(self.sequence.generation, item)?;
+                let skipped = self.skipped(self.sequence.generation, item)?;
                 if let Some(missed) = self.sequence.advance_past(item, skipped) {
                     return Ok(Next::Message(self.current.insert(message), missed));
                 }
@@ -230,9 +235,41 @@ impl<M: Message> Observer<'_, M> {
         }
     }
 
-    fn skipped_by(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+    /// Takes a copy of the next message that is there; `None` without a message. A message that
+    /// breaks its contract is an error and counts as missed.
+    pub fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        Ok(match self.next(Duration::ZERO)? {
+            Next::Message(message, _) => Some(message.to_bytes()),
+            Next::Idle | Next::Ended => None,
+        })
+    }
+
+    /// Returns, among the generations after `known` and before the item's, the one that reused the
+    /// smallest number.
+    pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
         let out = &self.run.manifest.out;
-        generation::skipped(out, NumberedBy::of(M::TOPIC), known, item)
+        generation::skipped(out, NumberedBy::of(self.topic()), known, item)
+    }
+
+    pub fn topic(&self) -> &'static str {
+        self.port.topic.name
+    }
+
+    /// Returns whether the last look has found the end of the stream or of the run.
+    pub fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    pub fn listener(&self) -> &Listener {
+        self.port.listener()
+    }
+
+    /// Counts as missed all items between `next` and the first received item: all before it is
+    /// known already, as from an observer that was there earlier, whose newest item had this
+    /// generation.
+    pub fn expect(&mut self, next: u64, generation: u32) {
+        self.sequence.expected = Some(next);
+        self.sequence.generation = generation;
     }
 
     /// Returns the number of items missed since the observer attached, or since the expected item.
@@ -240,17 +277,10 @@ impl<M: Message> Observer<'_, M> {
         self.sequence.missed
     }
 
-    fn receive(&self) -> Result<Option<Received<M>>, StageError> {
-        let sample = self.subscriber.receive()?;
-        sample
-            .map(|sample| Received::checked(sample, &self.run.manifest.limits))
-            .transpose()
-    }
-
     /// Sleeps until the publisher notifies, and on until [`REST`] has passed since the last look.
     fn sleep(&mut self, limit: Duration) -> Result<(), StageError> {
         let since = Instant::now();
-        wake::wait_for(&self.data, limit)?;
+        wake::wait_for(self.port.listener(), limit)?;
         let left = limit.saturating_sub(since.elapsed());
         thread::sleep(REST.saturating_sub(self.looked.elapsed()).min(left));
         self.looked = Instant::now();
@@ -270,88 +300,4 @@ pub fn wait_for_any(
         return Ok(true);
     }
     signals.sleep(REST)
-}
-
-/// An observer of a topic that is known by its name, whose messages are taken as bytes.
-pub trait TopicObserver {
-    fn topic(&self) -> &'static str;
-
-    /// Takes the next message that is there; `None` without a message. A message that breaks its
-    /// contract is an error and counts as missed.
-    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
-
-    /// Returns whether the end of the stream or of the run has been taken.
-    fn has_ended(&self) -> bool;
-
-    /// Returns the listener that the publisher notifies: see
-    /// [`wait_for_any`].
-    fn listener(&self) -> &Listener;
-
-    /// Counts as missed all items between `next` and the first received item: all before it is
-    /// known already, as from an observer that was there earlier, whose newest item had this
-    /// generation.
-    fn expect(&mut self, next: u64, generation: u32);
-
-    fn missed(&self) -> u64;
-
-    /// Returns, among the generations after `known` and before the item's, the one that reused the
-    /// smallest number.
-    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
-}
-
-impl ObservedRun {
-    /// Subscribes to the topic of this name; `None` for an unknown topic.
-    pub fn observe_topic(
-        &self,
-        topic: &str,
-    ) -> Result<Option<Box<dyn TopicObserver + '_>>, StageError> {
-        let observer: Box<dyn TopicObserver + '_> = match topic {
-            Scan::TOPIC => Box::new(self.observe::<Scan>()?),
-            Masked::TOPIC => Box::new(self.observe::<Masked>()?),
-            Rotation::TOPIC => Box::new(self.observe::<Rotation>()?),
-            Motion::TOPIC => Box::new(self.observe::<Motion>()?),
-            Refined::TOPIC => Box::new(self.observe::<Refined>()?),
-            Pose::TOPIC => Box::new(self.observe::<Pose>()?),
-            Loop::TOPIC => Box::new(self.observe::<Loop>()?),
-            Correction::TOPIC => Box::new(self.observe::<Correction>()?),
-            Fix::TOPIC => Box::new(self.observe::<Fix>()?),
-            Objects::TOPIC => Box::new(self.observe::<Objects>()?),
-            _ => return Ok(None),
-        };
-        Ok(Some(observer))
-    }
-}
-
-impl<M: Message> TopicObserver for Observer<'_, M> {
-    fn topic(&self) -> &'static str {
-        M::TOPIC
-    }
-
-    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
-        Ok(match self.next(Duration::ZERO)? {
-            Next::Message(message, _) => Some(message.to_bytes()),
-            Next::Idle | Next::Ended => None,
-        })
-    }
-
-    fn has_ended(&self) -> bool {
-        self.has_ended
-    }
-
-    fn listener(&self) -> &Listener {
-        &self.data
-    }
-
-    fn expect(&mut self, next: u64, generation: u32) {
-        self.sequence.expected = Some(next);
-        self.sequence.generation = generation;
-    }
-
-    fn missed(&self) -> u64 {
-        self.sequence.missed
-    }
-
-    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
-        self.skipped_by(known, item)
-    }
 }

@@ -68,9 +68,8 @@ impl Function {
     /// attempt helps where a process was killed or not to be had.
     pub fn load(file: &Path, name: Name) -> Result<Self, StageError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
-        let file = absolute.ok_or_else(|| {
-            StageError::Configuration(format!("there is no file {}", file.display()))
-        })?;
+        let file = absolute
+            .ok_or_else(|| StageError::Input(format!("there is no file {}", file.display())))?;
         let python = interpreter();
         let of = file.display();
         let start = |error: std::io::Error| {
@@ -78,9 +77,7 @@ impl Function {
                 "cannot start {python} for {of}: {error}; install Python 3, or name one with GYRE_PYTHON"
             );
             match error.kind() {
-                ErrorKind::NotFound | ErrorKind::PermissionDenied => {
-                    StageError::Configuration(sentence)
-                }
+                ErrorKind::NotFound | ErrorKind::PermissionDenied => StageError::Input(sentence),
                 _ => StageError::Transient(sentence),
             }
         };
@@ -108,9 +105,9 @@ impl Function {
         };
         match function.answer() {
             Ok(_) => Ok(function),
-            Err(StageError::Input(exception)) => Err(StageError::Configuration(exception)),
+            Err(exception @ StageError::Input(_)) => Err(exception),
             Err(ended) => Err(match function.python.try_wait() {
-                Ok(Some(status)) if status.code().is_some() => StageError::Configuration(format!(
+                Ok(Some(status)) if status.code().is_some() => StageError::Input(format!(
                     "{python} has ended before it had loaded {of}: {status}; name a Python of version 3 with \
                      GYRE_PYTHON, and see that the file does not end it"
                 )),
@@ -158,7 +155,6 @@ impl Function {
         self.requests.flush()
     }
 
-    /// Reads an array; `None` if the interpreter has ended before its end.
     fn array<T: bytemuck::Pod>(&mut self, shape: (usize, usize)) -> Option<Array2<T>> {
         let mut array = Array2::from_elem(shape, T::zeroed());
         let cells = array.as_slice_mut()?;

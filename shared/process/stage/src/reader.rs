@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use bytemuck::Pod;
-use gyre_messages::{Header, Item, Limits, Message, Topic};
+use gyre_messages::{Item, Limits, Message, Topic, flag};
 
 use crate::{
     Launch, Manifest, StageError, clock, services,
@@ -11,33 +11,31 @@ use crate::{
     writer::RecordedMessage,
 };
 
+/// Stands for the message type of a topic that is known by its name alone.
+pub enum AnyMessage {}
+
 /// A message in shared memory, borrowed from its publisher until it is dropped.
-pub struct Received<M: Message> {
+pub struct Received<M> {
     sample: Sample,
+    topic: &'static Topic,
     message: PhantomData<M>,
     /// Time of its removal from the queue, `CLOCK_MONOTONIC`, ns.
     pub received_ns: i64,
 }
 
 impl<M: Message> Received<M> {
-    pub(crate) fn checked(sample: Sample, limits: &Limits) -> Result<Self, StageError> {
-        let received = Self {
-            sample,
-            message: PhantomData,
-            received_ns: clock::now_ns(),
-        };
-        match M::check(received.header(), received.values(), limits) {
-            Ok(()) => Ok(received),
-            Err(violation) => Err(received.malformed(violation.to_string())),
-        }
-    }
-
     pub fn header(&self) -> &M::Header {
         bytemuck::from_bytes(self.sample.header())
     }
+}
+
+impl<M> Received<M> {
+    pub fn header_bytes(&self) -> &[u8] {
+        self.sample.header()
+    }
 
     pub fn item(&self) -> &Item {
-        self.header().item()
+        bytemuck::from_bytes(&self.sample.header()[..size_of::<Item>()])
     }
 
     /// Returns the values of the payload, in the publisher's memory.
@@ -48,25 +46,26 @@ impl<M: Message> Received<M> {
     /// Returns a copy of the message outside of shared memory: its header, and what that describes
     /// of its payload.
     pub fn to_bytes(&self) -> RecordedMessage {
-        let bytes = self.values::<u8>();
-        let content = M::content_bytes(self.header()).unwrap_or(bytes.len());
+        let (header, payload) = (self.sample.header(), self.sample.payload());
+        let content = (self.topic.content_bytes)(header).unwrap_or(payload.len());
         RecordedMessage {
-            header: bytemuck::bytes_of(self.header()).to_vec(),
-            payload: bytes[..content.min(bytes.len())].to_vec(),
+            header: header.to_vec(),
+            payload: payload[..content.min(payload.len())].to_vec(),
         }
     }
 
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
-            topic: M::TOPIC,
-            sender: M::SENDER.of(self.item()),
+            topic: self.topic.name,
+            sender: self.topic.sender.of(self.item()),
             seq: self.item().seq,
             reason: reason.into(),
         }
     }
 }
 
-pub struct Port<M: Message> {
+pub struct Port<M> {
+    pub(crate) topic: &'static Topic,
     limits: Limits,
     subscriber: Subscriber,
     data: Listener,
@@ -81,28 +80,59 @@ impl<M: Message> Port<M> {
 
     /// Subscribes as a process that is no stage.
     pub fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        let port = Self::silent(node, manifest)?;
-        notify_publisher(node, M::TOPIC)?;
+        Self::to(M::ENTRY, node, manifest)
+    }
+}
+
+impl<M> Port<M> {
+    pub fn to(topic: &'static Topic, node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+        let port = Self::silent(topic, node, manifest)?;
+        notify_publisher(node, topic.name)?;
         Ok(port)
     }
 
     /// Subscribes without notifying the publisher, as no stage may.
-    pub fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        let service = Service::open(node, &Topic::of::<M>())?;
+    pub fn silent(
+        topic: &'static Topic,
+        node: &Node,
+        manifest: &Manifest,
+    ) -> Result<Self, StageError> {
+        let subscriber = Subscriber::create(&Service::open(node, topic)?, None)?;
+        Self::of(subscriber, topic, node, manifest)
+    }
+
+    pub(crate) fn of(
+        subscriber: Subscriber,
+        topic: &'static Topic,
+        node: &Node,
+        manifest: &Manifest,
+    ) -> Result<Self, StageError> {
+        let data = Listener::open(node, &services::data_event(topic.name))?;
         Ok(Self {
+            topic,
             limits: manifest.limits,
-            subscriber: Subscriber::create(&service, None)?,
-            data: Listener::open(node, &services::data_event(M::TOPIC))?,
+            subscriber,
+            data,
             message: PhantomData,
         })
     }
 
     /// Receives the next message and checks it; `None` if the queue is empty.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
-        let sample = self.subscriber.receive()?;
-        sample
-            .map(|sample| Received::checked(sample, &self.limits))
-            .transpose()
+        let Some(sample) = self.subscriber.receive()? else {
+            return Ok(None);
+        };
+        let received = Received {
+            sample,
+            topic: self.topic,
+            message: PhantomData,
+            received_ns: clock::now_ns(),
+        };
+        let sample = &received.sample;
+        match (self.topic.check)(sample.header(), sample.payload(), &self.limits) {
+            Ok(()) => Ok(Some(received)),
+            Err(violation) => Err(received.malformed(violation.to_string())),
+        }
     }
 
     pub fn listener(&self) -> &Listener {
@@ -116,7 +146,7 @@ pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageErro
 }
 
 /// The items of a topic in order, each once: the current and the previous one.
-pub struct Reader<M: Message> {
+pub struct Reader<M> {
     port: Port<M>,
     next: Option<u64>,
     head: Option<Received<M>>,
@@ -129,21 +159,19 @@ impl<M: Message> Reader<M> {
     /// Subscribes to the topic. `next` is the first item wanted; `None` takes whichever arrives
     /// first.
     pub fn open(launch: &Launch, next: Option<u64>) -> Result<Self, StageError> {
-        Self::on(&launch.node, &launch.manifest, next)
+        Ok(Self::of(Port::open(launch)?, next))
     }
+}
 
-    pub(crate) fn on(
-        node: &Node,
-        manifest: &Manifest,
-        next: Option<u64>,
-    ) -> Result<Self, StageError> {
-        Ok(Self {
-            port: Port::on(node, manifest)?,
+impl<M> Reader<M> {
+    pub(crate) fn of(port: Port<M>, next: Option<u64>) -> Self {
+        Self {
+            port,
             next,
             head: None,
             previous: None,
             duplicates: 0,
-        })
+        }
     }
 
     /// Returns the current item and receives it first if necessary. Duplicates are skipped.
@@ -155,7 +183,9 @@ impl<M: Message> Reader<M> {
             let got = received.item().seq;
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
-                Some(next) if got > next => return Err(StageError::gap(M::TOPIC, next, got)),
+                Some(next) if got > next => {
+                    return Err(StageError::gap(self.port.topic.name, next, got));
+                }
                 _ => self.head = Some(received),
             }
         }
@@ -169,9 +199,8 @@ impl<M: Message> Reader<M> {
     /// Returns the previous item if the chain is unbroken.
     pub fn previous(&self) -> Option<&Received<M>> {
         let (previous, head) = (self.previous.as_ref()?, self.head.as_ref()?);
-        let follows = head.item().seq.checked_sub(1) == Some(previous.item().seq)
-            && !head.item().is(gyre_messages::flag::BREAK);
-        follows.then_some(previous)
+        let follows = head.item().seq.checked_sub(1) == Some(previous.item().seq);
+        (follows && !head.item().is(flag::BREAK)).then_some(previous)
     }
 
     pub fn advance(&mut self) {

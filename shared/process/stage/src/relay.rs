@@ -3,17 +3,14 @@
 
 use std::os::fd::BorrowedFd;
 
-use gyre_messages::{
-    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, StageId,
-};
+use gyre_messages::{Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan, StageId};
 
 use crate::{
     Launch, StageCounters, StageError, clock, counters,
     numbers::Numbers,
-    reader::Reader,
+    reader::{AnyMessage, Port, Reader},
     remote_progress, sink,
     source::{Feed, hop},
-    transport::Listener,
     wake,
     writer::{RecordedMessage, TopicWriter, Writer, item_of},
 };
@@ -21,7 +18,7 @@ use crate::{
 /// Publishes messages of the first stages, which are on another machine, in the place of the
 /// source. It is never late: the other machine may be out of reach.
 pub struct FirstStages<'a> {
-    feed: Feed<'a, Vec<TopicWriter>>,
+    feed: Feed<'a, AnyMessage>,
     /// The motions that go back to the first stages beside the poses.
     motions: Option<Reader<Motion>>,
     /// The supervisor takes its publisher for a sign that the source has started.
@@ -56,7 +53,6 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.resume_at.as_ref()
     }
 
-    /// Returns whether the last stage has journalled the end of the stream.
     pub fn has_ended(&self) -> bool {
         self.feed.credit.has_ended
     }
@@ -65,7 +61,6 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.newest
     }
 
-    /// Returns the next motion; `None` if nothing has arrived yet.
     pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }
@@ -127,7 +122,7 @@ pub struct LastStages<'a> {
     poses: Writer<Pose>,
     /// For masking, if the searches are on the other machine.
     motions: Option<Writer<Motion>>,
-    inlets: Vec<Box<dyn Inlet>>,
+    inlets: Vec<Reader<AnyMessage>>,
     progress: Numbers<1>,
     counters: StageCounters,
 }
@@ -167,7 +162,7 @@ impl<'a> LastStages<'a> {
     /// has arrived yet.
     pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, StageError> {
         let inlet = self.inlets.get_mut(topic);
-        inlet.map_or(Ok(None), |inlet| inlet.receive())
+        inlet.map_or(Ok(None), Reader::take_bytes)
     }
 
     /// Reports the number of items whose poses the other machine owes, counted at the source.
@@ -175,7 +170,6 @@ impl<'a> LastStages<'a> {
         self.progress.write([items])
     }
 
-    /// Publishes a new pose, the credit for one more scan.
     pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
@@ -198,7 +192,7 @@ impl<'a> LastStages<'a> {
     /// Sleeps until a topic has a message or the connection has something to read, and answers the
     /// handshakes of new readers; true on a request to stop.
     pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
-        let data: Vec<_> = self.inlets.iter().map(|inlet| inlet.listener()).collect();
+        let data: Vec<_> = self.inlets.iter().map(Reader::listener).collect();
         let motions = self.motions.as_ref().map(|motions| motions.listener());
         let handshakes: Vec<_> = [self.poses.listener()].into_iter().chain(motions).collect();
         let signals = &self.launch.signals;
@@ -218,32 +212,10 @@ impl<'a> LastStages<'a> {
     }
 }
 
-trait Inlet {
-    fn receive(&mut self) -> Result<Option<RecordedMessage>, StageError>;
-    fn listener(&self) -> &Listener;
-}
-
-fn inlet(launch: &Launch, topic: &str) -> Result<Box<dyn Inlet>, StageError> {
+fn inlet(launch: &Launch, name: &str) -> Result<Reader<AnyMessage>, StageError> {
+    let topic = gyre_messages::topic(name)
+        .ok_or_else(|| StageError::Input(format!("no stage publishes the topic `{name}`")))?;
     // Whichever item comes first: after a restart that is one of the history.
-    Ok(match topic {
-        Scan::TOPIC => Box::new(Reader::<Scan>::open(launch, None)?),
-        Masked::TOPIC => Box::new(Reader::<Masked>::open(launch, None)?),
-        Rotation::TOPIC => Box::new(Reader::<Rotation>::open(launch, None)?),
-        Motion::TOPIC => Box::new(Reader::<Motion>::open(launch, None)?),
-        Refined::TOPIC => Box::new(Reader::<Refined>::open(launch, None)?),
-        _ => {
-            let reason = format!("no stage of the stream reads the topic `{topic}`");
-            return Err(StageError::Configuration(reason));
-        }
-    })
-}
-
-impl<M: Message> Inlet for Reader<M> {
-    fn receive(&mut self) -> Result<Option<RecordedMessage>, StageError> {
-        self.take_bytes()
-    }
-
-    fn listener(&self) -> &Listener {
-        Self::listener(self)
-    }
+    let port = Port::to(topic, &launch.node, &launch.manifest)?;
+    Ok(Reader::of(port, None))
 }

@@ -13,7 +13,6 @@ use tracing_subscriber::fmt::{
 use crate::{Manifest, StageError, manifest, run};
 
 const SESSIONS: &str = "log/supervisor.txt";
-/// The line of a begin.
 pub const BEGUN: &str = "the run begins";
 
 /// Logs that the run begins, or why it ends. Without a place for that the run is the same.

@@ -2,7 +2,6 @@
 
 use rustix::fs::statvfs;
 
-/// The file system of all shared memory.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Returns the bytes of shared memory that are free; `None` if they are not limited.
@@ -11,7 +10,6 @@ pub fn free_shared_memory() -> rustix::io::Result<Option<u64>> {
     Ok((there.f_blocks > 0).then_some(there.f_bavail * there.f_frsize))
 }
 
-/// Returns whether no shared memory is left.
 pub(crate) fn is_full() -> bool {
     free_shared_memory().is_ok_and(|free| free == Some(0))
 }

@@ -2,19 +2,20 @@
 
 use std::fs;
 
-use gyre_messages::{Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{
+    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, StageId, flag,
+};
 
 use crate::{
     Launch, Manifest, StageCounters, StageError,
     counters::Work,
-    reader::{Reader, Received},
+    reader::{Port, Reader, Received},
     run,
     transport::Listener,
     wake,
     writer::Writer,
 };
 
-/// The file in the run's root with a sentence about the whole run.
 const NOTICE: &str = "notice";
 
 /// The owner of the trajectory.
@@ -35,15 +36,11 @@ pub trait Sink {
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
     ) -> Result<PoseHeader, StageError>;
-    /// Journals the end of the stream.
     fn end(&mut self, item: &Item) -> Result<(), StageError>;
 }
 
-/// Runs the sink on the motions of topic `M` until SIGTERM.
-pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
-    launch: &Launch,
-    sink: &mut S,
-) -> Result<StageCounters, StageError> {
+/// Runs the sink on the motions of the run until SIGTERM.
+pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
@@ -60,7 +57,7 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
         let last = last.unwrap_or_default();
         integration.poses.end(last, Some(S::HOP))?;
     }
-    let mut inputs = Motions::<M>::open(launch, next, integration.sink.takes_scans())?;
+    let mut inputs = Motions::open(launch, next, integration.sink.takes_scans())?;
     integration.drain(&mut inputs)?;
     loop {
         let woken = launch.signals.wait(
@@ -82,7 +79,6 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     }
 }
 
-/// Returns a stage's sentence about the whole run.
 pub fn notice(manifest: &Manifest) -> Option<String> {
     let notice = fs::read_to_string(manifest.root.join(NOTICE)).ok()?;
     (!notice.is_empty()).then_some(notice)
@@ -117,17 +113,22 @@ pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
     pose
 }
 
-/// The motions in order, each with its scan if the sink takes scans.
-struct Motions<M: Message> {
-    motions: Reader<M>,
+struct Motions {
+    motions: Reader<Motion>,
     scans: Option<Reader<Masked>>,
 }
 
-impl<M: Message<Header = MotionHeader>> Motions<M> {
+impl Motions {
     fn open(launch: &Launch, next: u64, with_scans: bool) -> Result<Self, StageError> {
+        // Both have the same header.
+        let topic = match launch.manifest.refines {
+            true => Refined::ENTRY,
+            false => Motion::ENTRY,
+        };
+        let motions = Port::to(topic, &launch.node, &launch.manifest)?;
         let scans = with_scans.then(|| Reader::open(launch, Some(next)));
         Ok(Self {
-            motions: Reader::open(launch, Some(next))?,
+            motions: Reader::of(motions, Some(next)),
             scans: scans.transpose()?,
         })
     }
@@ -192,10 +193,7 @@ struct Integration<'a, S: Sink> {
 }
 
 impl<S: Sink> Integration<'_, S> {
-    fn drain<M: Message<Header = MotionHeader>>(
-        &mut self,
-        inputs: &mut Motions<M>,
-    ) -> Result<bool, StageError> {
+    fn drain(&mut self, inputs: &mut Motions) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
             let Some(input) = inputs.head()? else {

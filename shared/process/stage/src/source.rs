@@ -20,13 +20,13 @@ use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
 
-use crate::{Launch, StageCounters, StageError, writer::Writer};
+use crate::{Launch, StageCounters, StageError};
 pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
 
 pub use crate::writer::RecordedMessage;
-pub use player::{Recorded, run_player};
+pub use player::run_player;
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
@@ -54,7 +54,6 @@ pub trait Source {
     /// down, as with a real sensor.
     fn drops_missed_scans(&self) -> bool;
 
-    /// Reads scan `index` into shared memory.
     fn read(
         &mut self,
         index: usize,
@@ -71,7 +70,7 @@ pub fn run(
 ) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let mut playback = Playback {
-        feed: Feed::open(launch, || Writer::open(&launch.node, &launch.manifest))?,
+        feed: Feed::of_scans(launch)?,
         source,
         tolerance,
     };
@@ -92,7 +91,6 @@ pub enum Unreadable {
     Io(String),
 }
 
-/// The limits on input that cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tolerance {
     /// Time for which failing input is tried again.
@@ -119,7 +117,6 @@ pub fn open<T>(
     }
 }
 
-/// The attempts to read the same input.
 struct Attempts {
     retry: Duration,
     first_failure: Option<Instant>,
@@ -133,7 +130,6 @@ impl Attempts {
         }
     }
 
-    /// Allows another attempt after one that failed.
     fn failed(&mut self, reason: String) -> Result<(), StageError> {
         if self.first_failure.is_none() {
             tracing::warn!("tried again: {reason}");

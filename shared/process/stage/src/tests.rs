@@ -16,7 +16,12 @@ use gyre_messages::{Item, Limits, Message, Pose, StageId, Window};
 use tempfile::TempDir;
 
 use crate::{
-    Manifest, reader::Reader, run::RunRoot, services::Services, transport::Node, wake::Signals,
+    Manifest,
+    reader::{Port, Reader},
+    run::RunRoot,
+    services::Services,
+    transport::Node,
+    wake::Signals,
     writer::Writer,
 };
 
@@ -87,7 +92,7 @@ fn writer<M: Message>(manifest: &Manifest) -> Writer<M> {
 }
 
 fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
-    Reader::on(&node(manifest), manifest, next).unwrap()
+    Reader::of(Port::on(&node(manifest), manifest).unwrap(), next)
 }
 
 /// A pose is the smallest message.

@@ -4,7 +4,6 @@
 
 mod event;
 mod port;
-mod sealed;
 mod service;
 
 use std::{fmt::Debug, path::Path};
@@ -20,7 +19,6 @@ use iceoryx2::{
 };
 
 use crate::{Manifest, StageError};
-use sealed::Sealed;
 
 pub use event::Listener;
 #[cfg(test)]
@@ -38,7 +36,7 @@ type AnyPayload = [CustomPayloadMarker];
 pub struct Transport(Config);
 
 /// A process in the transport of a run.
-pub struct Node(Sealed<iceoryx2::node::Node<Ipc>>);
+pub struct Node(iceoryx2::node::Node<Ipc>);
 
 /// Lets the transport print nothing: what fails is an error that Gyre reports.
 pub fn silence() {
@@ -87,7 +85,7 @@ impl Transport {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Ipc>()
             .map_err(|e| StageError::transport("join the run", e))?;
-        Ok(Node(Sealed::new(node)))
+        Ok(Node(node))
     }
 
     /// Returns the folder in the run's root where the transport describes its services.

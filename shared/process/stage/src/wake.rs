@@ -107,16 +107,6 @@ impl Signals {
         Ok(self.wait(&[], None, limit)?.stop)
     }
 
-    /// Sleeps until one of these listeners is notified, a signal arrives or `limit` has passed;
-    /// true on a request to stop.
-    pub fn sleep_until_any(
-        &self,
-        listeners: &[&Listener],
-        limit: Duration,
-    ) -> Result<bool, StageError> {
-        Ok(self.wait(listeners, None, limit)?.stop)
-    }
-
     /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is
     /// first. Consumes the notifications of `data`: read all queues afterwards. A notification of
     /// `handshake` is left for `accept_readers` of the writer, to be called if

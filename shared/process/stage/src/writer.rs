@@ -1,51 +1,39 @@
 //! The publisher of a topic.
 
-use std::{fs::File, marker::PhantomData, ops::Deref, path::Path, slice};
+use std::{fs::File, marker::PhantomData, path::Path};
 
 use gyre_messages::{Item, Message, Pose, Sender, StageId, Topic, flag};
 use rustix::fs::{FallocateFlags, fallocate};
 
 use crate::{
     Launch, Manifest, StageError, clock,
+    reader::AnyMessage,
     run::{self, SHARED_MEMORY},
     services,
     transport::{Listener, Loan, Node, Notifier, Publisher, Service},
 };
 
 /// Publishes the messages of a topic and keeps a history for late readers: see
-/// [`TopicWriter::accept_readers`].
-pub struct Writer<M: Message> {
-    untyped: TopicWriter,
-    message: PhantomData<M>,
-}
-
-pub struct Draft<M: Message> {
-    loan: Loan,
-    message: PhantomData<M>,
-}
-
-/// A [`Writer`] of messages of any type, as bytes.
-pub struct TopicWriter {
+/// [`accept_readers`](Self::accept_readers).
+pub struct Writer<M> {
     pub(crate) topic: &'static str,
     handshake: Listener,
     data: Notifier,
     publisher: Publisher,
+    message: PhantomData<M>,
+}
+
+/// A [`Writer`] of messages of any type, as bytes.
+pub type TopicWriter = Writer<AnyMessage>;
+
+pub struct Draft<M> {
+    loan: Loan,
+    message: PhantomData<M>,
 }
 
 impl<M: Message> Writer<M> {
     pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        Ok(Self {
-            untyped: TopicWriter::open(node, manifest, &Topic::of::<M>())?,
-            message: PhantomData,
-        })
-    }
-
-    /// Loans a message to fill in. The header is zero; the payload is uninitialised.
-    pub fn loan(&self) -> Result<Draft<M>, StageError> {
-        Ok(Draft {
-            loan: self.untyped.loan()?,
-            message: PhantomData,
-        })
+        Self::to(M::ENTRY, node, manifest)
     }
 
     pub(crate) fn publish(
@@ -55,40 +43,13 @@ impl<M: Message> Writer<M> {
     ) -> Result<(), StageError> {
         let mut draft = self.loan()?;
         *draft.header() = header;
-        self.untyped.send(draft.loan, hop)
-    }
-
-    /// Publishes a message without copying: readers receive its offset in shared memory.
-    pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
-        self.untyped.send(draft.loan, Some(hop))
-    }
-
-    /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
-    pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
-        self.untyped.send(draft.loan, None)
+        self.put(draft, hop)
     }
 }
 
-impl<M: Message> Deref for Writer<M> {
-    type Target = TopicWriter;
-
-    fn deref(&self) -> &TopicWriter {
-        &self.untyped
-    }
-}
-
-impl<M: Message> AsRef<[TopicWriter]> for Writer<M> {
-    fn as_ref(&self) -> &[TopicWriter] {
-        slice::from_ref(&self.untyped)
-    }
-}
-
-impl TopicWriter {
-    pub(crate) fn open(
-        node: &Node,
-        manifest: &Manifest,
-        topic: &Topic,
-    ) -> Result<Self, StageError> {
+impl<M> Writer<M> {
+    /// Publishes a topic of messages `M`.
+    pub fn to(topic: &Topic, node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let handshake = Listener::open(node, &services::handshake_event(topic.name))?;
         let data = Notifier::open(node, &services::data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
@@ -100,25 +61,35 @@ impl TopicWriter {
             handshake,
             data,
             publisher,
+            message: PhantomData,
         })
     }
 
-    pub(crate) fn loan(&self) -> Result<Loan, StageError> {
-        self.publisher.loan()
+    /// Loans a message to fill in. The header is zero; the payload is uninitialised.
+    pub fn loan(&self) -> Result<Draft<M>, StageError> {
+        Ok(Draft {
+            loan: self.publisher.loan()?,
+            message: PhantomData,
+        })
     }
 
-    pub(crate) fn send(&self, mut loan: Loan, hop: Option<StageId>) -> Result<(), StageError> {
+    /// Publishes a message without copying: readers receive its offset in shared memory.
+    pub fn send(&self, draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
+        self.put(draft, Some(hop))
+    }
+
+    fn put(&self, mut draft: Draft<M>, hop: Option<StageId>) -> Result<(), StageError> {
         if let Some(hop) = hop {
-            loan.item().hop_mut(hop).published_ns = clock::now_ns();
+            draft.loan.item().hop_mut(hop).published_ns = clock::now_ns();
         }
-        self.publisher.send(loan)?;
+        self.publisher.send(draft.loan)?;
         self.data.notify()
     }
 
     pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
-        let mut loan = self.loan()?;
-        *loan.item() = item.flagged(flag::END);
-        self.send(loan, hop)
+        let mut draft = self.loan()?;
+        *draft.loan.item() = item.flagged(flag::END);
+        self.put(draft, hop)
     }
 
     /// Sends the history to readers that have subscribed since the last call, and wakes them.
@@ -211,6 +182,24 @@ impl RecordedMessage {
 }
 
 impl TopicWriter {
+    /// Publishes a message as it is, without stamping it: of its payload as much as there is room
+    /// for.
+    pub fn send_unchanged(&self, start: &[u8], payload: &[u8]) -> Result<(), StageError> {
+        let mut draft = self.loan()?;
+        let (header, room) = draft.loan.parts();
+        if start.len() != header.len() {
+            return Err(StageError::Input(format!(
+                "a header of {} bytes is none of topic `{}`",
+                start.len(),
+                self.topic
+            )));
+        }
+        header.copy_from_slice(start);
+        let length = payload.len().min(room.len());
+        room[..length].copy_from_slice(&payload[..length]);
+        self.put(draft, None)
+    }
+
     /// Opens topics of the stream for publishing, in the place of the source.
     pub(crate) fn of_stream(launch: &Launch, topics: &[&str]) -> Result<Vec<Self>, StageError> {
         let of_stream = |topic: &&str| {
@@ -218,9 +207,9 @@ impl TopicWriter {
                 .filter(|it| matches!(it.sender, Sender::Stage(_)) && it.name != Pose::TOPIC);
             let topic = found.ok_or_else(|| {
                 let reason = format!("a source does not publish the topic `{topic}`");
-                StageError::Configuration(reason)
+                StageError::Input(reason)
             })?;
-            Self::open(&launch.node, &launch.manifest, topic)
+            Self::to(topic, &launch.node, &launch.manifest)
         };
         topics.iter().map(of_stream).collect()
     }
@@ -231,8 +220,8 @@ impl TopicWriter {
         message: &RecordedMessage,
         item: Item,
     ) -> Result<(), StageError> {
-        let mut loan = self.loan()?;
-        let (header, payload) = loan.parts();
+        let mut draft = self.loan()?;
+        let (header, payload) = draft.loan.parts();
         let (bytes, room) = (message.payload.len(), payload.len());
         let is_whole = message.header.len() == header.len();
         let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
@@ -245,8 +234,8 @@ impl TopicWriter {
         // The memory behind it has no meaning, and must not differ from run to run.
         payload[bytes..].fill(0);
         header.copy_from_slice(&message.header);
-        *loan.item() = item;
-        self.send(loan, Some(StageId::RadarReplay))
+        *draft.loan.item() = item;
+        self.send(draft, StageId::RadarReplay)
     }
 }
 

@@ -150,7 +150,6 @@ impl Child {
         self.process.id()
     }
 
-    /// Returns which stage it is; `None` for an additional process.
     pub fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
     }
@@ -159,7 +158,6 @@ impl Child {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
-    /// Returns whether it has lived for longer than the window for counting its deaths.
     pub fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed() > RESTART_WINDOW
     }
@@ -183,7 +181,6 @@ impl Child {
         self.status.is_some()
     }
 
-    /// Counts a death against the restart policy.
     pub fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Process(message));

@@ -1,9 +1,7 @@
-//! Removes the transport's resources of dead processes.
-//!
-//! The transport's own cleanup does this, except in two cases, which are handled first. A process
-//! that is killed while it creates a port can leave an empty shared-memory file, and every process
-//! that opens it waits for ever; or an empty tag, and every cleanup fails. A time limit covers
-//! unknown cases.
+//! Removes the transport's resources of dead processes, by the transport's own cleanup. A process
+//! that is killed while it creates a port can leave an empty shared-memory file, for which every
+//! process that opens it waits for ever, or an empty tag, by which every cleanup fails: both go
+//! first.
 
 use std::{
     collections::HashSet,
@@ -125,7 +123,6 @@ fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
         .collect()
 }
 
-/// Returns the empty files of the run whose names pass `is_meant`.
 fn empty_files(directory: &Path, prefix: &str, is_meant: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let empty = run::own_files(directory, prefix).filter(|(path, file)| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

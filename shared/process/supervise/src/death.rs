@@ -12,7 +12,6 @@ pub struct Death {
 }
 
 impl Death {
-    /// Returns the last line of its output in parentheses, or nothing.
     pub(crate) fn output(&self) -> String {
         let line = self.last_output.as_ref();
         line.map_or_else(String::new, |line| format!(" ({line})"))

@@ -50,7 +50,6 @@ pub(crate) struct Followers<'a> {
     pub given_up: Vec<(usize, String)>,
 }
 
-/// The decision about a follower that the run waits for.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Patience {
     Wait,
@@ -72,7 +71,6 @@ impl<'a> Followers<'a> {
         }
     }
 
-    /// Returns whether a process is a follower that is not restarted any more.
     pub fn has_given_up(&self, process: usize) -> bool {
         self.given_up.iter().any(|(it, _)| *it == process)
     }

@@ -1,9 +1,6 @@
-//! A process that outlives a killed supervisor, to end the stages' child processes and to remove
-//! the run's shared memory.
-//!
-//! The system ends a stage together with its supervisor, but not the stage's own children, as a
-//! shell has them. Each stage leads a process group, and the guardian knows them all: it reads them
-//! from a pipe, and the end of the pipe is the end of the supervisor.
+//! A process that outlives a killed supervisor, to end the stages' own children, as a shell has
+//! them, and to remove the run's shared memory. Each stage leads a process group; the guardian
+//! reads the groups from a pipe, whose end is the end of the supervisor.
 
 use std::{
     collections::BTreeMap,
@@ -27,7 +24,6 @@ use rustix::{
 use crate::{ProcessStat, SuperviseError, end::ends_within};
 
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
-/// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);
 
 pub(crate) struct Guardian {
@@ -158,7 +154,6 @@ fn lives(group: Pid) -> bool {
     ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)
 }
 
-/// Returns when a process was started, in the system's ticks; `None` without such a process.
 fn started(process: RawPid) -> Option<u64> {
     ProcessStat::of(process as u32).map(|stat| stat.started)
 }

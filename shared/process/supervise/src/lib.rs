@@ -1,14 +1,10 @@
-//! Starts the processes of a run, restarts dead ones, and removes all resources at the end.
+//! Starts the processes of a run, restarts dead ones, and removes all resources at the end. A dead
+//! stage is restarted alone, since every start resumes; all are, if that does not help or the plan
+//! demands it. Followers are restarted alone. [`rig`] runs one process alone, to test it.
 //!
-//! After a death only the dead stage is restarted: every start resumes. All stages are restarted if
-//! that does not help (the stage dies again before a new pose, or no pose is published) or if the
-//! plan demands it. Followers are no part of that: they are restarted alone, and waited for at the
-//! end. [`rig`] runs one process alone, to test it.
-//!
-//! Reading order: `supervisor`, the loop; its parts, each with a file of that name: `processes`,
-//! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, the
-//! actions that they decide; `start` and `child`, a process; `clean`. [`ProcessStat`], [`Usage`]
-//! and [`memory`] read `/proc`.
+//! Reading order: `supervisor`, the loop; its parts `processes`, `poses`, `stall`, `recovery`,
+//! `followers`, `swaps`, `recorder`; `restarts` and `requests`, which carry out their decisions;
+//! `start` and `child`, a process; `clean`.
 
 // `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.
 #![allow(unsafe_code)]

@@ -144,19 +144,15 @@ impl Collected {
         let _ = self.file.write_all(bytes);
         if length(&self.file) > MAX {
             bound(&self.path);
-            self.bound_what_has_lost_its_name();
+            // A file that was removed or renamed meanwhile is not bounded by its name.
+            if length(&self.file) > MAX {
+                let _ = self.file.set_len(0);
+            }
         }
         let newest = &bytes[bytes.len().saturating_sub(TAIL)..];
         self.tail.extend_from_slice(newest);
         let old = self.tail.len().saturating_sub(TAIL);
         self.tail.drain(..old);
-    }
-
-    /// Empties a file that was removed or renamed, since without its name it would not be bounded.
-    fn bound_what_has_lost_its_name(&self) {
-        if length(&self.file) > MAX {
-            let _ = self.file.set_len(0);
-        }
     }
 }
 

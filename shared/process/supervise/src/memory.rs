@@ -31,13 +31,11 @@ impl Room {
         }
     }
 
-    /// Returns the bytes that this process can still get, if anything is known.
     pub fn least(&self) -> Option<u64> {
         self.available.into_iter().chain(self.left).min()
     }
 }
 
-/// Returns the memory that programs can still get, from `/proc/meminfo`.
 fn available(meminfo: &str) -> Option<u64> {
     let line = meminfo
         .lines()
@@ -122,17 +120,5 @@ mod tests {
         let meminfo = "MemTotal:  100 kB\nMemAvailable:   42 kB\n";
         assert_eq!(available(meminfo), Some(42 * 1024));
         assert_eq!(available("MemTotal: 100 kB"), None);
-    }
-
-    #[test]
-    fn the_least_of_machine_and_groups_is_what_there_is() {
-        let room = |available, left| Room {
-            available,
-            limit: None,
-            left,
-        };
-        assert_eq!(room(Some(5), Some(3)).least(), Some(3));
-        assert_eq!(room(Some(5), None).least(), Some(5));
-        assert_eq!(room(None, None).least(), None);
     }
 }

@@ -43,7 +43,6 @@ impl Sweep {
     }
 }
 
-/// Returns the number of processes, living and dead, that have joined the run.
 fn nodes(manifest: &Manifest) -> usize {
     let entries = fs::read_dir(manifest.root.join("nodes")).into_iter();
     let is_directory = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_dir());

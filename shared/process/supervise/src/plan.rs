@@ -14,7 +14,6 @@ use crate::program::Program;
 
 #[derive(Debug)]
 pub struct Plan {
-    /// The manifest, which all processes read.
     pub manifest: Manifest,
     /// The processes: the stages in the order of the stream, then the followers.
     pub stages: Vec<StagePlan>,
@@ -33,12 +32,10 @@ pub struct Plan {
     pub cpu_wake_us: Option<u32>,
 }
 
-/// One process of a run.
 #[derive(Clone, Debug)]
 pub struct StagePlan {
     /// The name of the stage, or any other for an additional process.
     pub name: String,
-    /// Program and arguments, executed without a shell.
     pub command: Vec<String>,
     /// The files that the command executes. After a change of one of them the stage is not started
     /// again.
@@ -83,7 +80,6 @@ impl StagePlan {
     }
 }
 
-/// An event during a run.
 #[derive(Debug)]
 pub enum Event<'a> {
     Pose(&'a PoseHeader),
@@ -100,7 +96,6 @@ pub enum Event<'a> {
     Ready,
     /// The supervisor has looked at all processes, which it does every 200 ms or more often.
     Watched,
-    /// The stages are asked to end.
     Stopping,
 }
 
@@ -123,7 +118,6 @@ pub enum Stall {
     Start { stage: String, limit: Duration },
 }
 
-/// An error that ends a run.
 #[derive(Debug, Error)]
 pub enum SuperviseError {
     #[error(transparent)]

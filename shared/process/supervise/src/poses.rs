@@ -17,7 +17,6 @@ pub(crate) struct Poses {
     seen: Option<Instant>,
 }
 
-/// A message with new information.
 pub(crate) enum News {
     Pose(Received<Pose>),
     End,
@@ -51,17 +50,14 @@ impl Poses {
         self.newest.map(|newest| newest.seq)
     }
 
-    /// Returns the number of poses so far.
     pub fn count(&self) -> u64 {
         self.newest_seq().map_or(0, |newest| newest + 1)
     }
 
-    /// Returns the number of scans that were dropped before the newest pose.
     pub fn dropped(&self) -> u64 {
         self.newest.map_or(0, |newest| newest.dropped())
     }
 
-    /// Returns the time since the newest pose was seen, s.
     pub fn age_s(&self) -> Option<f64> {
         self.seen.map(|seen| seen.elapsed().as_secs_f64())
     }

@@ -9,7 +9,6 @@ use gyre_stage::{
 
 use crate::{child::Child, processes::Processes, run::Run};
 
-/// Returns the state of a stage or a follower.
 pub(crate) fn status_of(process: usize, processes: &Processes, run: &Run<'_>) -> ProcessStatus {
     let child = &processes[process];
     let beat = child.heartbeat(run.manifest());
@@ -34,7 +33,6 @@ pub(crate) fn status_of(process: usize, processes: &Processes, run: &Run<'_>) ->
     }
 }
 
-/// Returns the activity of a living process.
 pub(crate) fn activity(beat: Heartbeat) -> Activity {
     match beat.activity {
         _ if beat.is_silent() => Activity::Silent,

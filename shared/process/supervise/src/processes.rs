@@ -14,11 +14,9 @@ use crate::{
     guardian::Guardian, recovery::Recovery, roles::Roles, run::Run, start::Position,
 };
 
-/// The processes, by their indices into the plan's stages.
 #[derive(Default)]
 pub(crate) struct Processes {
     children: Vec<Child>,
-    /// The numbers of restarts by name.
     pub restarts: BTreeMap<String, usize>,
 }
 
@@ -114,7 +112,6 @@ impl Processes {
         }
     }
 
-    /// Kills these processes, and waits for their end.
     pub fn kill(&mut self, processes: &[usize], guardian: &Guardian) -> Result<(), SuperviseError> {
         processes.iter().for_each(|i| self[*i].kill());
         for i in processes {

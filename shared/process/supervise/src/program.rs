@@ -23,7 +23,6 @@ fn state_of(path: &Path) -> io::Result<State> {
 }
 
 impl Program {
-    /// Returns the file at `path` as it is now.
     pub fn at(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),

@@ -20,14 +20,12 @@ use crate::{
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
 const START_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time between two looks at whether it does.
 const LOOK: Duration = Duration::from_millis(10);
 /// The longest time for which a complete run waits for the end of its recording.
 const END_TIMEOUT: Duration = Duration::from_secs(30);
 /// The same for a run that was interrupted or has failed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The process, and when it is to be started again.
 pub(crate) struct Recorder {
     child: Child,
     /// `None` while it runs, and when it has ended for good.
@@ -73,7 +71,6 @@ impl Recorder {
         self.child.pid()
     }
 
-    /// Starts the recorder again if it has died.
     pub fn keep(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
         if self.has_ended || !self.child.has_exited() {
             return Ok(());

@@ -7,7 +7,6 @@ use gyre_stage::clock;
 
 use crate::roles::Roles;
 
-/// Restarted stages, and the times that earlier ones took.
 #[derive(Default)]
 pub(crate) struct Recovery {
     /// Without a pose yet that the new process worked on.
@@ -16,7 +15,6 @@ pub(crate) struct Recovery {
     pub times: Vec<Duration>,
 }
 
-/// A restarted stage without a pose that the new process has worked on.
 struct Recovering {
     hop: StageId,
     died_ns: i64,

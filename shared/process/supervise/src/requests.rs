@@ -159,7 +159,6 @@ impl Supervisor<'_> {
         self.processes.why_not_again(others)
     }
 
-    /// Looks after the program that stands by, and lets it take over.
     pub(crate) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
         let is_in_flight = || self.poses.are_owed(self.run.manifest());
         match self.swaps.step(&self.run, is_in_flight) {

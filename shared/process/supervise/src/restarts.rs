@@ -150,7 +150,6 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Looks for stalls, and restarts what may be stuck.
     pub(crate) fn look_for_stalls(&mut self) -> Result<(), SuperviseError> {
         let (processes, run) = (&self.processes, &self.run);
         let starting = processes.starting(run);

@@ -7,20 +7,17 @@
 
 mod recorded;
 
-use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
+use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
-    StageId, Topic,
-};
+use gyre_messages::{StageId, Topic};
 use gyre_stage::{
     Launch, Manifest, StageError,
-    reader::Port,
+    reader::{AnyMessage, Port},
     run::{self, RunRoot},
     services::Services,
     transport::{self, Listener, Node, Service, Transport},
     wake::Signals,
-    writer::Writer,
+    writer::TopicWriter,
 };
 
 use crate::{
@@ -33,7 +30,6 @@ use crate::{
 
 pub use recorded::Recorded;
 
-/// A run without processes, to start one in it.
 pub struct Rig<'a> {
     manifest: Manifest,
     services: Option<Services>,
@@ -52,32 +48,12 @@ pub struct Process {
 }
 
 /// The publisher of a topic, in place of the stage that it is of.
-pub trait Feed {
-    /// Sends a message as it is, with its time stamps and its process id, and notifies its readers.
-    fn send(&self, message: &Recorded) -> Result<(), StageError>;
-
-    /// Sends the history to readers that have notified since the last call; returns whether there
-    /// were any. A reader that does not notify is not connected to.
-    fn answer_handshakes(&self) -> Result<bool, StageError>;
-
-    /// Sends the history to all new readers, whether they have notified or not.
-    fn connect(&self) -> Result<(), StageError>;
-
-    /// Returns the number of subscribers of the topic.
-    fn subscribers(&self) -> usize;
-
-    /// Returns the listener that new readers notify.
-    fn listener(&self) -> &Listener;
+pub struct Feed {
+    writer: TopicWriter,
+    topic: Service,
 }
 
-/// A reader of a topic.
-pub trait Tap {
-    /// Receives the next message; `None` if the queue is empty.
-    fn receive(&self) -> Result<Option<Recorded>, StageError>;
-
-    /// Returns the listener that the publisher notifies.
-    fn listener(&self) -> &Listener;
-}
+pub struct Tap(Port<AnyMessage>);
 
 impl<'a> Rig<'a> {
     /// Creates the root of a run with this manifest, whose prefix and root are set, and this
@@ -150,41 +126,29 @@ impl<'a> Rig<'a> {
 
     /// Returns the names of the files that describe the services which exist.
     pub fn services(&self) -> BTreeSet<String> {
-        let folder = fs::read_dir(self.services_folder());
-        let names = folder.into_iter().flatten().flatten();
+        let folder = self.manifest.root.join(self.transport.services_folder());
+        let names = fs::read_dir(folder).into_iter().flatten().flatten();
         names
             .map(|file| file.file_name().to_string_lossy().into_owned())
             .collect()
     }
 
-    fn services_folder(&self) -> PathBuf {
-        self.manifest.root.join(self.transport.services_folder())
+    pub fn feed(&self, topic: &str) -> Result<Feed, StageError> {
+        Feed::on(&self.node, &self.manifest, topic)
     }
 
-    pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
-        self.ports().feed(topic)
-    }
-
-    /// Subscribes to a topic of a stage, and asks for its history.
-    pub fn tap(&self, topic: &str) -> Result<Box<dyn Tap>, StageError> {
-        self.ports().tap(topic, Joining::Asks)
-    }
-
-    fn ports(&self) -> Ports<'_> {
-        Ports {
-            node: &self.node,
-            manifest: &self.manifest,
-        }
+    pub fn tap(&self, topic: &str) -> Result<Tap, StageError> {
+        Port::to(known(topic)?, &self.node, &self.manifest).map(Tap)
     }
 
     /// True on a request to stop.
     pub fn sleep_until_readable(
         &self,
-        feeds: &[&dyn Feed],
+        feeds: &[&Feed],
         connection: BorrowedFd<'_>,
         limit: Duration,
     ) -> Result<bool, StageError> {
-        let handshakes: Vec<_> = feeds.iter().map(|feed| feed.listener()).collect();
+        let handshakes: Vec<_> = feeds.iter().map(|feed| feed.writer.listener()).collect();
         let woken = self
             .signals
             .wait_or_readable(&[], &handshakes, Some(connection), limit)?;
@@ -192,83 +156,15 @@ impl<'a> Rig<'a> {
     }
 
     /// True on a request to stop.
-    pub fn sleep(&self, taps: &[&dyn Tap], limit: Duration) -> Result<bool, StageError> {
+    pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<bool, StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
-        self.signals.sleep_until_any(&listeners, limit)
+        Ok(self.signals.wait(&listeners, None, limit)?.stop)
     }
 }
 
-/// The manner of a reader's joining.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Joining {
-    /// It notifies the publisher, and so receives its history.
-    Asks,
-    Silently,
-}
-
-/// The topics of a run by their names, for processes that do more or less than a stage may.
-pub struct Ports<'a> {
-    node: &'a Node,
-    manifest: &'a Manifest,
-}
-
-/// Calls a method for the message type of a topic.
-macro_rules! of_topic {
-    ($topic:expr, $self:ident.$method:ident($($argument:expr),*)) => {
-        match $topic {
-            Scan::TOPIC => $self.$method::<Scan>($($argument),*),
-            Masked::TOPIC => $self.$method::<Masked>($($argument),*),
-            Rotation::TOPIC => $self.$method::<Rotation>($($argument),*),
-            Motion::TOPIC => $self.$method::<Motion>($($argument),*),
-            Refined::TOPIC => $self.$method::<Refined>($($argument),*),
-            Pose::TOPIC => $self.$method::<Pose>($($argument),*),
-            Loop::TOPIC => $self.$method::<Loop>($($argument),*),
-            Correction::TOPIC => $self.$method::<Correction>($($argument),*),
-            Fix::TOPIC => $self.$method::<Fix>($($argument),*),
-            Objects::TOPIC => $self.$method::<Objects>($($argument),*),
-            topic => Err(no_such(topic)),
-        }
-    };
-}
-
-impl<'a> Ports<'a> {
-    /// The topics of the run that a process has joined.
-    pub fn of(launch: &'a Launch) -> Self {
-        Self {
-            node: launch.node(),
-            manifest: &launch.manifest,
-        }
-    }
-
-    pub fn feed(&self, topic: &str) -> Result<Box<dyn Feed>, StageError> {
-        of_topic!(topic, self.open_feed())
-    }
-
-    pub fn tap(&self, topic: &str, joining: Joining) -> Result<Box<dyn Tap>, StageError> {
-        of_topic!(topic, self.open_tap(joining))
-    }
-
-    fn open_feed<M: Message<Header: Copy>>(&self) -> Result<Box<dyn Feed>, StageError> {
-        Ok(Box::new(TypedFeed::<M> {
-            writer: Writer::open(self.node, self.manifest)?,
-            topic: Service::open(self.node, &Topic::of::<M>())?,
-        }))
-    }
-
-    fn open_tap<M: Message<Header: Copy>>(
-        &self,
-        joining: Joining,
-    ) -> Result<Box<dyn Tap>, StageError> {
-        let port = match joining {
-            Joining::Asks => Port::<M>::on(self.node, self.manifest)?,
-            Joining::Silently => Port::<M>::silent(self.node, self.manifest)?,
-        };
-        Ok(Box::new(port))
-    }
-}
-
-fn no_such(topic: &str) -> StageError {
-    StageError::Input(format!("no stage has a topic `{topic}`"))
+fn known(topic: &str) -> Result<&'static Topic, StageError> {
+    let found = gyre_messages::topic(topic);
+    found.ok_or_else(|| StageError::Input(format!("no stage has a topic `{topic}`")))
 }
 
 impl Process {
@@ -277,7 +173,6 @@ impl Process {
         self.child.pid()
     }
 
-    /// Returns how it ended; `None` while it runs.
     pub fn death(&mut self) -> Option<Death> {
         if self.death.is_none() && self.child.has_exited() {
             // Once: it takes the last words.
@@ -291,58 +186,69 @@ impl Process {
         self.child.terminate();
     }
 
-    /// Kills the group and waits for its end.
     pub fn kill(mut self) -> Result<(), SuperviseError> {
         self.child.kill();
         self.child.await_end()
     }
 }
 
-struct TypedFeed<M: Message> {
-    writer: Writer<M>,
-    topic: Service,
-}
-
-impl<M: Message<Header: Copy>> Feed for TypedFeed<M> {
-    fn send(&self, message: &Recorded) -> Result<(), StageError> {
-        let mut draft = self.writer.loan()?;
-        let (header, bytes) = draft.parts::<u8>();
-        *header = message.header::<M>()?;
-        let length = message.payload.len().min(bytes.len());
-        bytes[..length].copy_from_slice(&message.payload[..length]);
-        self.writer.send_unchanged(draft)
+impl Feed {
+    /// Publishes a topic of the run that a process has joined.
+    pub fn of(launch: &Launch, topic: &str) -> Result<Self, StageError> {
+        Self::on(launch.node(), &launch.manifest, topic)
     }
 
-    fn answer_handshakes(&self) -> Result<bool, StageError> {
+    fn on(node: &Node, manifest: &Manifest, topic: &str) -> Result<Self, StageError> {
+        let topic = known(topic)?;
+        Ok(Self {
+            writer: TopicWriter::to(topic, node, manifest)?,
+            topic: Service::open(node, topic)?,
+        })
+    }
+
+    /// Sends a message as it is, with its time stamps, and notifies its readers.
+    pub fn send(&self, message: &Recorded) -> Result<(), StageError> {
+        let (header, payload) = (message.header_bytes(), &message.payload);
+        self.writer.send_unchanged(header, payload)
+    }
+
+    /// Sends the history to readers that have notified since the last call; returns whether there
+    /// were any. A reader that does not notify is not connected to.
+    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
         self.writer.answer_handshakes()
     }
 
-    fn connect(&self) -> Result<(), StageError> {
+    /// Sends the history to all new readers, whether they have notified or not.
+    pub fn connect(&self) -> Result<(), StageError> {
         self.writer.accept_readers()
     }
 
-    fn subscribers(&self) -> usize {
+    pub fn subscribers(&self) -> usize {
         self.topic.subscribers()
-    }
-
-    fn listener(&self) -> &Listener {
-        self.writer.listener()
     }
 }
 
-impl<M: Message<Header: Copy>> Tap for Port<M> {
-    fn receive(&self) -> Result<Option<Recorded>, StageError> {
-        let received = Self::receive(self)?;
-        Ok(received.map(|received| {
-            Recorded::of::<M>(
-                received.header(),
-                received.values::<u8>(),
-                received.received_ns,
-            )
+impl Tap {
+    /// Subscribes to a topic of the run that a process has joined; `silently`, it does not ask for
+    /// its history.
+    pub fn of(launch: &Launch, topic: &str, silently: bool) -> Result<Self, StageError> {
+        let (topic, node, manifest) = (known(topic)?, launch.node(), &launch.manifest);
+        let port = match silently {
+            true => Port::silent(topic, node, manifest)?,
+            false => Port::to(topic, node, manifest)?,
+        };
+        Ok(Self(port))
+    }
+
+    pub fn receive(&self) -> Result<Option<Recorded>, StageError> {
+        Ok(self.0.receive()?.map(|received| Recorded {
+            header: received.header_bytes().to_vec(),
+            payload: received.values::<u8>().to_vec(),
+            received_ns: received.received_ns,
         }))
     }
 
-    fn listener(&self) -> &Listener {
-        Self::listener(self)
+    pub fn listener(&self) -> &Listener {
+        self.0.listener()
     }
 }

@@ -38,7 +38,6 @@ impl<'a> Roles<'a> {
         (0..self.0.len()).filter(move |process| self.follows(*process))
     }
 
-    /// Returns the first stage of the stream.
     pub fn sources(self) -> Vec<usize> {
         let is_source = |name| StageId::by_name(name) == Some(StageId::RadarReplay);
         let all = 0..self.0.len();

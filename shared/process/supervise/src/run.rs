@@ -73,7 +73,6 @@ impl<'a> Run<'a> {
         (self.observe)(event);
     }
 
-    /// Reports a sentence, unless it is empty.
     pub fn note(&mut self, sentence: &str) {
         if !sentence.is_empty() {
             self.say(Event::Note(sentence));

@@ -19,28 +19,15 @@ pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
     }
 }
 
-/// Returns a key with its value, for a sentence.
-pub(super) fn describe(scheduling: &Scheduling, key: Key) -> String {
-    match key {
-        Key::Cpus => format!("cpus = {:?}", scheduling.cpus),
-        Key::Nice => format!("nice = {}", scheduling.nice.unwrap_or_default()),
-        Key::RealtimePriority => {
-            let priority = scheduling.realtime_priority.unwrap_or_default();
-            format!("realtime_priority = {priority}")
-        }
-    }
-}
-
-/// A key that the system can refuse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Key {
-    Cpus,
-    Nice,
-    RealtimePriority,
-}
-
-impl Key {
-    pub const ALL: [Self; 3] = [Self::Cpus, Self::Nice, Self::RealtimePriority];
+/// The keys that the system can refuse, with their values, for a sentence.
+pub(super) fn keys(scheduling: &Scheduling) -> [String; 3] {
+    let nice = scheduling.nice.unwrap_or_default();
+    let priority = scheduling.realtime_priority.unwrap_or_default();
+    [
+        format!("cpus = {:?}", scheduling.cpus),
+        format!("nice = {nice}"),
+        format!("realtime_priority = {priority}"),
+    ]
 }
 
 /// A [`Scheduling`] without anything that has to be allocated.
@@ -53,15 +40,16 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Applies it to this process, and so to all that it will start. It only calls the system.
-    pub fn apply(&self) -> Result<(), (Key, io::Error)> {
+    /// The error has the place of the refused key among [`keys`].
+    pub fn apply(&self) -> Result<(), (u8, io::Error)> {
         if let Some(set) = &self.cpus {
-            sched_setaffinity(None, set).map_err(|error| (Key::Cpus, error.into()))?;
+            sched_setaffinity(None, set).map_err(|error| (0_u8, error.into()))?;
         }
         if let Some(nice) = self.nice {
-            setpriority_process(None, nice).map_err(|error| (Key::Nice, error.into()))?;
+            setpriority_process(None, nice).map_err(|error| (1_u8, error.into()))?;
         }
         if let Some(priority) = self.realtime_priority {
-            set_realtime(priority).map_err(|error| (Key::RealtimePriority, error))?;
+            set_realtime(priority).map_err(|error| (2_u8, error))?;
         }
         Ok(())
     }

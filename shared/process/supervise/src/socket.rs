@@ -20,7 +20,6 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 /// Time for a client to send its request, and to take the answer. The supervisor does nothing else
 /// meanwhile, and clients of this user send it at once.
 const LIMIT: Duration = Duration::from_millis(100);
-/// Size of the longest request, bytes.
 const MAX: usize = 64 << 10;
 
 /// The socket, open to this user alone since it lies in the run's root.
@@ -39,7 +38,6 @@ impl ControlSocket {
         }
     }
 
-    /// Returns the descriptor that is readable when a client has come.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.0.as_fd()
     }

@@ -1,10 +1,7 @@
-//! Finds a run that makes no progress although no process has died, and decides which processes to
-//! restart.
-//!
-//! The clock runs only while something is owed: a pose, of an item that the source has published,
-//! or an item that the source should have published by its own schedule. So neither slow playback
-//! nor a gap in a recording is a stall. A stage that has not opened its topics is starting: it may
-//! load a model, and has a limit of its own. The stages on another machine are watched there.
+//! Finds a run that makes no progress although no process has died, and decides what to restart.
+//! The clock runs only while a pose is owed, or a scan by the source's own schedule: neither slow
+//! playback nor a gap in a recording is a stall. A stage that opens its topics, maybe after loading
+//! a model, has a limit of its own; stages on another machine are watched there.
 
 use std::time::{Duration, Instant};
 
@@ -35,7 +32,6 @@ pub(crate) struct Stalls<'a> {
     stalls_in_a_row: usize,
 }
 
-/// The result of a look at all processes.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Found {
     /// Followers that hang: odometry continues, with them or without.
@@ -57,14 +53,12 @@ impl<'a> Stalls<'a> {
         }
     }
 
-    /// Resets the clock at a new pose.
     pub fn progress(&mut self, pose: &Item) {
         self.poses = pose.published.saturating_add(1);
         self.owed = None;
         self.stalls_in_a_row = 0;
     }
 
-    /// Resets the clock at a restart.
     pub fn restarted(&mut self) {
         self.owed = None;
     }
@@ -119,7 +113,6 @@ impl<'a> Stalls<'a> {
         })
     }
 
-    /// Returns the stall, if something has been owed for too long.
     fn late_message(&mut self) -> Option<Stall> {
         let limit = self.limit?;
         let owed = match remote_progress::owes(self.manifest, self.poses) {
@@ -190,7 +183,6 @@ impl<'a> Stalls<'a> {
 /// When the supervisor has looked for stalls.
 struct Looks {
     last: Instant,
-    /// The last look at the heartbeats.
     at_heartbeats: Instant,
     /// Until then, old heartbeats are no evidence.
     resumes_until: Option<Instant>,
@@ -263,13 +255,7 @@ mod tests {
             (one.followers, one.stall),
             (vec![(FOLLOWER, follower)], None)
         );
-    }
-
-    #[test]
-    fn heartbeats_are_looked_at_once_a_second() {
-        let plan = plan();
-        let mut stalls = Stalls::of(&plan);
-        found(&mut stalls, &[], LIMIT);
+        // Heartbeats are looked at once a second.
         let now = stalls.looks.last + PERIOD / 2;
         assert_eq!(stalls.look(now, |_, _| true, None), Found::default());
     }

@@ -156,7 +156,6 @@ impl<'a> Supervisor<'a> {
         Ok(woken.stop)
     }
 
-    /// Reads the new poses; true at the end of the stream.
     fn read_poses(&mut self) -> Result<bool, SuperviseError> {
         while let Some(news) = self.poses.next()? {
             let News::Pose(received) = news else {
@@ -218,7 +217,6 @@ impl<'a> Supervisor<'a> {
     }
 }
 
-/// Reads the counters of the stages that exited cleanly, by name.
 fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
     let names = plan.stages.iter().map(|stage| &stage.name);
     names

@@ -1,10 +1,7 @@
-//! Swaps: a new program replaces a stage's program during the run.
-//!
-//! The new program first stands by: it loads its data while the one before works. It takes over
-//! when no scan is in flight, if there is such a moment, and a restart of the stage is all that the
-//! others see. (Masking in live mode alone knows which scans it has admitted: if there are some
-//! without a pose, the others are restarted with it.) A program that fails before its first pose,
-//! or too often later, is given up, and the one before is started again.
+//! Swaps: a new program replaces a stage's program during the run. It stands by and loads its data
+//! while the one before works, and takes over when no scan is in flight, if there is such a moment:
+//! the others see a restart. (Only masking in live mode knows which scans it has admitted.) A
+//! program that fails before its first pose, or too often later, gives way to the one before.
 
 mod trial;
 
@@ -36,7 +33,6 @@ pub(crate) struct Swaps {
     pub standby: Option<Standby>,
     /// Who waits for a program that has taken over to prove itself.
     trial: Option<Trial>,
-    /// The programs that have taken the place of others, in order.
     pub done: Vec<Swapped>,
 }
 
@@ -57,7 +53,6 @@ pub(crate) enum Step {
 }
 
 impl Swaps {
-    /// Returns why no swap can begin now.
     pub fn why_not_now(&self, has_ended: bool) -> Option<&'static str> {
         match () {
             () if has_ended => Some(ENDED),
@@ -192,7 +187,6 @@ impl Standby {
     }
 }
 
-/// When a program that stands by takes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Judged {
     Now,
@@ -231,22 +225,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ready_program_takes_over_between_scans_or_when_there_is_no_such_moment() {
+    fn a_program_takes_over_when_it_is_ready_and_is_not_waited_for_without_end() {
         let (moment, long) = (Duration::from_millis(1), 2 * PATIENCE);
-        let limit = Some(Duration::from_secs(60));
-        let ready = |ready, is_in_flight| judge(Some(ready), long, limit, || is_in_flight);
-        assert_eq!(ready(moment, true), Judged::Later);
-        assert_eq!(ready(moment, false), Judged::Now);
-        assert_eq!(ready(long, true), Judged::Now);
-    }
-
-    #[test]
-    fn a_program_that_does_not_get_ready_is_waited_for_with_the_limit_of_a_start() {
-        let (minute, limit) = (Duration::from_secs(60), Duration::from_secs(30));
-        let waited = |limit| judge(None, minute, limit, || false);
-        assert_eq!(waited(Some(limit)), Judged::TooLate);
-        assert_eq!(waited(Some(2 * minute)), Judged::Later);
-        assert_eq!(waited(None), Judged::Later);
+        for (ready, limit, is_in_flight, expected) in [
+            (Some(moment), Some(moment), true, Judged::Later),
+            (Some(moment), Some(moment), false, Judged::Now),
+            (Some(long), Some(moment), true, Judged::Now),
+            (None, Some(moment), false, Judged::TooLate),
+            (None, Some(2 * long), false, Judged::Later),
+            (None, None, false, Judged::Later),
+        ] {
+            let judged = judge(ready, long, limit, || is_in_flight);
+            assert_eq!(judged, expected, "{ready:?}, {limit:?}, {is_in_flight}");
+        }
     }
 
     #[test]

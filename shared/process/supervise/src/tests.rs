@@ -16,10 +16,8 @@ pub(crate) const MASKING: usize = 1;
 pub(crate) const REFINEMENT: usize = 2;
 pub(crate) const FOLLOWER: usize = 3;
 
-/// The time limit of a stall.
 pub(crate) const LIMIT: Duration = Duration::from_secs(5);
 
-/// The manifest of a run with these results.
 pub(crate) fn manifest(out: &Path) -> Manifest {
     Manifest {
         prefix: String::new(),

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::ProcessStat;
 
-/// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
     pub cpu_s: f64,
@@ -48,7 +47,6 @@ impl Usage {
     }
 }
 
-/// A run and the resources that its processes use.
 #[derive(Serialize)]
 pub struct UsedRun {
     pub status: Status,
@@ -66,7 +64,6 @@ impl UsedRun {
     }
 }
 
-/// Reads the file `status` of a process or thread in `/proc`.
 fn status(folder: &Path) -> Option<String> {
     fs::read_to_string(folder.join("status")).ok()
 }

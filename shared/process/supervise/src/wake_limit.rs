@@ -1,8 +1,6 @@
-//! Processors that wake in time: a limit on how long they take to leave an idle state.
-//!
-//! A processor that has nothing to do sleeps, the deeper the longer. Each hop of a scan wakes one
-//! up, which can take longer than the hop's message needs. The limit holds for the whole machine,
-//! while the supervisor lives.
+//! A limit on how long processors take to wake, for the whole machine, while the supervisor lives.
+//! A processor without work sleeps, the deeper the longer, and each hop of a scan wakes one: that
+//! can take longer than the hop's message needs.
 
 use std::{
     fs::File,

@@ -35,7 +35,7 @@ pub(super) struct MirroredTopic {
     name: &'static str,
     header_bytes: usize,
     pub fetcher: Fetcher,
-    feed: Box<dyn Feed>,
+    feed: Feed,
     sequence: Sequence,
     count: ReceivedCount,
 }
@@ -172,7 +172,7 @@ impl Mirror<'_> {
                 true => self.answers = None,
                 false => self.find_another_sender()?,
             }
-            let feeds: Vec<&dyn Feed> = self.topics.iter().map(|topic| &*topic.feed).collect();
+            let feeds: Vec<&Feed> = self.topics.iter().map(|topic| &topic.feed).collect();
             for feed in &feeds {
                 feed.answer_handshakes()?;
             }

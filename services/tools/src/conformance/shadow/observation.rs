@@ -53,7 +53,7 @@ pub(crate) struct Observation<'run> {
     run: &'run ObservedRun,
     /// The inputs, the output, then the feedback.
     topics: Vec<&'static str>,
-    observers: Vec<Box<dyn TopicObserver + 'run>>,
+    observers: Vec<TopicObserver<'run>>,
     forward: usize,
     lag: u64,
     /// The messages of incomplete items, by the number of the scan at its source, because masking

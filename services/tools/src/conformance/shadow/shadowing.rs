@@ -142,11 +142,11 @@ impl<'a> Shadowing<'a> {
         let shadow = self.life.iter().map(|life| life.harness.output.listener());
         let mut listeners: Vec<&Listener> = shadow.collect();
         if !rest.is_zero() {
-            return self.signals.sleep_until_any(&listeners, rest);
+            return Ok(self.signals.wait(&listeners, None, rest)?.stop);
         }
         listeners.extend(self.observation.listeners());
         let limit = if is_starting { STARTING } else { MAX_WAIT };
-        self.signals.sleep_until_any(&listeners, limit)
+        Ok(self.signals.wait(&listeners, None, limit)?.stop)
     }
 
     fn take(&mut self, at_once: bool) -> Result<(), StageError> {

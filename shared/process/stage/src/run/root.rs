@@ -308,7 +308,6 @@ fn remove_files(root: &Path) {
     let _ = fs::remove_dir(root).or_else(|_| fs::remove_dir_all(root));
 }
 
-/// Returns the files of this user in a directory whose names begin with `prefix`.
 pub fn own_files(directory: &Path, prefix: &str) -> impl Iterator<Item = (PathBuf, Metadata)> {
     let user = geteuid().as_raw();
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();

@@ -2,11 +2,11 @@
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{Hop, Item, Pose, StageId, flag};
+use gyre_messages::{Hop, Item, Pose, Scan, StageId, flag};
 
 use crate::{
     Launch, Listener, StageCounters, StageError, clock, reader::Port, schedule::ScheduleWriter,
-    wake, writer::TopicWriter,
+    wake, writer::Writer,
 };
 
 /// Time without need for the supervisor to intervene: a source that waits for a sensor or for
@@ -17,23 +17,34 @@ const ALIVE_NS: i64 = 5_000_000_000;
 const SAID_EVERY_NS: i64 = 1_000_000_000;
 
 /// A source without its input.
-pub(crate) struct Feed<'a, O> {
+pub(crate) struct Feed<'a, M> {
     pub launch: &'a Launch,
     pub credit: Credit,
     pub schedule: ScheduleWriter,
-    pub outputs: O,
+    pub outputs: Vec<Writer<M>>,
     pub counters: StageCounters,
-    /// True if readers may have come since the last wait.
     may_have_new_readers: bool,
     /// Time of the last sign of life of a source that is never late, `CLOCK_MONOTONIC`, ns.
     said_ns: Option<i64>,
 }
 
-impl<'a, O: AsRef<[TopicWriter]>> Feed<'a, O> {
+impl<'a> Feed<'a, Scan> {
+    pub fn of_scans(launch: &'a Launch) -> Result<Self, StageError> {
+        Self::open(launch, || {
+            Ok(vec![Writer::open(&launch.node, &launch.manifest)?])
+        })
+    }
+
+    pub fn scans(&self) -> &Writer<Scan> {
+        &self.outputs[0]
+    }
+}
+
+impl<'a, M> Feed<'a, M> {
     /// Reads the poses, and opens the topics afterwards.
     pub fn open(
         launch: &'a Launch,
-        outputs: impl FnOnce() -> Result<O, StageError>,
+        outputs: impl FnOnce() -> Result<Vec<Writer<M>>, StageError>,
     ) -> Result<Self, StageError> {
         Ok(Self {
             launch,
@@ -111,11 +122,11 @@ impl<'a, O: AsRef<[TopicWriter]>> Feed<'a, O> {
             self.schedule.due_at(now_ns + ALIVE_NS)?;
             self.said_ns = Some(now_ns);
         }
-        let outputs = self.outputs.as_ref();
+        let outputs = self.outputs.iter();
         if mem::take(&mut self.may_have_new_readers) {
-            outputs.iter().try_for_each(TopicWriter::accept_readers)?;
+            outputs.clone().try_for_each(Writer::accept_readers)?;
         }
-        let handshakes: Vec<_> = outputs.iter().map(TopicWriter::listener).collect();
+        let handshakes: Vec<_> = outputs.map(Writer::listener).collect();
         let mut data = vec![self.credit.poses.listener()];
         data.extend(listener);
         let signals = &self.launch.signals;
@@ -130,12 +141,11 @@ impl<'a, O: AsRef<[TopicWriter]>> Feed<'a, O> {
     }
 
     pub fn end(&mut self, item: Item) -> Result<(), StageError> {
-        let mut outputs = self.outputs.as_ref().iter();
+        let mut outputs = self.outputs.iter();
         outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;
         self.schedule.has_published(item.published)
     }
 
-    /// Returns the counters of a source that was asked to stop.
     pub fn finish(self, ended: Result<(), StageError>) -> Result<StageCounters, StageError> {
         match ended {
             Ok(()) | Err(StageError::Stopped) => Ok(self.counters),
@@ -157,13 +167,11 @@ pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
 /// The progress of the run, from its poses.
 pub(crate) struct Credit {
     pub poses: Port<Pose>,
-    /// Sequence number of the newest pose.
     pub newest: Option<u64>,
     /// The same at the source.
     pub published: Option<u64>,
     /// The newest pose of the trajectory at the last start of the sink.
     pub resume_at: Option<Item>,
-    /// True if the sink has journalled the end of the stream.
     pub has_ended: bool,
 }
 

@@ -25,7 +25,6 @@ use crate::{
 pub(super) struct LiveSensors {
     sensors: Vec<Live>,
     datagram: Vec<u8>,
-    /// The samples of the last scan.
     of_scan: Vec<Sample>,
     /// The longest time for which a scan waits for its samples.
     pub max_wait: Duration,
@@ -74,7 +73,6 @@ impl LiveSensors {
         }))
     }
 
-    /// The sockets to wait for.
     pub fn sockets(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         let sockets = self.sensors.iter().filter_map(|live| live.socket.as_ref());
         sockets.map(AsFd::as_fd)
@@ -90,7 +88,6 @@ impl LiveSensors {
         Ok(())
     }
 
-    /// Returns whether a complete scan has all its samples.
     pub fn cover(&self, header: &ScanHeader) -> bool {
         let until_ns = header.span_ns()[1];
         self.sensors.iter().all(|live| live.samples.cover(until_ns))
@@ -120,7 +117,6 @@ impl LiveSensors {
 }
 
 impl Live {
-    /// Opens a sensor, whose datagrams are received at an address if there is one.
     fn open(
         kind: SampleKind,
         listens: Option<String>,
@@ -139,7 +135,6 @@ impl Live {
         })
     }
 
-    /// Returns the datagrams that the system has dropped since the last call.
     fn newly_dropped(&mut self) -> usize {
         let so_far = self.socket.as_ref().map_or(0, dropped);
         so_far.wrapping_sub(mem::replace(&mut self.dropped, so_far)) as usize

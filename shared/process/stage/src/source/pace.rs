@@ -5,36 +5,21 @@ use crate::clock;
 /// Maps sensor time to run time: `due = start + (complete - first) / rate`.
 #[derive(Clone, Copy)]
 pub(super) struct Pace {
-    rate: f64,
-    start_ns: i64,
-    first_ns: i64,
+    pub rate: f64,
+    /// A time of the run, and the time of the sensor that it stands for, both in ns.
+    pub origin: (i64, i64),
 }
 
 impl Pace {
-    /// The pace with this [`origin`](Self::origin).
-    pub fn new(rate: f64, (start_ns, first_ns): (i64, i64)) -> Self {
-        Self {
-            rate,
-            start_ns,
-            first_ns,
-        }
-    }
-
-    /// Returns the time of the run, and the time of the sensor that it stands for, both in ns.
-    pub fn origin(&self) -> (i64, i64) {
-        (self.start_ns, self.first_ns)
-    }
-
-    /// Returns when a scan is due.
     pub fn due_ns(&self, complete_ns: i64) -> i64 {
-        self.start_ns
-            .saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
+        let (start_ns, first_ns) = self.origin;
+        start_ns.saturating_add((complete_ns.saturating_sub(first_ns) as f64 / self.rate) as i64)
     }
 
     /// Makes a scan after a break due one period after the scan before the break.
     pub fn resume(&mut self, before_ns: i64, complete_ns: i64, period_ns: i64) {
-        self.start_ns = self.due_ns(before_ns.saturating_add(period_ns));
-        self.first_ns = complete_ns;
+        let start_ns = self.due_ns(before_ns.saturating_add(period_ns));
+        self.origin = (start_ns, complete_ns);
     }
 
     /// Delays the playback if a scan is late, so that it is due now. Returns the delay, ns.
@@ -42,7 +27,7 @@ impl Pace {
         let late_ns = clock::now_ns()
             .saturating_sub(self.due_ns(complete_ns))
             .max(0);
-        self.start_ns = self.start_ns.saturating_add(late_ns);
+        self.origin.0 = self.origin.0.saturating_add(late_ns);
         late_ns as u64
     }
 }
@@ -57,8 +42,7 @@ mod tests {
         for complete_ns in [9_000_000_000 + year_ns, 9_000_000_000 - year_ns] {
             let mut pace = Pace {
                 rate: 2.0,
-                start_ns: 1000,
-                first_ns: 500,
+                origin: (1000, 500),
             };
             assert_eq!(pace.due_ns(500 + 4000), 3000);
             pace.resume(500 + 8000, complete_ns, 400);
@@ -72,8 +56,7 @@ mod tests {
         let start_ns = clock::now_ns() - 1_000_000_000;
         let mut pace = Pace {
             rate: 1.0,
-            start_ns,
-            first_ns: 0,
+            origin: (start_ns, 0),
         };
         assert!(pace.slip(500_000_000) >= 500_000_000);
         assert!(pace.due_ns(500_000_000) <= clock::now_ns());

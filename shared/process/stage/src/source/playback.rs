@@ -6,16 +6,10 @@ use gyre_radar::continues;
 use super::{
     Attempts, Feed, PAUSE, Source, Tolerance, Unreadable, hop, pace::Pace, position::Position,
 };
-use crate::{
-    StageError, clock,
-    counters::Work,
-    wake,
-    writer::{Draft, Writer},
-};
+use crate::{StageError, clock, counters::Work, wake, writer::Draft};
 
-/// A source that is being played.
 pub(super) struct Playback<'a, S: Source> {
-    pub feed: Feed<'a, Writer<Scan>>,
+    pub feed: Feed<'a, Scan>,
     pub source: &'a mut S,
     pub tolerance: &'a Tolerance,
 }
@@ -45,7 +39,7 @@ impl<S: Source> Playback<'_, S> {
             self.feed
                 .wait_for_admission(position.published, due_ns, live)?;
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
-            self.feed.outputs.send(draft, S::HOP)?;
+            self.feed.scans().send(draft, S::HOP)?;
             self.feed.schedule.has_published(position.published)?;
             before = Some((stamp_ns, complete_ns));
             position.advance();
@@ -79,7 +73,7 @@ impl<S: Source> Playback<'_, S> {
         let pace = pace.get_or_insert_with(|| {
             let before = self.feed.schedule.origin.filter(|_| self.is_sensor());
             let origin = before.unwrap_or_else(|| (clock::now_ns(), complete_ns));
-            Pace::new(rate, origin)
+            Pace { rate, origin }
         });
         if let Some(before_ns) = gap_ns {
             pace.resume(before_ns, complete_ns, self.source.period_ns());
@@ -87,7 +81,7 @@ impl<S: Source> Playback<'_, S> {
         if self.feed.launch.manifest.live && !self.source.drops_missed_scans() {
             self.feed.counters.slipped_ns += pace.slip(complete_ns);
         }
-        self.feed.schedule.is_paced_from(pace.origin())?;
+        self.feed.schedule.is_paced_from(pace.origin)?;
         let burst_ns = self.burst_ns(complete_ns, published);
         Ok(Some(pace.due_ns(burst_ns)))
     }
@@ -103,7 +97,6 @@ impl<S: Source> Playback<'_, S> {
         complete_ns.saturating_add(self.source.period_ns().saturating_mul(after))
     }
 
-    /// Returns the number of scans that follow a scan in its burst.
     fn left_in_burst(&self, published: u64) -> u64 {
         let burst = self.source.burst().get() as u64;
         burst - 1 - published % burst
@@ -114,7 +107,7 @@ impl<S: Source> Playback<'_, S> {
         &mut self,
         position: &mut Position,
     ) -> Result<Option<Draft<Scan>>, StageError> {
-        let mut draft = self.feed.outputs.loan()?;
+        let mut draft = self.feed.scans().loan()?;
         let mut skipped = 0;
         while position.index < self.source.scans().end {
             let Some(reason) = self.read(position, &mut draft)? else {

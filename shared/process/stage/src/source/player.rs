@@ -8,38 +8,33 @@ use gyre_messages::{Item, Scan, StageId, flag};
 
 use super::{Feed, Pace, hop};
 use crate::{
-    Launch, StageCounters, StageError, clock, counters, wake,
+    Launch, StageCounters, StageError, clock, counters,
+    reader::AnyMessage,
+    wake,
     writer::{RecordedMessage, TopicWriter, Writer, item_of},
 };
 
-pub trait Recorded {
-    /// The topics to publish, in the order of the stream.
-    fn topics(&self) -> &[&'static str];
-
-    /// The messages to play, by their sequence number: each topic has all of them.
-    fn items(&self) -> Range<u64>;
-
-    fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError>;
-}
-
-/// Plays recorded messages until SIGTERM.
+/// Plays recorded messages until SIGTERM: of each of these topics, in the order of the stream, the
+/// messages with these sequence numbers. `read` returns one of them.
 pub fn run_player(
     launch: &Launch,
-    recorded: &mut impl Recorded,
+    topics: &[&str],
+    items: Range<u64>,
+    mut read: impl FnMut(&str, u64) -> Result<RecordedMessage, StageError>,
 ) -> Result<StageCounters, StageError> {
     launch.take_place()?;
-    let mut feed = Feed::open(launch, || TopicWriter::of_stream(launch, recorded.topics()))?;
+    let mut feed = Feed::open(launch, || TopicWriter::of_stream(launch, topics))?;
     // The supervisor takes its publisher for a sign that the source has started.
     let _scans = Writer::<Scan>::open(&launch.node, &launch.manifest)?;
-    let ended = play(&mut feed, recorded);
+    let ended = play(&mut feed, items, &mut read);
     feed.finish(ended)
 }
 
 fn play(
-    feed: &mut Feed<'_, Vec<TopicWriter>>,
-    recorded: &mut impl Recorded,
+    feed: &mut Feed<'_, AnyMessage>,
+    items: Range<u64>,
+    read: &mut impl FnMut(&str, u64) -> Result<RecordedMessage, StageError>,
 ) -> Result<(), StageError> {
-    let items = recorded.items();
     let newest = feed.wait_for_start()?;
     // The others need the message of the newest pose as the previous one.
     let mut seq = match newest.is(flag::BASE) {
@@ -51,12 +46,12 @@ fn play(
         let started_ns = clock::now_ns();
         let topics = feed.outputs.iter().map(|output| output.topic);
         let messages: Vec<_> = topics
-            .map(|topic| recorded.read(topic, seq))
+            .map(|topic| read(topic, seq))
             .collect::<Result<_, _>>()?;
         let mut item = item_of(&messages, seq)?;
         let due_ns = feed.launch.manifest.rate.map(|rate| {
-            let pace =
-                pace.get_or_insert_with(|| Pace::new(rate, (clock::now_ns(), item.stamp_ns)));
+            let origin = (clock::now_ns(), item.stamp_ns);
+            let pace = pace.get_or_insert(Pace { rate, origin });
             pace.due_ns(item.stamp_ns)
         });
         *item.hop_mut(StageId::RadarReplay) = hop(started_ns, clock::now_ns());

@@ -5,19 +5,16 @@ use gyre_messages::{Item, flag};
 /// The next scan to read, and its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
-    /// Index of the scan in the recording.
     pub index: usize,
     /// Sequence number among the published scans. In live mode masking numbers the chain of motions
     /// itself.
     pub published: u64,
     /// The scan published before it; `None` at the start, and where it is not known.
     previous: Option<u64>,
-    /// True if the chain of motions starts with it.
     starts_chain: bool,
 }
 
 impl Position {
-    /// Starts a stream with scan `first`.
     pub fn start(first: usize) -> Self {
         Self {
             index: first,
@@ -67,13 +64,11 @@ impl Position {
         }
     }
 
-    /// Starts a new chain with the scan.
     pub fn break_chain(&mut self) {
         self.previous = None;
         self.starts_chain = true;
     }
 
-    /// Steps past a scan that was published.
     pub fn advance(&mut self) {
         self.previous = Some(self.index as u64);
         self.starts_chain = false;
@@ -95,7 +90,6 @@ impl Position {
         };
     }
 
-    /// Returns the header of the scan.
     pub fn item(&self) -> Item {
         let flags = if self.starts_chain { flag::BREAK } else { 0 };
         let scan = self.index as u64;

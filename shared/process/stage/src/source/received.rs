@@ -18,18 +18,15 @@ pub struct Received {
     pub missing_azimuths: u64,
     /// Turns of the sensor without a scan.
     pub scans_left_out: u64,
-    /// Messages that could not be read.
     pub damaged_messages: u64,
     /// Datagrams of others, and descriptions of scans that do not fit into the run. They were
     /// passed over.
     pub foreign_messages: u64,
     pub connections: u64,
     pub is_receiving: bool,
-    /// The scan that was published last.
     pub last_scan: Option<LastScan>,
 }
 
-/// A scan that was published.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LastScan {
     /// Time of its middle by the sensor, ns.
@@ -39,13 +36,11 @@ pub struct LastScan {
 }
 
 impl Received {
-    /// Returns the number of connections after the first.
     #[must_use]
     pub fn reconnections(&self) -> u64 {
         self.connections.saturating_sub(1)
     }
 
-    /// Sets the counts of the source.
     pub(super) fn count(&self, counters: &mut StageCounters) {
         counters.missing_azimuths = self.missing_azimuths;
         counters.scans_left_out = self.scans_left_out;

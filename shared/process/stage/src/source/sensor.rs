@@ -13,11 +13,8 @@ use super::{
     received::{self, Received},
 };
 use crate::{
-    Generation, Launch, StageCounters, StageError, clock,
-    counters::Work,
-    numbers::Numbers,
-    wake,
-    writer::{Draft, Writer},
+    Generation, Launch, StageCounters, StageError, clock, counters::Work, numbers::Numbers, wake,
+    writer::Draft,
 };
 
 /// A sensor that delivers scans at its own pace.
@@ -52,7 +49,6 @@ pub trait Sensor {
     /// Continues to count after a dead source.
     fn resume(&mut self, before: Received);
 
-    /// Returns the deliveries and losses since the start of the run.
     fn received(&self) -> Received;
 }
 
@@ -76,11 +72,10 @@ pub fn run_sensor(
 ) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     sensor.resume(received::read(&launch.manifest).unwrap_or_default());
-    let open_scans = || Writer::open(&launch.node, &launch.manifest);
     let mut stream = Stream {
         received: received::open(&launch.manifest)?,
         live: LiveSensors::open(launch)?,
-        feed: Feed::open(launch, open_scans)?.never_late(),
+        feed: Feed::of_scans(launch)?.never_late(),
     };
     let ended = stream.publish(sensor, scans);
     let received = sensor.received();
@@ -90,8 +85,7 @@ pub fn run_sensor(
 }
 
 struct Stream<'a> {
-    feed: Feed<'a, Writer<Scan>>,
-    /// The counts of [`Sensor::received`].
+    feed: Feed<'a, Scan>,
     received: Numbers<9>,
     live: Option<LiveSensors>,
 }
@@ -104,7 +98,7 @@ impl Stream<'_> {
         let (manifest, first) = (&self.feed.launch.manifest, position.published);
         let generation = Generation::begin(manifest, NumberedBy::Source, &newest, first)?;
         while scans.is_none_or(|scans| position.published < scans) {
-            let mut draft = self.feed.outputs.loan()?;
+            let mut draft = self.feed.scans().loan()?;
             let started_ns = self.take(sensor, &mut draft)?;
             self.add_samples(sensor, &mut draft)?;
             let item = &mut draft.header().item;
@@ -116,7 +110,7 @@ impl Stream<'_> {
             // dropped, and no scan without a number.
             self.feed.schedule.has_published(position.published)?;
             self.received.write(sensor.received().to_numbers())?;
-            self.feed.outputs.send(draft, S::HOP)?;
+            self.feed.scans().send(draft, S::HOP)?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.
             self.feed
@@ -153,7 +147,6 @@ impl Stream<'_> {
         }
     }
 
-    /// Waits for the samples of a complete scan, and adds them.
     fn add_samples(
         &mut self,
         sensor: &mut impl Sensor,

@@ -4,7 +4,7 @@ use std::{path::Path, rc::Rc, time::Duration};
 
 use gyre_messages::{
     Correction, Fix, Footprint, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation,
-    Scan, Topic, flag,
+    Scan, flag,
 };
 
 use super::{Run, WINDOW, reader, send, writer};
@@ -15,8 +15,6 @@ use crate::{
     run::{SHARED_MEMORY, own_files},
     transport::Service,
 };
-
-const POSE: Topic = Topic::of::<Pose>();
 
 /// The sequence number of the next message, and the number of missed messages before it.
 fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
@@ -107,16 +105,16 @@ fn observers_leave_the_places_of_the_stages_free() {
     let run = Run::new();
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
     let attached: Vec<_> = (0..WINDOW.observers)
-        .map(|_| observed.try_attach(&POSE).unwrap())
+        .map(|_| observed.try_attach::<Pose>(Pose::ENTRY).unwrap())
         .collect();
-    let one_too_many = observed.try_attach(&POSE).map(drop);
+    let one_too_many = observed.try_attach::<Pose>(Pose::ENTRY).map(drop);
     assert!(matches!(one_too_many, Err(StageError::NoPlace { .. })));
     let readers: Vec<_> = (0..Pose::READERS)
         .map(|_| reader::<Pose>(&run.manifest, None))
         .collect();
     // An observer that leaves makes room at once.
     drop(attached);
-    assert!(observed.try_attach(&POSE).is_ok());
+    assert!(observed.try_attach::<Pose>(Pose::ENTRY).is_ok());
     drop(readers);
 }
 
@@ -132,7 +130,7 @@ fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_resu
     drop(observer);
     drop(observed);
     // A restarted stage opens its topics again.
-    Service::open(&super::node(&later.manifest), &POSE).unwrap();
+    Service::open(&super::node(&later.manifest), Pose::ENTRY).unwrap();
     reader::<Pose>(&later.manifest, None);
 }
 

@@ -11,7 +11,7 @@ use iceoryx2::{
     service::port_factory::event,
 };
 
-use super::{Ipc, Node, Sealed, service_name};
+use super::{Ipc, Node, service_name};
 use crate::StageError;
 
 /// Spare ports of an event: a listener that is killed during its creation can occupy one until the
@@ -29,16 +29,16 @@ pub(crate) fn bind_alone() -> MutexGuard<'static, ()> {
 }
 
 /// An event. It exists as long as a process has it open.
-pub(crate) struct Event(Sealed<event::PortFactory<Ipc>>);
+pub(crate) struct Event(event::PortFactory<Ipc>);
 
 pub struct Listener {
     event: String,
-    port: Sealed<listener::Listener<Ipc>>,
+    port: listener::Listener<Ipc>,
 }
 
 pub(crate) struct Notifier {
     event: String,
-    port: Sealed<notifier::Notifier<Ipc>>,
+    port: notifier::Notifier<Ipc>,
 }
 
 impl Event {
@@ -57,7 +57,7 @@ impl Event {
             .max_nodes(nodes)
             .event_id_max_value(1)
             .create()
-            .map(|event| Self(Sealed::new(event)))
+            .map(Self)
             .map_err(|e| StageError::transport(format!("create the event {name}"), e))
     }
 
@@ -66,7 +66,7 @@ impl Event {
             .service_builder(&service_name(name)?)
             .event()
             .open()
-            .map(|event| Self(Sealed::new(event)))
+            .map(Self)
             .map_err(|e| StageError::transport(format!("open the event {name}"), e))
     }
 }
@@ -79,7 +79,7 @@ impl Listener {
         let port = created.map_err(|e| StageError::transport(format!("listen to {event}"), e))?;
         Ok(Self {
             event: event.to_owned(),
-            port: Sealed::new(port),
+            port,
         })
     }
 
@@ -104,7 +104,7 @@ impl Notifier {
         let port = created.map_err(|e| StageError::transport(format!("notify {event}"), e))?;
         Ok(Self {
             event: event.to_owned(),
-            port: Sealed::new(port),
+            port,
         })
     }
 

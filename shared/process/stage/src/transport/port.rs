@@ -13,18 +13,18 @@ use iceoryx2::{
     sample_mut::SampleMut,
 };
 
-use super::{AnyHeader, AnyPayload, Ipc, Sealed, Service};
+use super::{AnyHeader, AnyPayload, Ipc, Service};
 use crate::StageError;
 
 pub(crate) struct Publisher {
     topic: &'static str,
     header_bytes: usize,
     elements: usize,
-    port: Sealed<publisher::Publisher<Ipc, AnyPayload, AnyHeader>>,
+    port: publisher::Publisher<Ipc, AnyPayload, AnyHeader>,
 }
 
 pub(crate) struct Loan {
-    sample: Sealed<SampleMut<Ipc, AnyPayload, AnyHeader>>,
+    sample: SampleMut<Ipc, AnyPayload, AnyHeader>,
     header_bytes: usize,
 }
 
@@ -51,7 +51,7 @@ impl Publisher {
             topic: topic.name,
             header_bytes: topic.header.bytes,
             elements,
-            port: Sealed::new(port),
+            port,
         })
     }
 
@@ -68,7 +68,7 @@ impl Publisher {
             .map_err(|e| StageError::transport(format!("get memory for {}", self.topic), e))?;
         let mut loan = Loan {
             // SAFETY: any bytes of mapped memory are valid values of bytes.
-            sample: Sealed::new(unsafe { sample.assume_init() }),
+            sample: unsafe { sample.assume_init() },
             header_bytes: self.header_bytes,
         };
         loan.header().fill(0);
@@ -77,7 +77,7 @@ impl Publisher {
 
     /// Publishes a message without copying: readers receive its offset in shared memory.
     pub(crate) fn send(&self, loan: Loan) -> Result<(), StageError> {
-        let sent = loan.sample.into_inner().send();
+        let sent = loan.sample.send();
         sent.map(drop)
             .map_err(|e| StageError::transport(format!("send {}", self.topic), e))
     }
@@ -119,12 +119,12 @@ pub(crate) struct Subscriber {
     topic: &'static str,
     header_bytes: usize,
     is_observer: bool,
-    port: Sealed<subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>>,
+    port: subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>,
 }
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
 pub(crate) struct Sample {
-    sample: Sealed<sample::Sample<Ipc, AnyPayload, AnyHeader>>,
+    sample: sample::Sample<Ipc, AnyPayload, AnyHeader>,
     header_bytes: usize,
 }
 
@@ -144,7 +144,7 @@ impl Subscriber {
             topic,
             header_bytes: service.topic.header.bytes,
             is_observer: observer.is_some(),
-            port: Sealed::new(port),
+            port,
         })
     }
 
@@ -152,7 +152,7 @@ impl Subscriber {
     pub(crate) fn receive(&self) -> Result<Option<Sample>, StageError> {
         match self.port.receive() {
             Ok(sample) => Ok(sample.map(|sample| Sample {
-                sample: Sealed::new(sample),
+                sample,
                 header_bytes: self.header_bytes,
             })),
             // Samples of a dead publisher are still borrowed. The next call succeeds once they are

@@ -10,12 +10,12 @@ use iceoryx2::{
     },
 };
 
-use super::{AnyHeader, AnyPayload, Ipc, Node, Sealed, service_name};
+use super::{AnyHeader, AnyPayload, Ipc, Node, service_name};
 use crate::StageError;
 
 pub struct Service {
     pub(super) topic: Topic,
-    pub(super) factory: Sealed<publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>>,
+    pub(super) factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
 }
 
 impl Service {
@@ -33,7 +33,7 @@ impl Service {
             .map_err(|e| StageError::transport(format!("create the topic {}", topic.name), e))?;
         Ok(Self {
             topic: *topic,
-            factory: Sealed::new(factory),
+            factory,
         })
     }
 
@@ -44,7 +44,7 @@ impl Service {
             .map_err(|e| StageError::transport(format!("open the topic {}", topic.name), e))?;
         Ok(Self {
             topic: *topic,
-            factory: Sealed::new(factory),
+            factory,
         })
     }
 

@@ -1,32 +1,22 @@
 //! A message as a value.
 
 use gyre_messages::{Item, Message};
-
 use gyre_stage::{StageError, source::RecordedMessage};
 
 /// A message outside of shared memory, of any topic of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     /// The bytes of the header, which starts with an [`Item`].
-    header: Vec<u8>,
-    /// The bytes of the payload.
+    pub(super) header: Vec<u8>,
     pub payload: Vec<u8>,
     /// Time of receipt, `CLOCK_MONOTONIC`, ns; 0 for a synthetic message.
     pub received_ns: i64,
 }
 
 impl Recorded {
-    pub fn of<M: Message<Header: Copy>>(
-        header: &M::Header,
-        payload: &[u8],
-        received_ns: i64,
-    ) -> Self {
-        let start = std::ptr::from_ref(header).cast::<u8>();
-        // SAFETY: a header is plain numbers, `repr(C)` and without padding, so all of its bytes are
-        // initialised.
-        let bytes = unsafe { std::slice::from_raw_parts(start, size_of::<M::Header>()) };
+    pub fn of<M: Message>(header: &M::Header, payload: &[u8], received_ns: i64) -> Self {
         Self {
-            header: bytes.to_vec(),
+            header: bytemuck::bytes_of(header).to_vec(),
             payload: payload.to_vec(),
             received_ns,
         }
@@ -41,30 +31,25 @@ impl Recorded {
         }
     }
 
-    pub fn header<M: Message<Header: Copy>>(&self) -> Result<M::Header, StageError> {
-        match self.header.len() == size_of::<M::Header>() {
-            // SAFETY: the bytes are a header of this size, which is plain numbers: any bytes are a
-            // value of it.
-            true => Ok(unsafe { self.header.as_ptr().cast::<M::Header>().read_unaligned() }),
-            false => Err(StageError::Input(format!(
+    pub fn header<M: Message>(&self) -> Result<M::Header, StageError> {
+        bytemuck::try_pod_read_unaligned(&self.header).map_err(|_| {
+            StageError::Input(format!(
                 "a header of {} bytes is none of topic `{}`",
                 self.header.len(),
                 M::TOPIC
-            ))),
-        }
+            ))
+        })
     }
 
     #[must_use]
-    pub fn with<M: Message<Header: Copy>>(&self, header: &M::Header) -> Self {
+    pub fn with<M: Message>(&self, header: &M::Header) -> Self {
         Self::of::<M>(header, &self.payload, self.received_ns)
     }
 
-    /// Returns the bytes of the header.
     pub fn header_bytes(&self) -> &[u8] {
         &self.header
     }
 
-    /// Returns the scan that the message is about.
     pub fn item(&self) -> Item {
         bytemuck::pod_read_unaligned(&self.header[..size_of::<Item>()])
     }
