@@ -11,9 +11,9 @@ use std::{
 use gyre_colossus::{Azimuth, Constants, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, ReadError, check_capacity, turn_ns,
+    OpenError, Properties, ReadError, check_capacity, turn_ns,
 };
-use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::bags::{
@@ -62,17 +62,18 @@ fn open_files(
     Ok(Box::new(Scans::open(path, files, options)?))
 }
 
+const MEANING: &str = "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
+                       is the middle of its first and last.";
+
 struct Scans {
     path: PathBuf,
+    properties: Properties,
     bag: Bag,
     topics: Topics,
     described: Described,
     constants: Constants,
     index: Index,
     files: FileList,
-    period_ns: i64,
-    notes: Vec<String>,
-    damage: Option<String>,
     /// The spans that were read last, and their messages of scans.
     kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
 }
@@ -97,10 +98,19 @@ impl Scans {
         let mut notes = vec![format!("Scans are on {}{source}.", topics.scans.name)];
         notes.extend(index.notes());
         notes.extend(damages.iter().map(|sentence| format!("{sentence}.")));
+        let size = ImageSize {
+            width: usize::from(described.radar.range_in_bins),
+            height: usize::from(described.radar.azimuth_samples),
+        };
         Ok(Self {
-            damage: damages.into_iter().next(),
-            period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
-            notes,
+            properties: Properties {
+                limits: index.limits,
+                period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
+                encoder_counts: Some(described.radar.encoder_size),
+                notes,
+                damage: damages.into_iter().next(),
+                ..Properties::of(Format::Ros2Bag, index.entries.len(), size, MEANING)
+            },
             files: bag.files.iter().map(|file| file.path.clone()).collect(),
             path: path.to_owned(),
             bag,
@@ -187,23 +197,8 @@ fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
 }
 
 impl Dataset for Scans {
-    fn format(&self) -> Format {
-        Format::Ros2Bag
-    }
-
-    fn len(&self) -> usize {
-        self.index.entries.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        self.index.limits
-    }
-
-    fn image_size(&self) -> ImageSize {
-        ImageSize {
-            width: usize::from(self.described.radar.range_in_bins),
-            height: usize::from(self.described.radar.azimuth_samples),
-        }
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn files(&self) -> &FileList {
@@ -220,29 +215,8 @@ impl Dataset for Scans {
         Some(self.index.entries.get(index)?.stamp_ns)
     }
 
-    fn period_ns(&self) -> i64 {
-        self.period_ns
-    }
-
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         Some(self.index.entries.get(index)?.logged_ns)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
-         is the middle of its first and last."
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        Some(self.described.radar.encoder_size)
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn damage(&self) -> Option<&str> {
-        self.damage.as_deref()
     }
 
     fn logged(
