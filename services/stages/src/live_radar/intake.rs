@@ -2,7 +2,8 @@
 
 use std::{fmt::Display, time::Duration};
 
-use gyre_colossus::{Azimuth, BadConfiguration, Configuration, Constants};
+use gyre_colossus::{Azimuth, BadConfiguration, Configuration};
+use gyre_datasets::DatasetOptions;
 use gyre_messages::ScanHeader;
 use gyre_stage::source::Received;
 use thiserror::Error;
@@ -11,7 +12,7 @@ use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
 /// Assembles the scans of a live source, and counts losses.
 pub struct Intake {
-    constants: Constants,
+    constants: DatasetOptions,
     /// `None` until the radar has sent its configuration.
     scans: Option<ScanAssembly>,
     turns: TurnCounter,
@@ -32,7 +33,7 @@ pub enum NoScans {
 }
 
 impl Intake {
-    pub fn new(constants: Constants) -> Self {
+    pub fn new(constants: DatasetOptions) -> Self {
         Self {
             constants,
             scans: None,

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_colossus::{Azimuth, Constants, SweepAssembler};
+use gyre_colossus::{Azimuth, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     OpenError, Properties, ReadError, check_capacity, turn_ns,
@@ -71,7 +71,7 @@ struct Scans {
     bag: Bag,
     topics: Topics,
     described: Described,
-    constants: Constants,
+    options: DatasetOptions,
     index: Index,
     files: FileList,
     /// The spans that were read last, and their messages of scans.
@@ -84,8 +84,7 @@ impl Scans {
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
         let (described, source) = bag.describe(&topics, options)?;
-        let constants = Constants::from(options);
-        let assembler = SweepAssembler::new(&described.radar, constants).map_err(|error| {
+        let assembler = SweepAssembler::new(&described.radar, *options).map_err(|error| {
             RecordingError::unreadable(path, format_args!("cannot be read: {error}"))
         })?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
@@ -116,7 +115,7 @@ impl Scans {
             bag,
             topics,
             described,
-            constants,
+            options: *options,
             index,
             kept: (None, BTreeMap::new()),
         })
@@ -152,7 +151,7 @@ impl Scans {
         entry: &Entry,
         mut slot: ScanSlot<'_>,
     ) -> Result<Option<SweepGeometry>, RecordingError> {
-        let assembler = SweepAssembler::new(&self.described.radar, self.constants);
+        let assembler = SweepAssembler::new(&self.described.radar, self.options);
         let Ok(mut assembler) = assembler else {
             return Ok(None);
         };
