@@ -183,7 +183,10 @@ impl Dataset for Scans {
         }
         let path = self.file(index).to_owned();
         let Some(entry) = self.entries.get(&index) else {
-            return Err(ReadError::NotRecorded { path, index });
+            return Err(ReadError::Scan(format!(
+                "{} has no scan {index}: the run did not read it, or the recorder missed it",
+                path.display()
+            )));
         };
         let stored = self
             .recording

@@ -239,11 +239,10 @@ impl Dataset for Scans {
         let failed = |error: RecordingError| error.of_scan(&path);
         if entry.is_damaged {
             let reason = self.why_damaged(&entry).map_err(failed)?;
-            return Err(ReadError::Message {
-                path,
-                index,
-                reason,
-            });
+            return Err(ReadError::Scan(format!(
+                "the message of scan {index} in {} cannot be decoded: {reason}",
+                path.display()
+            )));
         }
         let assembled = self.assemble(index, &entry, slot).map_err(failed)?;
         assembled.ok_or_else(|| ReadError::Damaged {
