@@ -34,7 +34,6 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 /// The longest sentence, bytes. Paths of temporary files are part of it.
 const LONGEST_SENTENCE: usize = 1000;
 
-/// A target that is being fuzzed.
 pub struct Target {
     limit_bytes: usize,
     _alone: MutexGuard<'static, ()>,
@@ -49,7 +48,6 @@ impl Target {
         }
     }
 
-    /// Executes one input.
     pub fn run<E: Display>(&self, execute: impl FnOnce() -> Result<(), E>) {
         let before = MEMORY.current_usage();
         MEMORY.reset_peak_usage();
@@ -63,7 +61,6 @@ impl Target {
     }
 }
 
-/// Any error.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// Asserts that an error is one sentence for a person: one line that is not too long, without the

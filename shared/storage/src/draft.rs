@@ -56,7 +56,6 @@ impl Draft {
         &self.path
     }
 
-    /// Adds text or bytes at the end.
     pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
         self.buffer.extend_from_slice(bytes.as_ref());
         match self.buffer.len() >= BUFFER {

@@ -44,7 +44,6 @@ pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{Log, LogError, LogMagic, LogReader};
 pub use quoted::quoted;
 
-/// A file or folder that cannot be read or written.
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct StorageError {
@@ -55,7 +54,6 @@ pub struct StorageError {
 }
 
 impl StorageError {
-    /// Adds operation and path to a system error.
     pub fn at(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self {
             action,

@@ -135,12 +135,10 @@ impl Log {
         Ok(self.file.sync.finish()?)
     }
 
-    /// Reads a record, which replaces the content of `bytes`.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
     }
 
-    /// Returns the error for a record that its reader cannot decode.
     pub fn malformed(&self, index: usize) -> LogError {
         self.records.malformed(index)
     }

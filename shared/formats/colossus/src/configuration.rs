@@ -13,7 +13,6 @@ pub(crate) const CONFIGURATION_BYTES: usize = 20;
 /// The protobuf's field of the range resolution, a float.
 pub(crate) const RESOLUTION_FIELD: u64 = 10;
 
-/// The radar's description of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Configuration {
     /// Azimuths per turn.
@@ -56,7 +55,6 @@ impl Configuration {
         exact.unwrap_or((f64::from(self.bin_size) / 1e4) as f32)
     }
 
-    /// Returns the duration of a turn, ns.
     pub fn period_ns(&self) -> i64 {
         let mhz = i64::from(self.rotation_mhz.max(1));
         (1_000_000_000_000 + mhz / 2) / mhz
@@ -67,7 +65,6 @@ impl Configuration {
         f64::from(self.encoder_size.max(1)) / f64::from(self.azimuth_samples.max(1))
     }
 
-    /// Returns the time per encoder count, ns.
     pub(crate) fn ns_per_count(&self) -> f64 {
         self.period_ns() as f64 / f64::from(self.encoder_size.max(1))
     }

@@ -12,7 +12,6 @@ pub const MAX_SPACE_BYTES: usize = 1 << 16;
 pub const MAX_BUFFER_BYTES: usize =
     SIGNATURE.len() + HEADER_BYTES + MAX_PAYLOAD_BYTES + MAX_SPACE_BYTES;
 
-/// One element of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
     Message(Message<'a>),
@@ -23,7 +22,6 @@ pub enum Event<'a> {
     },
 }
 
-/// A fault of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Damage {
     #[error("the bytes do not start with Colossus' signature")]
@@ -61,7 +59,6 @@ pub struct Parser {
 }
 
 impl Parser {
-    /// Returns a parser at the start of a stream.
     pub fn new() -> Self {
         Self::default()
     }

@@ -18,10 +18,8 @@ pub use counters::Counters;
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
 
-/// A scan that has been written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
     /// Azimuths that did not arrive. Their powers are 0, and their flag is not `MEASURED`.
     pub missing: usize,
@@ -84,12 +82,10 @@ impl SweepAssembler {
         })
     }
 
-    /// Returns the memory that a scan needs.
     pub fn limits(&self) -> ScanLimits {
         self.rows.limits
     }
 
-    /// Returns the losses, drops and changes so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }

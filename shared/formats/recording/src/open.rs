@@ -71,7 +71,6 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     }
 }
 
-/// Opens a recording of a run with all its parts.
 pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
     recording_of(&parts(root), root)
 }

@@ -94,7 +94,6 @@ impl SplitWriter {
         Ok(())
     }
 
-    /// Counts messages that were missed, without one after them.
     pub fn missed(&mut self, topic: &str, missed: u64) {
         self.writer.missed(topic, missed);
     }

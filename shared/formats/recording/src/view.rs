@@ -50,7 +50,6 @@ pub const LOG: &str = "/log";
 pub const TRAJECTORY: &str = "/trajectory";
 pub const POINTS: &str = "/points";
 
-/// A line of the log of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogLine {
     /// When it was written, ns since 1970 on the clock of the machine.
@@ -61,7 +60,6 @@ pub struct LogLine {
     pub message: String,
 }
 
-/// An encoded message for viewers.
 #[derive(Clone, Debug)]
 pub struct View {
     pub channel: &'static str,
@@ -70,7 +68,6 @@ pub struct View {
     pub data: Vec<u8>,
 }
 
-/// A channel that viewers know.
 pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
@@ -328,7 +325,6 @@ fn object_colour(object: &ListedObject, a: f64) -> Color {
     Color { r, g, b, a }
 }
 
-/// The place of an object at a height, m.
 fn lifted(object: &ListedObject, yaw_rad: f64, height_m: f64) -> Option<Pose> {
     let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
     pose.position.as_mut()?.z = height_m;

@@ -38,7 +38,6 @@ const PROTOBUF: &str = "protobuf";
 const HEALTH: &str = "/health";
 const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 
-/// A wire message to record.
 #[derive(Clone, Debug)]
 pub struct Incoming {
     pub topic: &'static str,

@@ -83,7 +83,6 @@ struct Layout {
     count: usize,
 }
 
-/// Returns the path of the checkpoint of the run that writes to `out`.
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("refinement.map")
 }

@@ -40,7 +40,6 @@ pub struct Journal {
     buffer: [u8; RECORD],
 }
 
-/// Returns the path of the journal of the run that writes to `out`.
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("poses.journal")
 }

@@ -7,7 +7,6 @@ use crate::configuration::Configuration;
 use crate::message::Message;
 use crate::parser::Event;
 
-/// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
 /// The largest step of the number of a message: a larger step means that the radar has restarted.
 const MAX_STEP: i32 = 1 << 16;
@@ -65,7 +64,6 @@ impl Datagrams {
         &mut self.buffer
     }
 
-    /// Marks the first `bytes` of the space as a datagram.
     pub fn filled(&mut self, bytes: usize) {
         self.filled = bytes.min(MAX_BYTES);
     }

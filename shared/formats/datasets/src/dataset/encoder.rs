@@ -8,12 +8,10 @@ use gyre_radar::median;
 const STEP_TOLERANCE: f64 = 0.25;
 /// Azimuths that can be missing at the seam, as a share of those that are there.
 const MISSING_SHARE: f64 = 0.05;
-/// Minimum number of azimuths that show the size of an encoder.
 const MIN_AZIMUTHS: usize = 8;
 /// Times that the azimuths of a turn take, turns. A sector that is blanked over the encoder's zero
 /// makes a turn look like one of a smaller encoder, but shorter by as much.
 const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
-/// Number of turns that show the size of an encoder.
 pub const FIRST_TURNS: usize = 8;
 
 /// The encoder counts of the azimuths of a turn, which may begin anywhere, and the time that the
@@ -27,13 +25,11 @@ pub struct EncoderTurn {
 }
 
 impl EncoderTurn {
-    /// Returns the turn of azimuths with these counts and times, where they have one.
     pub fn new(counts: Vec<u16>, time_ns: impl Fn(usize) -> Option<i64>) -> Self {
         let turn_ns = turn_ns(&counts, time_ns);
         Self { counts, turn_ns }
     }
 
-    /// Returns the duration of the turn by the times of its azimuths, ns.
     pub(crate) fn turn_ns(&self) -> Option<i64> {
         self.turn_ns
     }
@@ -92,7 +88,6 @@ impl EncoderStep {
         u16::try_from(self.span + u32::from(self.step)).ok()
     }
 
-    /// Returns the counts over the seam, for an encoder of `counts` per turn.
     pub(crate) fn seam(self, counts: u16) -> Option<u32> {
         u32::from(counts).checked_sub(self.span)
     }

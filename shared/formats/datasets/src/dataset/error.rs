@@ -8,7 +8,6 @@ use std::{
 
 use super::format::Format;
 
-/// A dataset that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// An option that is out of bounds, or does not apply to the format.
@@ -53,7 +52,6 @@ impl OpenError {
     }
 }
 
-/// A scan that cannot be read. Other scans may be readable.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     #[error("scan {index} does not exist: the dataset has {len} scans")]

@@ -11,7 +11,6 @@ use super::error::OpenError;
 use super::file_list::FileList;
 use super::stamp;
 
-/// Files that are named at most where several are left out.
 const MAX_NAMED: usize = 4;
 
 #[derive(Debug, Default)]
@@ -166,7 +165,6 @@ pub(crate) fn has_png(folder: &Path) -> bool {
     names.any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
 }
 
-/// Returns the name of an entry if it is a PNG file, or a link to one.
 fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
     let name = entry.file_name();
     let extension = Path::new(&name).extension();

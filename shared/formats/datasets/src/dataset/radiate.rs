@@ -21,7 +21,6 @@ use gyre_storage::quoted;
 
 /// The largest list of stamps: months of scans.
 const MAX_LIST_BYTES: u64 = 1 << 30;
-/// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
 /// Bounds of the period, ns: the radar turns four times per second.
 const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;

@@ -27,12 +27,10 @@ impl StaleRows {
         }
     }
 
-    /// Returns whether the rows belong to an image.
     pub fn has(&self, index: usize) -> bool {
         self.of == Some(index)
     }
 
-    /// Keeps an image.
     pub fn remember(&mut self, index: usize, image: &[u8]) {
         self.of = Some(index);
         self.rows.clear();

@@ -17,9 +17,7 @@ const AFTERWARDS: usize = 5;
 
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Timing {
-    /// Time of the first scan, ns since 1970.
     pub first_ns: i64,
-    /// Time of the last scan, ns since 1970.
     pub last_ns: i64,
     /// Median time between scans, s; 0 for a single scan.
     period_s: f64,
@@ -46,7 +44,6 @@ pub(super) struct Gap {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Stall {
     scan: usize,
-    /// Delay of its stamp, s.
     delay_s: f64,
 }
 

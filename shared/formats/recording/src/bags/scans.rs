@@ -134,7 +134,6 @@ impl Scans {
         Ok(())
     }
 
-    /// Returns why the message of a scan cannot be decoded.
     fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
         self.keep(&entry.spans)?;
         let message = self.kept.1.get(&entry.start.message);
@@ -144,7 +143,6 @@ impl Scans {
         Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
     }
 
-    /// Assembles a scan from the azimuths from its entry's start on.
     fn assemble(
         &mut self,
         index: usize,

@@ -206,8 +206,8 @@ pub(super) fn encode_state(
     Checksum::First.seal(slot);
 }
 
-/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
-/// first.
+/// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong. Puts
+/// its keyframes into `keyframes`, oldest first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,
