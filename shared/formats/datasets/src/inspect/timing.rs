@@ -180,19 +180,6 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_counted_and_no_stall() {
-        let mut stamps = uniform(20);
-        stamps.drain(7..10);
-        let report = times(&stamps, &stamps).unwrap();
-        let [gap] = &report.gaps[..] else {
-            panic!("{report:?}");
-        };
-        assert_eq!((gap.scan, gap.missing, gap.seconds), (7, 3, 1.0));
-        assert_eq!((report.missing_scans, report.stalls.len()), (3, 0));
-        assert!((report.period_s - 0.25).abs() < 1e-9 && report.jitter_s < 1e-9);
-    }
-
-    #[test]
     fn a_stall_with_catching_up_is_not_a_gap() {
         let mut logged = uniform(30);
         for (k, late) in [900, 700, 500, 300, 100].into_iter().enumerate() {
