@@ -1,18 +1,10 @@
-//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target; each generates edits of
-//! small valid inputs and asserts of every input that
-//!
-//! - nothing panics,
-//! - memory stays within the target's limit,
-//! - each rejection is one sentence.
+//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target: of each edit of a small
+//! valid input it asserts that nothing panics, that memory stays within the target's limit, and
+//! that a rejection is one sentence.
 //!
 //! `cargo test` runs each target for a second. For longer, by name, one at a time:
-//!
-//! ```sh
-//! BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels
-//! ```
-//!
-//! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate
-//! that was at fault.
+//! `BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels`.
+//! A failure prints the edits, shrunk, and the seed that repeats it.
 
 pub mod edit;
 pub mod recording;

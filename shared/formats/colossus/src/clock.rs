@@ -122,10 +122,9 @@ impl fmt::Display for FoundClock {
 
 /// Gives each azimuth its time. One clock per connection.
 ///
-/// The first azimuth does not determine the format of its time: there are two byte orders, and a
-/// fraction below 1,000,000 may have either unit. The difference of two azimuths does, because the
-/// configuration gives the time that the radar takes to turn from one to the other. So the first
-/// azimuth is held back until the second, and no azimuth is lost or has a wrong time.
+/// One azimuth does not determine the byte order and the unit of its time. The difference of two
+/// does, because the configuration gives the time of the turn from one to the other. So the first
+/// azimuth is held back until the second.
 #[derive(Clone, Debug)]
 pub struct RadarClock {
     encoder_size: i32,

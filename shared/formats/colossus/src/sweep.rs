@@ -112,10 +112,8 @@ impl SweepAssembler {
     /// sweep completes one that has lost its last azimuths; it is kept, and written at the next
     /// call.
     ///
-    /// `slot` is the same memory until a sweep is returned, whose scan it then is.
-    ///
-    /// # Panics
-    /// If `slot` is smaller than [`SweepAssembler::limits`].
+    /// `slot` is the same memory, of [`SweepAssembler::limits`], until a sweep is returned, whose
+    /// scan it then is.
     pub fn add(
         &mut self,
         azimuth: &Azimuth<'_>,

@@ -1,18 +1,9 @@
-//! Messages as viewers draw them, in Foxglove's schemas.
+//! Messages as viewers draw them, in Foxglove's schemas: see [`CHANNELS`].
 //!
-//! | channel | schema | content |
-//! |---|---|---|
-//! | `/scan`, `/masked` | `RawImage` | the image of the message: [`image`](crate::image) |
-//! | `/points` | `PointCloud` | the points of a masked scan, motion-compensated, in its frame. Not recorded: they are in the wire message |
-//! | `/rotation`, `/motion`, `/refined` | `PoseInFrame` | the motion, in the frame of the scan before |
-//! | `/pose` | `PoseInFrame` | the pose in the frame of the first scan, `odometry` |
-//! | `/trajectory` | `PosesInFrame` | the last poses (in a recording), once a second of the sensor's time |
-//! | `/tf` | `FrameTransform` | `odometry` to `radar` |
-//! | `/correction` | `FrameTransform` | `map` to `odometry`: later than the poses, so on a channel of its own, which is in order |
-//! | `/loop` | `PoseInFrame` | the later keyframe in the frame of the earlier one |
-//! | `/fix` | `PoseInFrame` | a keyframe in the map of the earlier drive |
-//! | `/objects` | `SceneUpdate` | a box for each moving object, with its velocity as an arrow of a second's length and its identity |
-//! | `/log` | `Log` | a line of `log.jsonl` |
+//! Motions are in the frame of the scan before, poses and objects in that of the first scan, loops
+//! in that of the earlier keyframe, fixes in the map of the earlier drive. `/points` is not
+//! recorded: the wire message has them. `/correction` is later than the poses, so it is on a
+//! channel of its own beside `/tf`, which is in order.
 
 use std::collections::VecDeque;
 
