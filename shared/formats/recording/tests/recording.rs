@@ -209,7 +209,7 @@ fn a_part_is_as_long_as_it_is_to_be_although_poses_lag_behind_the_scans() {
         }
         writer.add(&scan(seq)).unwrap();
     }
-    writer.finish().unwrap();
+    writer.file.finish().unwrap();
     // Of three or four scans.
     assert_eq!(gyre_recording::parts(&to).len(), 4);
 }
