@@ -1,7 +1,5 @@
 //! The radar's description of itself: 20 bytes, then a protobuf.
 
-use std::ops::RangeInclusive;
-
 use gyre_radar::MAX_AZIMUTHS;
 use thiserror::Error;
 
@@ -37,14 +35,8 @@ pub struct Configuration {
 
 /// A configuration that no radar has.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error(
-    "the radar's configuration gives {what} as {value}, expected {} to {}", bounds.start(), bounds.end()
-)]
-pub struct BadConfiguration {
-    pub what: &'static str,
-    pub value: f64,
-    pub bounds: RangeInclusive<f64>,
-}
+#[error("the radar's configuration gives {0}")]
+pub struct BadConfiguration(String);
 
 impl Configuration {
     /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one,
@@ -87,11 +79,11 @@ impl Configuration {
         let mut checks = checks.into_iter();
         match checks.find(|(_, value, bounds)| !bounds.contains(value)) {
             None => Ok(()),
-            Some((what, value, bounds)) => Err(BadConfiguration {
-                what,
-                value,
-                bounds,
-            }),
+            Some((what, value, bounds)) => {
+                let (least, most) = (bounds.start(), bounds.end());
+                let wrong = format!("{what} as {value}, expected {least} to {most}");
+                Err(BadConfiguration(wrong))
+            }
         }
     }
 }
