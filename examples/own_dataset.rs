@@ -8,11 +8,11 @@
 use std::{env, error::Error, f32::consts::TAU, fs, io, path::Path};
 
 use gyre_datasets::{
-    Dataset, DatasetOptions, FileList, Format, ImageSize, InspectedLogs, ReadError,
-    inspect_dataset, turn_ns, write_tum,
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, InspectedLogs,
+    Properties, ReadError, inspect_dataset, turn_ns, write_tum,
 };
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
+use gyre_radar::{OwnedScan, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
 
 const SIZE: ImageSize = ImageSize {
     width: 576,
@@ -22,6 +22,7 @@ const BIN_M: f32 = 100.0 / 576.0;
 
 /// A folder of sweeps.
 pub(crate) struct RawSweeps {
+    properties: Properties,
     files: FileList,
     stamp_ns: Vec<i64>,
 }
@@ -39,29 +40,21 @@ impl RawSweeps {
         }
         found.sort();
         let (stamp_ns, files): (Vec<i64>, Vec<_>) = found.into_iter().unzip();
-        let files = files.into_iter().collect();
-        Ok(Self { files, stamp_ns })
+        let meaning = "the file name is the time of the middle of the sweep";
+        Ok(Self {
+            properties: Properties {
+                period_ns: turn_ns(stamp_ns.iter().copied()).unwrap_or(DEFAULT_TURN_NS),
+                ..Properties::of(Format::Other, files.len(), SIZE, meaning)
+            },
+            files: files.into_iter().collect(),
+            stamp_ns,
+        })
     }
 }
 
 impl Dataset for RawSweeps {
-    fn format(&self) -> Format {
-        Format::Other
-    }
-
-    fn len(&self) -> usize {
-        self.files.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        ScanLimits {
-            bytes: SIZE.bytes(),
-            azimuths: SIZE.height,
-        }
-    }
-
-    fn image_size(&self) -> ImageSize {
-        SIZE
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn files(&self) -> &FileList {
@@ -70,14 +63,6 @@ impl Dataset for RawSweeps {
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
         self.stamp_ns.get(index).copied()
-    }
-
-    fn period_ns(&self) -> i64 {
-        turn_ns(self.stamp_ns.iter().copied()).unwrap_or(gyre_datasets::DEFAULT_TURN_NS)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        "the file name is the time of the middle of the sweep"
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -6,7 +6,6 @@ use bolero::TypeGenerator;
 #[derive(Clone, Debug, TypeGenerator)]
 pub enum ByteEdit {
     Set(u32, u8),
-    /// Flips a bit.
     Flip(u32, u8),
     /// Replaces eight bytes by a number.
     Word(u32, Number),
@@ -21,7 +20,6 @@ pub enum ByteEdit {
 /// A number that often reveals faults of programs.
 #[derive(Clone, Copy, Debug, TypeGenerator)]
 pub enum Number {
-    /// Any bits.
     Any(u64),
     /// A small number, or a small negative one.
     Small(i8),
@@ -50,7 +48,6 @@ impl Number {
         }
     }
 
-    /// A floating-point number.
     pub fn f64(self) -> f64 {
         match self {
             Self::Any(_) | Self::Float(_) => f64::from_bits(self.bits()),
@@ -107,7 +104,6 @@ pub enum TextEdit {
     Line(u16, u8),
     RemoveLine(u16),
     RepeatLine(u16),
-    /// Swaps two lines.
     SwapLines(u16, u16),
     /// Edits the bytes; invalid UTF-8 is then replaced.
     Bytes(ByteEdit),

@@ -1,18 +1,10 @@
-//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target; each generates edits of
-//! small valid inputs and asserts of every input that
-//!
-//! - nothing panics,
-//! - memory stays within the target's limit,
-//! - each rejection is one sentence.
+//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target: of each edit of a small
+//! valid input it asserts that nothing panics, that memory stays within the target's limit, and
+//! that a rejection is one sentence.
 //!
 //! `cargo test` runs each target for a second. For longer, by name, one at a time:
-//!
-//! ```sh
-//! BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels
-//! ```
-//!
-//! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate
-//! that was at fault.
+//! `BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels`.
+//! A failure prints the edits, shrunk, and the seed that repeats it.
 
 pub mod edit;
 pub mod recording;
@@ -34,7 +26,6 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 /// The longest sentence, bytes. Paths of temporary files are part of it.
 const LONGEST_SENTENCE: usize = 1000;
 
-/// A target that is being fuzzed.
 pub struct Target {
     limit_bytes: usize,
     _alone: MutexGuard<'static, ()>,
@@ -49,7 +40,6 @@ impl Target {
         }
     }
 
-    /// Executes one input.
     pub fn run<E: Display>(&self, execute: impl FnOnce() -> Result<(), E>) {
         let before = MEMORY.current_usage();
         MEMORY.reset_peak_usage();
@@ -63,7 +53,6 @@ impl Target {
     }
 }
 
-/// Any error.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// Asserts that an error is one sentence for a person: one line that is not too long, without the

@@ -13,7 +13,6 @@ const METADATA: usize = 11;
 const START_US: i64 = 1_547_131_046_000_000;
 const PERIOD_US: i64 = 250_000;
 
-/// A grey image.
 pub struct Image {
     /// The name of the file, relative to the recording.
     pub name: String,
@@ -23,7 +22,6 @@ pub struct Image {
     pub pixels: Vec<u8>,
 }
 
-/// A recording of a few scans.
 pub struct Recording {
     pub format: Format,
     pub images: Vec<Image>,
@@ -87,7 +85,6 @@ impl Recording {
 }
 
 impl Image {
-    /// The image as a file.
     pub fn png(&self) -> Vec<u8> {
         let mut file = Vec::new();
         let height = self.pixels.len() / self.width;

@@ -165,8 +165,6 @@ enum BagEdit {
     File(Vec<ByteEdit>),
     /// The bytes of a message.
     Message(u8, Vec<ByteEdit>),
-    /// The file ends early.
-    Cut(u16),
     /// A message is missing.
     Lost(u8),
     /// The times of receipt from a message on, shifted.
@@ -188,10 +186,8 @@ fn bags() {
             write(&path, &messages, *chunks);
             let mut file = fs::read(&path).unwrap();
             for edit in edits {
-                match edit {
-                    BagEdit::File(edits) => edit_bytes(&mut file, edits),
-                    BagEdit::Cut(at) => file.truncate(usize::from(*at)),
-                    _ => {}
+                if let BagEdit::File(edits) = edit {
+                    edit_bytes(&mut file, edits);
                 }
             }
             fs::write(&path, file).unwrap();
@@ -215,7 +211,7 @@ fn edit_messages(messages: &mut Vec<Message>, edit: &BagEdit) {
             let later = messages[usize::from(*index) % count..].iter_mut();
             later.for_each(|message| message.log_ns = message.log_ns.wrapping_add(*by));
         }
-        BagEdit::File(_) | BagEdit::Cut(_) => {}
+        BagEdit::File(_) => {}
     }
 }
 

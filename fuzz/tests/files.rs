@@ -37,12 +37,8 @@ pub fn edited(file: &[u8], edits: &[Edit], word: impl Fn(&mut [u8], usize, usize
         match edit {
             Edit::Bytes(edit) => edit_bytes(&mut bytes, std::slice::from_ref(edit)),
             Edit::Word(index, at, number) => {
-                word(
-                    &mut bytes,
-                    usize::from(*index),
-                    usize::from(*at),
-                    number.bits(),
-                );
+                let (index, at) = (usize::from(*index), usize::from(*at));
+                word(&mut bytes, index, at, number.bits());
             }
         }
     }

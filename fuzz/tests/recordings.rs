@@ -125,9 +125,7 @@ enum FileEdit {
     Bytes(Vec<ByteEdit>),
     /// Edits of the bytes, and of the checksums of all chunks that are still there.
     Checked(Vec<ByteEdit>),
-    Width(u32),
-    Height(u32),
-    /// Bit depth, colour, compression, filter, interlace.
+    /// A byte of the width, the height, the bit depth, and of what follows them.
     Header(u8, u8),
     /// A chunk of this name and length before the image data; its content is shorter.
     Chunk([u8; 4], u32, u8),
@@ -137,9 +135,7 @@ fn edit_file(file: &mut Vec<u8>, edit: &FileEdit) {
     match edit {
         FileEdit::Bytes(edits) => return edit_bytes(file, edits),
         FileEdit::Checked(edits) => edit_bytes(file, edits),
-        FileEdit::Width(width) => set(file, 16, &width.to_be_bytes()),
-        FileEdit::Height(height) => set(file, 20, &height.to_be_bytes()),
-        FileEdit::Header(at, value) => set(file, 24 + usize::from(at % 5), &[*value]),
+        FileEdit::Header(at, value) => set(file, 16 + usize::from(at % 13), &[*value]),
         FileEdit::Chunk(name, length, content) if file.len() > 33 => {
             let content = vec![7; usize::from(*content) + 4];
             let chunk = [&length.to_be_bytes()[..], name, &content].concat();

@@ -1,8 +1,8 @@
-//! Recordings of runs: MCAP files whose bytes are edited, or that end early.
+//! Recordings of runs: MCAP files whose bytes are edited.
 
 use std::{fs, path::Path, slice};
 
-use bolero::{TypeGenerator, check};
+use bolero::check;
 use bytemuck::{Zeroable, bytes_of};
 use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
@@ -93,38 +93,18 @@ fn use_run(path: &Path) -> Result<(), Failure> {
     refused.map_or(Ok(()), |error| Err(error.into()))
 }
 
-#[derive(Clone, Debug, TypeGenerator)]
-enum RunEdit {
-    Bytes(Vec<ByteEdit>),
-    /// The file ends early.
-    Cut(u16),
-}
-
 #[test]
 fn runs() {
-    let target = Target::new(320);
-    let recording = recording();
-    check!().with_type::<Vec<RunEdit>>().for_each(|edits| {
-        let folder = folder();
-        let path = folder.path().join("run.mcap");
-        let mut file = recording.clone();
-        for edit in edits {
-            match edit {
-                RunEdit::Bytes(edits) => edit_bytes(&mut file, edits),
-                RunEdit::Cut(at) => file.truncate(usize::from(*at)),
-            }
-        }
-        fs::write(&path, file).unwrap();
-        target.run(|| use_run(&path));
-    });
-}
-
-#[test]
-fn a_run_without_edits_is_accepted() {
-    let folder = folder();
+    let (target, folder, recording) = (Target::new(320), folder(), recording());
     let path = folder.path().join("run.mcap");
-    fs::write(&path, recording()).unwrap();
+    fs::write(&path, &recording).unwrap();
     use_run(&path).unwrap();
     let dataset = gyre_recording::open(&path, &DatasetOptions::default()).unwrap();
     assert_eq!(dataset.len(), SCANS as usize);
+    check!().with_type::<Vec<ByteEdit>>().for_each(|edits| {
+        let mut file = recording.clone();
+        edit_bytes(&mut file, edits);
+        fs::write(&path, file).unwrap();
+        target.run(|| use_run(&path));
+    });
 }

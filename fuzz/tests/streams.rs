@@ -2,10 +2,11 @@
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{
-    Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Constants, Damage, Datagrams,
-    Event, Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
+    Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Damage, Datagrams, Event,
+    Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
     write_configuration, write_keep_alive, write_other,
 };
+use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
@@ -138,7 +139,7 @@ struct Client {
 
 impl Client {
     fn new(configuration: &Configuration) -> Result<Option<Self>, BadConfiguration> {
-        let assembler = SweepAssembler::new(configuration, Constants::default())?;
+        let assembler = SweepAssembler::new(configuration, DatasetOptions::default())?;
         let limits = assembler.limits();
         Ok((limits.bytes <= LARGEST_BYTES).then(|| Self {
             clock: RadarClock::new(configuration),

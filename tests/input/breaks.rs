@@ -22,25 +22,6 @@ fn run_of(recording: &Path) -> Run {
     Run::small().data(recording)
 }
 
-/// The reasons are tested where images are read: here, that a scan with wrong times alone is left
-/// out, in real time too.
-#[test]
-fn a_scan_with_a_row_that_is_a_year_ahead_is_skipped() {
-    let recording = recording::copy(16);
-    recording::restamp(&recording::images(recording.path())[9], |row, us| {
-        us + if row == 200 { YEAR_US } else { 0 }
-    });
-    let run = run_of(recording.path()).rate(MODERATE);
-    run.complete();
-    let summary = run.summary();
-    for (key, count) in [("published", 15), ("unreadable", 1), ("breaks", 0)] {
-        assert_eq!(summary[key], count, "{key}");
-    }
-    odometry::assert_unbroken(&odometry::rows(&run.odometry()));
-    let log = run.result("log.jsonl");
-    assert!(log.contains("row 200: stamp is 31536000"), "{log}");
-}
-
 /// A recording with a gap of a year before scan [`BREAK`].
 pub fn with_a_gap() -> PathBuf {
     recording::damaged("gap", |images| {

@@ -107,7 +107,7 @@ fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
 }
 
 #[test]
-fn an_image_that_cannot_be_read_is_skipped_wherever_it_is() {
+fn a_scan_that_cannot_be_used_is_skipped_wherever_it_is() {
     for bad in [0, 4, 7] {
         let truncate = |image: &Path| recording::truncate(image, 100_000);
         skips(bad, "truncated", truncate);
@@ -115,6 +115,13 @@ fn an_image_that_cannot_be_read_is_skipped_wherever_it_is() {
     // An image of another size.
     skips(4, "most images of the dataset are", |image| {
         recording::resize(image, 1000, 400)
+    });
+    // A row that is a year ahead.
+    skips(4, "row 200: stamp is 31536000", |image| {
+        recording::restamp(image, |row, us| match row {
+            200 => us + 31_536_000_000_000,
+            _ => us,
+        })
     });
 }
 

@@ -12,7 +12,7 @@ mod turn_counter;
 
 use std::time::Duration;
 
-use gyre_colossus::{Address, BadAddress, Constants};
+use gyre_colossus::{Address, BadAddress};
 use gyre_datasets::DatasetOptions;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
@@ -41,7 +41,7 @@ pub struct Settings {
     /// Time without an azimuth after which the run reconnects.
     pub silence: Duration,
     pub scans: Option<u64>,
-    pub constants: Constants,
+    pub constants: DatasetOptions,
 }
 
 impl Settings {
@@ -53,7 +53,7 @@ impl Settings {
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
-            constants: options.into(),
+            constants: *options,
         })
     }
 

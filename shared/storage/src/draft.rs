@@ -56,7 +56,6 @@ impl Draft {
         &self.path
     }
 
-    /// Adds text or bytes at the end.
     pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
         let bytes = bytes.as_ref();
         if self.buffer.len() + bytes.len() > BUFFER {

@@ -83,7 +83,6 @@ pub enum Checksum {
 }
 
 impl Checksum {
-    /// Puts the checksum into its place.
     pub fn seal(self, slot: &mut [u8]) {
         match self {
             Self::First => {

@@ -42,7 +42,6 @@ fn is_full(error: &io::Error) -> bool {
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
-/// A file that is changed in place.
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,

@@ -1,16 +1,6 @@
-//! Files that are whole after a kill and after a power failure.
-//!
-//! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and
-//!   renamed.
-//! - [`File`] is changed in place; after a power failure, unsynchronised changes may be there in
-//!   part. A process can [continue when the disk is full](continue_when_full).
-//! - [`GroupSync`] synchronises such a file in the background.
-//! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`],
-//!   each with a [`Checksum`].
-//! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
-//! - [`lock`]: locks of files.
-//! - [`open()`], [`read_text`] and [`read_bytes`] read files of unknown origin: no pipes or
-//!   devices, and up to a size. [`quoted`] quotes their content.
+//! Files that are whole after a kill and after a power failure: replaced as a whole ([`Draft`]), or
+//! changed in place and synchronised in the background ([`DurableFile`], [`Log`]). Also locks, and
+//! readers of files of unknown origin: no pipes or devices, and up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
 //! synchronised. All data that must survive are written through this crate, so that a test can
@@ -44,7 +34,6 @@ pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{Log, LogError, LogMagic, LogReader};
 pub use quoted::quoted;
 
-/// A file or folder that cannot be read or written.
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct StorageError {
@@ -55,7 +44,6 @@ pub struct StorageError {
 }
 
 impl StorageError {
-    /// Adds operation and path to a system error.
     pub fn at(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self {
             action,

@@ -15,7 +15,6 @@ use rustix::{
     io::Errno,
 };
 
-/// An attempt to lock a file.
 #[derive(Debug)]
 pub enum Attempt {
     /// It is locked as long as this file is open.

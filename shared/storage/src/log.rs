@@ -1,11 +1,9 @@
 //! A log: a file of records of any length, each with a checksum, that grows at its end.
 //!
-//! One process appends, others read complete records meanwhile. Each record is one `write`. A
-//! record that is cut short by a death is the last one; a thread synchronises the file, so that a
-//! power failure takes or damages at most the last [`GroupSync::LIMIT`](crate::GroupSync::LIMIT)
-//! records. Those are cut off when the log is opened. Any other damaged record was whole once, and
-//! is refused with its number: when the log is opened if its header is damaged, else when it is
-//! read.
+//! One process appends, others read complete records meanwhile. A death cuts the last record short;
+//! a power failure takes or damages at most the last
+//! [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) records. Those are cut off when the log is opened;
+//! any other damaged record is refused with its number.
 //!
 //! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in
 //! bytes (u32), the CRC-32 of its bytes (u32), the CRC-32 of these three (u32), its bytes, and
@@ -135,12 +133,10 @@ impl Log {
         Ok(self.file.sync.finish()?)
     }
 
-    /// Reads a record, which replaces the content of `bytes`.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
     }
 
-    /// Returns the error for a record that its reader cannot decode.
     pub fn malformed(&self, index: usize) -> LogError {
         self.records.malformed(index)
     }

@@ -12,13 +12,11 @@ use std::{
 pub enum Operation {
     CreateFolder(PathBuf),
     Create(PathBuf),
-    /// Bytes written at an offset.
     Write {
         path: PathBuf,
         offset: u64,
         bytes: Vec<u8>,
     },
-    /// A file cut or extended.
     SetLength {
         path: PathBuf,
         length: u64,
@@ -32,7 +30,6 @@ pub enum Operation {
         path: PathBuf,
         id: u64,
     },
-    /// A file renamed, in place of an existing one.
     Rename {
         from: PathBuf,
         to: PathBuf,
@@ -54,7 +51,6 @@ fn recordings() -> MutexGuard<'static, Vec<(PathBuf, Vec<Operation>)>> {
 }
 
 impl Recorder {
-    /// Starts to record the changes below `root`.
     pub fn start(root: &Path) -> Self {
         recordings().push((root.to_owned(), Vec::new()));
         Self(root.to_owned())

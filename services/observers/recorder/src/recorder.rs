@@ -93,7 +93,7 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let (to, split) = (options.to.clone(), options.split);
     let earlier = begun.earlier.unwrap_or_default();
     let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier)?;
-    let path = writer.path().to_owned();
+    let path = writer.file.path.clone();
     if options.continues {
         run.is_ready(NAME, &signals)?;
     }

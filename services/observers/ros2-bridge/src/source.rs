@@ -10,7 +10,6 @@ mod wakeups;
 
 use std::time::Duration;
 
-use gyre_colossus::Constants;
 use gyre_datasets::DatasetOptions;
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
@@ -43,7 +42,7 @@ pub struct Settings {
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
-    pub constants: Constants,
+    pub constants: DatasetOptions,
 }
 
 impl Settings {
@@ -60,7 +59,7 @@ impl Settings {
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
-            constants: options.into(),
+            constants: *options,
         })
     }
 

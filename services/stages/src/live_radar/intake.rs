@@ -2,7 +2,8 @@
 
 use std::{fmt::Display, time::Duration};
 
-use gyre_colossus::{Azimuth, BadConfiguration, Configuration, Constants};
+use gyre_colossus::{Azimuth, BadConfiguration, Configuration};
+use gyre_datasets::DatasetOptions;
 use gyre_messages::ScanHeader;
 use gyre_stage::source::Received;
 use thiserror::Error;
@@ -10,7 +11,7 @@ use thiserror::Error;
 use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
 pub struct Intake {
-    constants: Constants,
+    constants: DatasetOptions,
     /// `None` until the radar has sent its configuration.
     scans: Option<ScanAssembly>,
     turns: TurnCounter,
@@ -31,7 +32,7 @@ pub enum NoScans {
 }
 
 impl Intake {
-    pub fn new(constants: Constants) -> Self {
+    pub fn new(constants: DatasetOptions) -> Self {
         Self {
             constants,
             scans: None,

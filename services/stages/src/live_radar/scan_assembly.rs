@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use gyre_colossus::{
-    Azimuth, BadConfiguration, Configuration, Constants, FoundClock, RadarClock, SweepAssembler,
+    Azimuth, BadConfiguration, Configuration, FoundClock, RadarClock, SweepAssembler,
 };
+use gyre_datasets::DatasetOptions;
 use gyre_messages::ScanHeader;
 use gyre_stage::{clock, source::LastScan};
 
@@ -25,7 +26,7 @@ pub struct ScanAssembly {
 }
 
 impl ScanAssembly {
-    pub fn new(radar: Configuration, constants: Constants) -> Result<Self, BadConfiguration> {
+    pub fn new(radar: Configuration, constants: DatasetOptions) -> Result<Self, BadConfiguration> {
         Ok(Self {
             clock: RadarClock::new(&radar),
             assembler: SweepAssembler::new(&radar, constants)?,
@@ -164,7 +165,7 @@ mod tests {
             let mut turns = TurnCounter::resume(None, 0);
             turns.configure(250_000_000);
             Self {
-                scans: ScanAssembly::new(radar, Constants::default()).unwrap(),
+                scans: ScanAssembly::new(radar, DatasetOptions::default()).unwrap(),
                 turns,
                 header: ScanHeader::default(),
                 bytes: vec![0; 400 * 16],

@@ -9,12 +9,10 @@ use thiserror::Error;
 
 use crate::PORT;
 
-/// The prefix of an address of datagrams.
 const UDP: &str = "udp://";
 const UNUSED: &str =
     "interface is set, but only an address that begins with `udp://` needs one: remove it";
 
-/// The address where a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     Tcp(String),
@@ -60,7 +58,6 @@ impl Address {
         })
     }
 
-    /// Returns whether the radar is received by UDP.
     pub fn is_udp(&self) -> bool {
         matches!(self, Self::Udp { .. })
     }

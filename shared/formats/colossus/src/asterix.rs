@@ -51,7 +51,6 @@ struct Video<'a> {
     number: u32,
     /// Angle of the antenna, in 1/65536 of a turn, rounded down.
     angle: u16,
-    /// Depth of a bin, m.
     resolution_m: f32,
     first: usize,
     /// Bytes per bin, 1 or 2.
@@ -60,7 +59,6 @@ struct Video<'a> {
     special: Special,
 }
 
-/// Navtech's special purpose field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Special {
     seconds: [u8; 4],

@@ -16,7 +16,6 @@ const MAX_HELD: usize = 32;
 /// differ by 1000.
 const MAX_RATIO: f64 = 20.0;
 
-/// The order of the bytes of a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ByteOrder {
     /// Least significant byte first.
@@ -25,7 +24,6 @@ pub enum ByteOrder {
     Big,
 }
 
-/// The unit of split seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplitUnit {
     #[default]
@@ -45,9 +43,7 @@ impl SplitUnit {
 /// The encoding of an azimuth's time. The default is what most radars send.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockFormat {
-    /// Byte order of both numbers.
     pub order: ByteOrder,
-    /// Unit of the split seconds.
     pub unit: SplitUnit,
 }
 
@@ -77,7 +73,6 @@ impl ClockFormat {
         (bytes(seconds), bytes(split))
     }
 
-    /// Returns the time of an azimuth, ns.
     fn ns(self, azimuth: &Azimuth<'_>) -> i64 {
         let split = self.number(azimuth.split_seconds) * self.unit.ns();
         self.number(azimuth.seconds) * SECOND_NS + split
@@ -127,10 +122,9 @@ impl fmt::Display for FoundClock {
 
 /// Gives each azimuth its time. One clock per connection.
 ///
-/// The first azimuth does not determine the format of its time: there are two byte orders, and a
-/// fraction below 1,000,000 may have either unit. The difference of two azimuths does, because the
-/// configuration gives the time that the radar takes to turn from one to the other. So the first
-/// azimuth is held back until the second, and no azimuth is lost or has a wrong time.
+/// One azimuth does not determine the byte order and the unit of its time. The difference of two
+/// does, because the configuration gives the time of the turn from one to the other. So the first
+/// azimuth is held back until the second.
 #[derive(Clone, Debug)]
 pub struct RadarClock {
     encoder_size: i32,
@@ -143,7 +137,6 @@ pub struct RadarClock {
 }
 
 impl RadarClock {
-    /// Returns the clock of a radar whose time is not yet known.
     pub fn new(configuration: &Configuration) -> Self {
         Self {
             encoder_size: i32::from(configuration.encoder_size.max(1)),

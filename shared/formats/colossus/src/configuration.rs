@@ -1,7 +1,5 @@
 //! The radar's description of itself: 20 bytes, then a protobuf.
 
-use std::ops::RangeInclusive;
-
 use gyre_radar::MAX_AZIMUTHS;
 use thiserror::Error;
 
@@ -13,7 +11,6 @@ pub(crate) const CONFIGURATION_BYTES: usize = 20;
 /// The protobuf's field of the range resolution, a float.
 pub(crate) const RESOLUTION_FIELD: u64 = 10;
 
-/// The radar's description of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Configuration {
     /// Azimuths per turn.
@@ -38,14 +35,8 @@ pub struct Configuration {
 
 /// A configuration that no radar has.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error(
-    "the radar's configuration gives {what} as {value}, expected {} to {}", bounds.start(), bounds.end()
-)]
-pub struct BadConfiguration {
-    pub what: &'static str,
-    pub value: f64,
-    pub bounds: RangeInclusive<f64>,
-}
+#[error("the radar's configuration gives {0}")]
+pub struct BadConfiguration(String);
 
 impl Configuration {
     /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one,
@@ -56,7 +47,6 @@ impl Configuration {
         exact.unwrap_or((f64::from(self.bin_size) / 1e4) as f32)
     }
 
-    /// Returns the duration of a turn, ns.
     pub fn period_ns(&self) -> i64 {
         let mhz = i64::from(self.rotation_mhz.max(1));
         (1_000_000_000_000 + mhz / 2) / mhz
@@ -67,7 +57,6 @@ impl Configuration {
         f64::from(self.encoder_size.max(1)) / f64::from(self.azimuth_samples.max(1))
     }
 
-    /// Returns the time per encoder count, ns.
     pub(crate) fn ns_per_count(&self) -> f64 {
         self.period_ns() as f64 / f64::from(self.encoder_size.max(1))
     }
@@ -90,11 +79,11 @@ impl Configuration {
         let mut checks = checks.into_iter();
         match checks.find(|(_, value, bounds)| !bounds.contains(value)) {
             None => Ok(()),
-            Some((what, value, bounds)) => Err(BadConfiguration {
-                what,
-                value,
-                bounds,
-            }),
+            Some((what, value, bounds)) => {
+                let (least, most) = (bounds.start(), bounds.end());
+                let wrong = format!("{what} as {value}, expected {least} to {most}");
+                Err(BadConfiguration(wrong))
+            }
         }
     }
 }

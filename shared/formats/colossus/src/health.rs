@@ -63,7 +63,6 @@ impl fmt::Display for HealthStatus {
 }
 
 impl Health {
-    /// Returns the readings, each with its subject.
     pub fn readings(&self) -> impl Iterator<Item = (&'static str, Reading)> + '_ {
         let named = READINGS.iter().zip(&self.readings);
         named.filter_map(|((_, name), reading)| Some((*name, (*reading)?)))

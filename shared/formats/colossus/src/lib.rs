@@ -26,5 +26,5 @@ pub use health::{Health, HealthStatus, Reading};
 pub use malformed::Malformed;
 pub use message::{Azimuth, Message, PORT, Powers, Request, decode};
 pub use parser::{Damage, Event, Parser};
-pub use sweep::{Constants, Counters, Sweep, SweepAssembler};
+pub use sweep::{Counters, Sweep, SweepAssembler};
 pub use write::{write_azimuth, write_configuration, write_keep_alive, write_other, write_request};

@@ -14,7 +14,6 @@ impl Malformed {
     }
 }
 
-/// Returns the first bytes of a payload.
 pub(crate) fn head<const N: usize>(message: &str, payload: &[u8]) -> Result<[u8; N], Malformed> {
     payload.first_chunk().copied().ok_or_else(|| {
         let actual = payload.len();

@@ -6,7 +6,6 @@ use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
 use crate::malformed::{Malformed, head};
 
-/// The TCP port of a radar.
 pub const PORT: u16 = 6317;
 /// The largest payload, bytes.
 pub const MAX_PAYLOAD_BYTES: usize = 1 << 20;
@@ -35,18 +34,15 @@ pub enum Message<'a> {
     /// The radar's description of itself: id 10.
     Configuration(Configuration),
     Azimuth(Azimuth<'a>),
-    /// A client's request.
     Request(Request),
     /// The radar's health: id 40.
     Health(Health),
     Other {
         id: u8,
-        /// The bytes.
         payload: &'a [u8],
     },
 }
 
-/// A client's request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Request {
@@ -69,7 +65,6 @@ impl Request {
         Self::StartNonContourFft,
     ];
 
-    /// Returns the id of the message.
     pub fn id(self) -> u8 {
         self as u8
     }
@@ -90,7 +85,6 @@ pub struct Azimuth<'a> {
     pub powers: Powers<'a>,
 }
 
-/// The powers of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Powers<'a> {
     /// One byte per bin.
@@ -101,7 +95,6 @@ pub enum Powers<'a> {
 }
 
 impl<'a> Powers<'a> {
-    /// Returns the number of range bins.
     pub fn bins(self) -> usize {
         match self {
             Self::Eight(bytes) => bytes.len(),
@@ -109,7 +102,6 @@ impl<'a> Powers<'a> {
         }
     }
 
-    /// Returns the bytes as received.
     pub fn bytes(self) -> &'a [u8] {
         match self {
             Self::Eight(bytes) | Self::Sixteen(bytes) => bytes,

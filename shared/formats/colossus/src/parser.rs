@@ -12,7 +12,6 @@ pub const MAX_SPACE_BYTES: usize = 1 << 16;
 pub const MAX_BUFFER_BYTES: usize =
     SIGNATURE.len() + HEADER_BYTES + MAX_PAYLOAD_BYTES + MAX_SPACE_BYTES;
 
-/// One element of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
     Message(Message<'a>),
@@ -23,7 +22,6 @@ pub enum Event<'a> {
     },
 }
 
-/// A fault of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Damage {
     #[error("the bytes do not start with Colossus' signature")]
@@ -43,9 +41,8 @@ pub enum Damage {
 /// Read into [`Parser::space`], pass the number of bytes to [`Parser::filled`], and take all events
 /// with [`Parser::next`].
 ///
-/// After a fault the parser looks for the next signature. All whole messages after it are found. A
-/// message that is cut short may be returned with some bytes of the next message, and may delay the
-/// next messages until its stated number of bytes has arrived.
+/// After a fault all whole messages behind the next signature are found. A message that is cut short
+/// may be returned with bytes of the next one, and delays what follows until as many have arrived.
 #[derive(Debug, Default)]
 pub struct Parser {
     buffer: Vec<u8>,
@@ -61,7 +58,6 @@ pub struct Parser {
 }
 
 impl Parser {
-    /// Returns a parser at the start of a stream.
     pub fn new() -> Self {
         Self::default()
     }

@@ -18,35 +18,8 @@ pub use counters::Counters;
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
 
-/// The constants that the radar does not report; as [`gyre_datasets::DatasetOptions`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Constants {
-    /// Depth of a range bin, m. Default: the radar's.
-    pub range_resolution_m: Option<f32>,
-    /// Offset of the ranges, m.
-    pub range_offset_m: f32,
-    /// Doppler coefficient, s: see [`SweepGeometry::doppler_s`].
-    pub doppler_s: f32,
-    /// Eccentricity of the encoder, rad.
-    pub azimuth_eccentricity_rad: f32,
-}
-
-impl From<&DatasetOptions> for Constants {
-    /// Takes the options that are set; all others are unknown.
-    fn from(options: &DatasetOptions) -> Self {
-        Self {
-            range_resolution_m: options.range_resolution_m,
-            range_offset_m: options.range_offset_m.unwrap_or_default(),
-            doppler_s: options.doppler_s.unwrap_or_default(),
-            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
-        }
-    }
-}
-
-/// A scan that has been written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
     /// Azimuths that did not arrive. Their powers are 0, and their flag is not `MEASURED`.
     pub missing: usize,
@@ -73,7 +46,7 @@ struct Reading {
 pub struct SweepAssembler {
     grid: Grid,
     rows: RowWriter,
-    constants: Constants,
+    constants: DatasetOptions,
     range_resolution_m: f32,
     state: State,
     last: Option<Reading>,
@@ -83,10 +56,11 @@ pub struct SweepAssembler {
 }
 
 impl SweepAssembler {
-    /// Returns an assembler at the start of a stream.
+    /// Returns an assembler at the start of a stream. `constants` has those that the radar does not
+    /// report, and perhaps its range resolution.
     pub fn new(
         configuration: &Configuration,
-        constants: Constants,
+        constants: DatasetOptions,
     ) -> Result<Self, BadConfiguration> {
         let radar_m = configuration.range_resolution_m();
         let resolution_m = constants.range_resolution_m.unwrap_or(radar_m);
@@ -108,12 +82,10 @@ impl SweepAssembler {
         })
     }
 
-    /// Returns the memory that a scan needs.
     pub fn limits(&self) -> ScanLimits {
         self.rows.limits
     }
 
-    /// Returns the losses, drops and changes so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }
@@ -140,10 +112,8 @@ impl SweepAssembler {
     /// sweep completes one that has lost its last azimuths; it is kept, and written at the next
     /// call.
     ///
-    /// `slot` is the same memory until a sweep is returned, whose scan it then is.
-    ///
-    /// # Panics
-    /// If `slot` is smaller than [`SweepAssembler::limits`].
+    /// `slot` is the same memory, of [`SweepAssembler::limits`], until a sweep is returned, whose
+    /// scan it then is.
     pub fn add(
         &mut self,
         azimuth: &Azimuth<'_>,
@@ -274,16 +244,17 @@ impl SweepAssembler {
         self.counters.sweeps += 1;
         self.counters.missing_azimuths += missing as u64;
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
-        correct_eccentricity(azimuth_rad, self.constants.azimuth_eccentricity_rad);
-        let bins = self.rows.bins;
+        let (constants, bins) = (&self.constants, self.rows.bins);
+        let eccentricity_rad = constants.azimuth_eccentricity_rad.unwrap_or_default();
+        correct_eccentricity(azimuth_rad, eccentricity_rad);
         let geometry = SweepGeometry {
             azimuths,
             bins,
             stride: bins,
             first_byte: 0,
             range_resolution_m: self.range_resolution_m,
-            range_offset_m: self.constants.range_offset_m,
-            doppler_s: self.constants.doppler_s,
+            range_offset_m: constants.range_offset_m.unwrap_or_default(),
+            doppler_s: constants.doppler_s.unwrap_or_default(),
             sense: Sense::Clockwise,
             stamp_ns: middle_ns(slot.stamp_ns[0], slot.stamp_ns[azimuths - 1]),
         };

@@ -6,7 +6,6 @@ use crate::message::{
 };
 use crate::protobuf::FOUR_BYTES;
 
-/// Appends the configuration of a radar.
 pub fn write_configuration(out: &mut Vec<u8>, configuration: &Configuration) {
     let tag = (RESOLUTION_FIELD << 3 | FOUR_BYTES) as u8;
     let resolution = configuration.range_resolution_m;
@@ -52,7 +51,6 @@ pub fn write_keep_alive(out: &mut Vec<u8>) {
     write_header(out, id::KEEP_ALIVE, 0);
 }
 
-/// Appends a client's request.
 pub fn write_request(out: &mut Vec<u8>, request: Request) {
     write_header(out, request.id(), 0);
 }

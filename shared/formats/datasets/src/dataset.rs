@@ -46,13 +46,85 @@ pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
 pub use radiate::frame_stamps;
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 
+/// The properties of a recording, which stay the same while it is open.
+pub struct Properties {
+    pub format: Format,
+    /// Number of scans.
+    pub len: usize,
+    /// Memory that a scan needs, from the header of the first image. All images must have its size.
+    pub limits: ScanLimits,
+    /// Size of the images as stored.
+    pub image_size: ImageSize,
+    /// True if the images are stored as range x azimuth, and transposed by [`Dataset::read`].
+    pub is_transposed: bool,
+    /// Median time between two scans, ns.
+    pub period_ns: i64,
+    /// The definition of the stamps, and how the middle of the sweep is obtained: one sentence.
+    pub stamp_meaning: &'static str,
+    /// Encoder counts per turn, if azimuths come from an encoder.
+    pub encoder_counts: Option<u16>,
+    /// Observations of the reader when it opened the dataset, and how it handles them: whole
+    /// sentences.
+    pub notes: Vec<String>,
+    /// The first place where the recording is damaged or ends too early, so that scans may be
+    /// missing: a sentence without its full stop. `None` if all that was recorded is there.
+    pub damage: Option<String>,
+}
+
+impl Properties {
+    /// Returns the properties of so many images, azimuth x range, without an encoder.
+    pub fn of(format: Format, len: usize, size: ImageSize, stamp_meaning: &'static str) -> Self {
+        Self {
+            format,
+            len,
+            limits: ScanLimits {
+                bytes: size.bytes(),
+                azimuths: size.height,
+            },
+            image_size: size,
+            is_transposed: false,
+            period_ns: DEFAULT_TURN_NS,
+            stamp_meaning,
+            encoder_counts: None,
+            notes: Vec::new(),
+            damage: None,
+        }
+    }
+}
+
+/// Methods that return the property of their name.
+macro_rules! properties {
+    ($($name:ident: $type:ty,)*) => {
+        $(fn $name(&self) -> $type {
+            self.properties().$name
+        })*
+    };
+}
+
 /// The scans of one recording, ordered by time.
 ///
 /// A scan that cannot be read gives an error; the others stay readable.
 pub trait Dataset: Send {
-    fn format(&self) -> Format;
+    fn properties(&self) -> &Properties;
 
-    fn len(&self) -> usize;
+    properties! {
+        format: Format,
+        len: usize,
+        limits: ScanLimits,
+        image_size: ImageSize,
+        is_transposed: bool,
+        period_ns: i64,
+        stamp_meaning: &'static str,
+        encoder_counts: Option<u16>,
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.properties().notes
+    }
+
+    fn damage(&self) -> Option<&str> {
+        self.properties().damage.as_deref()
+    }
 
     /// Index of the first scan that can be read; those before it are of another part of the drive.
     fn first(&self) -> usize {
@@ -69,18 +141,6 @@ pub trait Dataset: Send {
         self.len() == 0
     }
 
-    /// Memory that a scan needs, from the header of the first image. All images must have its size.
-    fn limits(&self) -> ScanLimits;
-
-    /// Size of the images as stored.
-    fn image_size(&self) -> ImageSize;
-
-    /// Returns whether the images are stored as range x azimuth, and transposed by
-    /// [`Dataset::read`].
-    fn is_transposed(&self) -> bool {
-        false
-    }
-
     /// The files of the scans.
     fn files(&self) -> &FileList;
 
@@ -93,32 +153,9 @@ pub trait Dataset: Send {
     /// is known without decoding.
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
 
-    /// Median time between two scans, ns.
-    fn period_ns(&self) -> i64;
-
     /// Time logged for a scan (in the file name or the list of stamps), ns since 1970.
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         self.nominal_stamp_ns(index)
-    }
-
-    /// The definition of the stamps, and how the middle of the sweep is obtained: one sentence.
-    fn stamp_meaning(&self) -> &'static str;
-
-    /// Encoder counts per turn, if azimuths come from an encoder.
-    fn encoder_counts(&self) -> Option<u16> {
-        None
-    }
-
-    /// Observations of the reader when it opened the dataset, and how it handles them: whole
-    /// sentences.
-    fn notes(&self) -> &[String] {
-        &[]
-    }
-
-    /// The first place where the recording is damaged or ends too early, so that scans may be
-    /// missing: a sentence without its full stop. `None` if all that was recorded is there.
-    fn damage(&self) -> Option<&str> {
-        None
     }
 
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].

@@ -13,11 +13,8 @@ use crate::dataset::{Dataset, Format, OpenError};
 pub struct Fingerprint {
     pub format: Format,
     pub scans: usize,
-    /// Size of all images, bytes.
     pub bytes: u64,
-    /// Time of the first scan, ns since 1970.
     pub first_stamp_ns: Option<i64>,
-    /// Time of the last scan, ns since 1970.
     pub last_stamp_ns: Option<i64>,
     /// SHA-256 of the name, size and time of each scan.
     pub sha256: String,

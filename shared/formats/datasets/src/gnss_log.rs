@@ -13,7 +13,6 @@ use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
 use crate::{LogError, gps_imu_twist, logs, table::Raw};
 
-/// The section of the receiver in configurations.
 const OF: &str = "gnss";
 
 /// Logs relative to the root of a dataset, in order of precedence.
@@ -42,9 +41,7 @@ pub struct GnssLog {
     /// The plane of the fixes, which touches the earth at the first of them; `None` if the log has
     /// coordinates in a plane of its own.
     pub plane: Option<LocalPlane>,
-    /// Faults of the log, with the number of fixes that were left out for each.
     pub faults: GnssFaults,
-    /// The file, the folder of files, or the bag.
     pub path: PathBuf,
     /// The topic in the bag; `None` of a file.
     pub topic: Option<String>,
@@ -52,7 +49,6 @@ pub struct GnssLog {
     pub unusable: Option<String>,
 }
 
-/// A fix as it was logged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoggedFix {
     /// Time on the receiver's clock, ns since 1970.
@@ -130,7 +126,6 @@ impl GnssLog {
         recording.with_extension(OF_RECORDING)
     }
 
-    /// Takes the fixes of this bag.
     pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, LogError> {
         let raw = Raw {
             unmeasured: fixes.without_fix,

@@ -12,7 +12,6 @@ use crate::{LogError, frame_stamps, table::Raw};
 
 /// The largest file: they have about 900 bytes.
 const MAX_BYTES: u64 = 1 << 16;
-/// The fault of a file that cannot be read.
 const UNREADABLE: &str = "the file of this number is missing, or has another form";
 
 /// Reads the files that the list beside a folder names. `entry` makes an entry of a time, ns since
@@ -49,7 +48,6 @@ pub(crate) fn read<T, const N: usize>(
     Ok(raw)
 }
 
-/// Reads lines of three numbers; `None` if the file is missing, or of another form.
 fn numbers<const N: usize>(path: &Path, lines: [usize; N]) -> Option<[[f64; 3]; N]> {
     let text = storage::read_text(path, MAX_BYTES).ok()?;
     let all: Vec<&str> = text.lines().collect();

@@ -178,7 +178,6 @@ const MAX_APART_M: f64 = 1.0;
 /// The largest number: no product or sum of such overflows.
 const LARGEST: f64 = 1e15;
 
-/// Parses `N` numbers.
 fn numbers<'a, const N: usize>(
     line: usize,
     fields: impl Iterator<Item = &'a str>,
@@ -208,7 +207,6 @@ fn numbers<'a, const N: usize>(
     }
 }
 
-/// Returns the columns of a csv with the given names.
 fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N], LineError> {
     let mut found = [0; N];
     for (into, name) in found.iter_mut().zip(names) {

@@ -49,9 +49,7 @@ pub struct GyroLog {
     /// The samples in the order of their stamps, which all differ. Rates are in rad/s,
     /// accelerations in m/s²: all zero where the log has none.
     pub samples: Vec<Sample>,
-    /// Faults of the log, with the number of samples that were left out for each.
     pub faults: LogFaults,
-    /// The file, or the folder of files.
     pub path: PathBuf,
 }
 

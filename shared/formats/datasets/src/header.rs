@@ -15,7 +15,6 @@ const MAX_COLUMNS: usize = 1000;
 
 /// Names of the column of stamps that have no unit.
 const STAMPS: &str = "timestamp stamp time t gpstime header_stamp utime unix_time tv";
-/// Units at the end of a stamp's name.
 const STAMP_UNITS: [(&str, StampUnit); 4] = [
     ("_ns", StampUnit::Ns(1)),
     ("_us", StampUnit::Ns(1_000)),
@@ -64,7 +63,6 @@ impl Sign {
 pub(crate) struct Header(Vec<String>);
 
 impl Header {
-    /// Takes the first row of a table.
     pub fn of(first: &StringRecord) -> Result<Self, String> {
         let count = first.len();
         if count > MAX_COLUMNS {
@@ -103,7 +101,6 @@ impl Header {
         &self.0
     }
 
-    /// Returns the names for a message.
     pub fn listed(&self) -> String {
         quoted(&self.0.join(","))
     }
@@ -160,7 +157,6 @@ impl Stamp {
         Self { column, unit, rest }
     }
 
-    /// Returns the time of a row, ns.
     pub fn ns(&self, row: &StringRecord) -> Option<i64> {
         let ns = self.unit.ns(row.get(self.column)?)?;
         match self.rest {
@@ -187,7 +183,6 @@ enum StampUnit {
 }
 
 impl StampUnit {
-    /// Returns the time of a stamp, ns.
     fn ns(self, text: &str) -> Option<i64> {
         let ns = match self {
             Self::Ns(unit) => text.parse::<i64>().ok()?.checked_mul(unit),

@@ -53,7 +53,6 @@ pub fn inspect(
     Ok(inspect_dataset(root, dataset, options, &logs, trajectory))
 }
 
-/// Settings for the readers of the logs beside the scans.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedLogs {
     /// The topic of GNSS in a bag, else the only one.
@@ -62,7 +61,6 @@ pub struct InspectedLogs {
     pub m_per_tick: Option<f64>,
 }
 
-/// Examines an open dataset, which was opened at `root` with `options`.
 pub fn inspect_dataset(
     root: &Path,
     mut dataset: Box<dyn Dataset>,

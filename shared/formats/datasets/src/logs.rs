@@ -42,14 +42,6 @@ pub enum LogError {
     Live { of: &'static str },
     #[error("{0}")]
     Unusable(String),
-    #[error(
-        "the bag {bag} has no messages of sensor_msgs/msg/NavSatFix, and no log of a GNSS receiver lies beside it: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
-    )]
-    NoneInBag { bag: PathBuf },
-    #[error(
-        "gnss.topic is {topic}, but {data} is no bag of ROS 2: remove it, and the log beside the scans is used"
-    )]
-    NoBag { topic: String, data: PathBuf },
     /// A bag, or the list of the times of RADIATE's files.
     #[error(transparent)]
     Open(#[from] OpenError),

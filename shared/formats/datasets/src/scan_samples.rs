@@ -69,7 +69,6 @@ impl ScanSamples {
         Ok(all)
     }
 
-    /// Takes the samples of the log of a gyro.
     pub fn of_gyro(
         log: &GyroLog,
         config: &GyroConfig,
@@ -83,7 +82,6 @@ impl ScanSamples {
         Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 
-    /// Takes the samples of the log of the wheels.
     pub fn of_wheels(
         log: &WheelLog,
         config: &WheelsConfig,
@@ -93,7 +91,6 @@ impl ScanSamples {
         Self::of_track(track, (SampleKind::Wheels, &log.path), &log.faults, dataset)
     }
 
-    /// Joins the samples of two logs.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         match (self, other) {

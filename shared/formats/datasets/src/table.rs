@@ -43,7 +43,6 @@ pub(crate) struct Rows<C: Columns> {
 }
 
 impl<C: Columns> Rows<C> {
-    /// Reads a table from its beginning.
     pub fn of(text: &str) -> Result<Self, String> {
         let first = text.lines().next().unwrap_or_default().as_bytes();
         let mark = MARKS.into_iter().find(|mark| first.contains(mark));
@@ -79,7 +78,6 @@ impl<C: Columns> Rows<C> {
         Ok(rows)
     }
 
-    /// Reads the rows that follow.
     pub fn go_on(&mut self, text: &str) {
         let mut reader = reader(text, self.mark);
         let mut row = StringRecord::new();
@@ -137,7 +135,6 @@ pub(crate) struct Raw<T> {
 }
 
 impl<T> Raw<T> {
-    /// Entries that are of no file.
     pub fn of(entries: Vec<T>) -> Self {
         Self {
             entries,
@@ -161,7 +158,6 @@ pub(crate) struct Unreadable {
 }
 
 impl Unreadable {
-    /// Counts a row so often.
     pub fn add(&mut self, times: usize, line: usize, why: impl FnOnce() -> String) {
         if self.count == 0 {
             (self.first, self.why) = (line, why());

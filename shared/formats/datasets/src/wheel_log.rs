@@ -24,7 +24,6 @@ const OF: &str = SampleKind::Wheels.section();
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
 
-/// The speeds of a vehicle on wheels.
 const SPEEDS: Plausible = Plausible {
     of: SampleKind::Wheels,
     values: 1,
@@ -37,7 +36,6 @@ const SPEEDS: Plausible = Plausible {
 pub struct WheelLog {
     /// The samples in the order of their stamps, which all differ, in m/s.
     pub samples: Vec<Sample>,
-    /// Faults of the log, with the number of samples that were left out for each.
     pub faults: LogFaults,
     pub path: PathBuf,
 }
@@ -81,7 +79,6 @@ impl WheelLog {
 }
 
 const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
-/// Units at the end of its name.
 const UNITS: [(&str, f64); 3] = [
     ("_mps _m_s _m_per_s", 1.0),
     ("_kmh _km_h _kmph _kph", 1.0 / 3.6),

@@ -153,6 +153,7 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     assert_eq!(report.scans, 11);
     assert_eq!(at(&report, "/timing/missing_scans"), 1);
     assert_eq!(at(&report, "/timing/gaps/0/scan"), 4);
+    assert_eq!(count(&report, "/timing/stalls"), 0);
     assert_eq!(count(&report, "/unreadable"), 1);
     assert_eq!(at(&report, "/unreadable/0/scan"), 6);
     assert_eq!(at(&report, "/rows/not_measured"), 4);

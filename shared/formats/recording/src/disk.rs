@@ -53,7 +53,6 @@ impl Disk {
         Ok(())
     }
 
-    /// Cuts off everything behind the last complete table.
     pub fn cut_back(&self) -> io::Result<()> {
         self.file.set_len(self.complete_bytes)
     }

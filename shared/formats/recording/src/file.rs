@@ -48,7 +48,6 @@ const MAX_SCHEMA_BYTES: usize = 4096;
 const CHUNK_TIMES: Range<usize> = 9..25;
 const MESSAGE_TIME: Range<usize> = 15..23;
 
-/// The place of records in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     pub offset: u64,

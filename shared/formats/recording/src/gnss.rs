@@ -44,8 +44,11 @@ pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, LogError
 
 /// Reads the fixes in the bag, else the log beside the scans.
 fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
-    let none_in_bag = |_| LogError::NoneInBag {
-        bag: data.to_owned(),
+    let shown = data.display();
+    let none_in_bag = |_| {
+        LogError::Unusable(format!(
+            "the bag {shown} has no messages of sensor_msgs/msg/NavSatFix, and no log of a GNSS receiver lies beside it: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
+        ))
     };
     match (is_bag(data), topic) {
         (true, _) => match bags::fixes(data, topic)? {
@@ -61,10 +64,9 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
                 false => GnssLog::read(&path),
             }
         }
-        (false, Some(topic)) => Err(LogError::NoBag {
-            topic: topic.to_owned(),
-            data: data.to_owned(),
-        }),
+        (false, Some(topic)) => Err(LogError::Unusable(format!(
+            "gnss.topic is {topic}, but {shown} is no bag of ROS 2: remove it, and the log beside the scans is used"
+        ))),
     }
 }
 

@@ -13,7 +13,6 @@ pub(crate) const NO_HEAD: &str = "it has no metadata `gyre.recording`";
 /// of their own.
 const FORMAT: &str = "1";
 
-/// The run that a recording is of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Head {
     /// Identifies the recording: all its parts have the same identifier.
@@ -82,7 +81,6 @@ impl Head {
     }
 }
 
-/// Returns the topics with the types of their headers.
 fn types(topics: &[String]) -> String {
     let topics = topics.iter().filter_map(|name| topic(name));
     let types = topics.map(|topic| format!("{}={}", topic.name, topic.header.name));

@@ -3,7 +3,6 @@
 use bytemuck::pod_read_unaligned;
 use gyre_messages::{Masked, MaskedHeader, Message, Scan, ScanHeader};
 
-/// The rows of an image in a payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
     pub first: usize,

@@ -31,7 +31,6 @@ pub struct Begun {
 pub struct Ledger(PathBuf);
 
 impl Ledger {
-    /// The ledger of the run that writes its results to `out`.
     pub fn of(out: &Path) -> Self {
         Self(out.join("journal").join("recording.toml"))
     }

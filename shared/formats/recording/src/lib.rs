@@ -1,24 +1,17 @@
 //! Recordings of runs as MCAP files, for viewers and for exact replay; and [`bags`] of ROS 2, which
 //! are MCAP files too.
 //!
-//! Each message of a run is in the file twice over, without its bulk being stored twice:
+//! A message of a run is in the file twice over, without its bulk being stored twice: as what a
+//! viewer draws, in Foxglove's schemas ([`view`]), and on the channel `gyre/TOPIC` (schema
+//! `gyre_TOPIC_header_vN`) as the header of the wire message, then what of its payload no image
+//! holds. The image stands directly before it, in the same chunk and with the same sequence number:
+//! [`image`] takes a payload apart and puts it together again.
 //!
-//! | channel | encoding | content |
-//! |---|---|---|
-//! | `/scan`, `/masked` | protobuf, `foxglove.RawImage` | the powers of a scan (`mono8`, azimuth x range), the raster of a masked scan (`32FC1`) |
-//! | `/motion`, `/pose`, `/tf`, `/log` and others | protobuf, Foxglove's schemas | what a viewer draws: [`view`] |
-//! | `gyre/TOPIC` | `gyre`, schema `gyre_TOPIC_header_vN` | the header of the wire message, then what of its payload no image holds |
+//! The log time of a message is the stamp of its scan, so that a drive that was replayed faster
+//! plays at its own pace; the publish time is that of its reception by the recorder.
 //!
-//! The image of a message stands directly before it, in the same chunk and with the same sequence
-//! number. [`image`] takes a payload apart and puts it together again.
-//!
-//! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed
-//! thirty times faster plays at its own pace. The publish time is measured by the machine that runs
-//! the recorder, at reception.
-//!
-//! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far.
-//! So a reader finds a message without decompressing earlier chunks, even in a file without a
-//! summary because its writer was killed.
+//! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far,
+//! so that a reader finds a message even in a file whose writer was killed before its summary.
 
 pub mod bags;
 mod disk;

@@ -71,7 +71,6 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     }
 }
 
-/// Opens a recording of a run with all its parts.
 pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
     recording_of(&parts(root), root)
 }
@@ -81,13 +80,12 @@ fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> 
         let reason = format!("there is no recording {}", root.display());
         return Err(OpenError::Recording(reason));
     }
-    Recording::open(paths).map_err(|error| match error {
-        RecordingError::Io { path, source } => OpenError::Io { path, source },
+    Recording::open(paths).map_err(|error| {
         // It may be an archive that is only named as a recording.
-        error => paths
-            .first()
-            .and_then(|path| foreign(path))
-            .unwrap_or_else(|| OpenError::Recording(error.to_string())),
+        let is_other = !matches!(error, RecordingError::Io { .. });
+        let archive = paths.first().filter(|_| is_other);
+        let archive = archive.and_then(|path| foreign(path));
+        archive.unwrap_or_else(|| error.into())
     })
 }
 

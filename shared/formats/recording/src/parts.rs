@@ -37,7 +37,6 @@ fn is_part(path: &Path, number: usize) -> bool {
     head(path).is_some_and(|head| head.part == number)
 }
 
-/// Returns the numbers of the parts that exist, in order.
 fn numbers(path: &Path) -> Vec<usize> {
     let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
     let Ok(files) = fs::read_dir(folder.unwrap_or(Path::new("."))) else {

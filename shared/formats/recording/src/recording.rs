@@ -129,7 +129,6 @@ impl Recording {
         self.parts.iter().map(|part| part.file.path.as_path())
     }
 
-    /// Returns the messages of a topic in the order of their sequence numbers.
     pub fn entries(&self, topic: &str) -> impl Iterator<Item = Entry> + '_ {
         let places = self.places.get(topic).into_iter().flatten();
         places.map(|(_, place)| place.entry)
@@ -151,7 +150,6 @@ impl Recording {
         missed
     }
 
-    /// Returns the files that are of another recording, and were left out.
     pub fn left_out(&self) -> &[PathBuf] {
         &self.left_out
     }
@@ -230,7 +228,6 @@ impl Recording {
 }
 
 impl Part {
-    /// Opens a file: its head, and where its messages are.
     fn open(path: &Path) -> Result<(Self, Places), RecordingError> {
         let mut part = Self {
             head: Head::default(),

@@ -4,8 +4,8 @@
 use std::{collections::BTreeMap, path::Path};
 
 use gyre_datasets::{
-    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, ReadError,
-    check_capacity, turn_ns,
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, Properties,
+    ReadError, check_capacity, turn_ns,
 };
 use gyre_messages::{Message, Scan, ScanHeader};
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
@@ -19,12 +19,10 @@ const MAX_SCANS: u64 = 50_000_000;
 /// The scans of a recording. A scan has the number that it had in the recorded run.
 pub(crate) struct Scans {
     recording: Recording,
+    properties: Properties,
     files: FileList,
     entries: BTreeMap<usize, Entry>,
     first: SweepGeometry,
-    period_ns: i64,
-    notes: Vec<String>,
-    damage: Option<String>,
     /// Of the scan that was read last.
     samples: Vec<Sample>,
 }
@@ -47,16 +45,28 @@ impl Scans {
         let (first, _) = geometry(&stored)
             .ok_or_else(|| OpenError::Recording(format!("the first scan of {path} is damaged")))?;
         let period_ns = turn_ns(entries.values().map(|entry| entry.stamp_ns));
-        let files: FileList = recording.paths().map(Path::to_owned).collect();
+        let len = entries.keys().next_back().map_or(0, |last| last + 1);
+        let size = ImageSize {
+            width: first.bins,
+            height: first.azimuths,
+        };
+        let meaning = "as recorded: the middle of the sweep on the sensor's clock";
         Ok(Self {
-            notes: notes(&recording, &entries),
-            damage: recording.damage(),
+            properties: Properties {
+                limits: ScanLimits {
+                    bytes: recording.head().scan_bytes,
+                    azimuths: MAX_AZIMUTHS,
+                },
+                period_ns: period_ns.unwrap_or(DEFAULT_TURN_NS),
+                notes: notes(&recording, &entries),
+                damage: recording.damage(),
+                ..Properties::of(Format::Mcap, len, size, meaning)
+            },
             samples: Vec::new(),
+            files: recording.paths().map(Path::to_owned).collect(),
             recording,
-            files,
             entries,
             first,
-            period_ns: period_ns.unwrap_or(DEFAULT_TURN_NS),
         })
     }
 
@@ -145,30 +155,12 @@ fn geometry(stored: &Stored) -> Option<(SweepGeometry, Box<ScanHeader>)> {
 }
 
 impl Dataset for Scans {
-    fn format(&self) -> Format {
-        Format::Mcap
-    }
-
-    fn len(&self) -> usize {
-        self.entries.keys().next_back().map_or(0, |last| last + 1)
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn first(&self) -> usize {
         self.entries.keys().next().copied().unwrap_or_default()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        ScanLimits {
-            bytes: self.recording.head().scan_bytes,
-            azimuths: MAX_AZIMUTHS,
-        }
-    }
-
-    fn image_size(&self) -> ImageSize {
-        ImageSize {
-            width: self.first.bins,
-            height: self.first.azimuths,
-        }
     }
 
     fn files(&self) -> &FileList {
@@ -184,30 +176,6 @@ impl Dataset for Scans {
         self.entries.get(&index).map(|entry| entry.stamp_ns)
     }
 
-    fn period_ns(&self) -> i64 {
-        self.period_ns
-    }
-
-    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.nominal_stamp_ns(index)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        "as recorded: the middle of the sweep on the sensor's clock"
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        None
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn damage(&self) -> Option<&str> {
-        self.damage.as_deref()
-    }
-
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         let len = self.len();
         if index >= len {
@@ -215,7 +183,10 @@ impl Dataset for Scans {
         }
         let path = self.file(index).to_owned();
         let Some(entry) = self.entries.get(&index) else {
-            return Err(ReadError::NotRecorded { path, index });
+            return Err(ReadError::Scan(format!(
+                "{} has no scan {index}: the run did not read it, or the recorder missed it",
+                path.display()
+            )));
         };
         let stored = self
             .recording

@@ -14,7 +14,6 @@ const MISSED: &str = "missed.";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Entry {
     pub seq: u64,
-    /// The number of its scan.
     pub scan: u64,
     /// The time of its scan, ns since 1970.
     pub stamp_ns: i64,
@@ -41,7 +40,6 @@ impl Entry {
     }
 }
 
-/// The messages of a chunk by topic.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Table {
     pub entries: BTreeMap<String, Vec<Entry>>,

@@ -1,18 +1,9 @@
-//! Messages as viewers draw them, in Foxglove's schemas.
+//! Messages as viewers draw them, in Foxglove's schemas: see [`CHANNELS`].
 //!
-//! | channel | schema | content |
-//! |---|---|---|
-//! | `/scan`, `/masked` | `RawImage` | the image of the message: [`image`](crate::image) |
-//! | `/points` | `PointCloud` | the points of a masked scan, motion-compensated, in its frame. Not recorded: they are in the wire message |
-//! | `/rotation`, `/motion`, `/refined` | `PoseInFrame` | the motion, in the frame of the scan before |
-//! | `/pose` | `PoseInFrame` | the pose in the frame of the first scan, `odometry` |
-//! | `/trajectory` | `PosesInFrame` | the last poses (in a recording), once a second of the sensor's time |
-//! | `/tf` | `FrameTransform` | `odometry` to `radar` |
-//! | `/correction` | `FrameTransform` | `map` to `odometry`: later than the poses, so on a channel of its own, which is in order |
-//! | `/loop` | `PoseInFrame` | the later keyframe in the frame of the earlier one |
-//! | `/fix` | `PoseInFrame` | a keyframe in the map of the earlier drive |
-//! | `/objects` | `SceneUpdate` | a box for each moving object, with its velocity as an arrow of a second's length and its identity |
-//! | `/log` | `Log` | a line of `log.jsonl` |
+//! Motions are in the frame of the scan before, poses and objects in that of the first scan, loops
+//! in that of the earlier keyframe, fixes in the map of the earlier drive. `/points` is not
+//! recorded: the wire message has them. `/correction` is later than the poses, so it is on a
+//! channel of its own beside `/tf`, which is in order.
 
 use std::collections::VecDeque;
 
@@ -50,7 +41,6 @@ pub const LOG: &str = "/log";
 pub const TRAJECTORY: &str = "/trajectory";
 pub const POINTS: &str = "/points";
 
-/// A line of the log of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogLine {
     /// When it was written, ns since 1970 on the clock of the machine.
@@ -61,7 +51,6 @@ pub struct LogLine {
     pub message: String,
 }
 
-/// An encoded message for viewers.
 #[derive(Clone, Debug)]
 pub struct View {
     pub channel: &'static str,
@@ -70,7 +59,6 @@ pub struct View {
     pub data: Vec<u8>,
 }
 
-/// A channel that viewers know.
 pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
@@ -328,7 +316,6 @@ fn object_colour(object: &ListedObject, a: f64) -> Color {
     Color { r, g, b, a }
 }
 
-/// The place of an object at a height, m.
 fn lifted(object: &ListedObject, yaw_rad: f64, height_m: f64) -> Option<Pose> {
     let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
     pose.position.as_mut()?.z = height_m;

@@ -38,7 +38,6 @@ const PROTOBUF: &str = "protobuf";
 const HEALTH: &str = "/health";
 const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 
-/// A wire message to record.
 #[derive(Clone, Debug)]
 pub struct Incoming {
     pub topic: &'static str,
@@ -54,7 +53,7 @@ pub struct Incoming {
 }
 
 pub struct RecordingWriter {
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// `None` after a failure.
     mcap: Option<Writer<File>>,
     disk: Disk,
@@ -305,26 +304,19 @@ impl RecordingWriter {
         Ok(self.disk.complete()?)
     }
 
-    /// Writes the remaining messages and the summary, and returns the number of messages missed, by
-    /// topic.
-    pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
+    /// Writes the remaining messages and the summary.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
         self.checked(Self::write_early)?;
-        self.end()?;
-        Ok(self.table.missed)
+        self.end()
     }
 
-    /// Continues in the next part after this one has ended; returns the number of messages missed
-    /// in this one, by topic.
-    pub(crate) fn go_on(
-        &mut self,
-        path: &Path,
-        head: &Head,
-    ) -> Result<BTreeMap<String, u64>, RecordingError> {
+    /// Continues in the next part after this one has ended.
+    pub(crate) fn go_on(&mut self, path: &Path, head: &Head) -> Result<(), RecordingError> {
         let next = Self::create_with(path, head, self.disk.synchronise.clone())?;
         let before = mem::replace(self, next);
         // The state of viewers continues.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
-        Ok(before.table.missed)
+        Ok(())
     }
 
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {

@@ -5,14 +5,12 @@ use crate::definition::package;
 const SECOND_NS: i64 = 1_000_000_000;
 
 package! { builtin_interfaces:
-    /// A time since 1970.
     #[derive(Copy)]
     struct Time {
         sec: i32 = "int32 sec",
         nanosec: u32 = "uint32 nanosec",
     }
 
-    /// A time between two times.
     #[derive(Copy)]
     struct Duration {
         sec: i32 = "int32 sec",

@@ -54,7 +54,6 @@ pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
     const DEFINITION: &'static Definition;
 }
 
-/// The type of a field.
 pub(crate) trait Field {
     /// The message that it consists of.
     const PART: Option<&'static Definition> = None;

@@ -14,7 +14,6 @@ package! { diagnostic_msgs:
         value: String = "string value",
     }
 
-    /// The status of a part.
     struct DiagnosticStatus {
         /// [`OK`], [`WARN`], [`ERROR`] or [`STALE`].
         level: u8 = "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level",

@@ -68,7 +68,6 @@ impl Default for Frames {
     }
 }
 
-/// The motion that led to a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
@@ -129,7 +128,6 @@ pub fn covariance(planar: Option<&Matrix3<f64>>) -> Covariance {
     covariance
 }
 
-/// Returns the covariance of the constant velocity in the moving frame.
 fn velocity_covariance(since: &Interval) -> Matrix3<f64> {
     let jacobian = twist_jacobian(&since.motion.motion, seconds(since));
     jacobian * since.motion.covariance * jacobian.transpose()

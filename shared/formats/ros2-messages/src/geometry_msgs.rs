@@ -28,7 +28,6 @@ impl Covariance {
         self.0.as_flattened_mut()[row * VALUES + column] = value;
     }
 
-    /// Returns all elements by rows.
     pub fn elements(&self) -> &[f64] {
         self.0.as_flattened()
     }
@@ -90,7 +89,6 @@ package! { geometry_msgs:
         orientation: Quaternion = "Quaternion orientation",
     }
 
-    /// A pose with its covariance along the axes of its frame.
     #[derive(Copy)]
     struct PoseWithCovariance {
         pose: Pose = "Pose pose",
@@ -116,7 +114,6 @@ package! { geometry_msgs:
         covariance: Covariance = "float64[36] covariance",
     }
 
-    /// The pose of a frame in another frame.
     #[derive(Copy)]
     struct Transform {
         translation: Vector3 = "Vector3 translation",

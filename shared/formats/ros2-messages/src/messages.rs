@@ -10,21 +10,16 @@ package! { messages:
         /// Not to be used.
         #[serde(with = "serde_bytes")]
         angle: Vec<u8> = "uint8[] angle",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         azimuth: Vec<u8> = "uint8[] azimuth",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         sweep_counter: Vec<u8> = "uint8[] sweep_counter",
-        /// Four bytes.
         #[serde(with = "serde_bytes")]
         ntp_seconds: Vec<u8> = "uint8[] ntp_seconds",
-        /// Four bytes.
         #[serde(with = "serde_bytes")]
         ntp_split_seconds: Vec<u8> = "uint8[] ntp_split_seconds",
         #[serde(with = "serde_bytes")]
         data: Vec<u8> = "uint8[] data",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         data_length: Vec<u8> = "uint8[] data_length",
     }
@@ -33,17 +28,14 @@ package! { messages:
     /// [`RadarConfigurationMsg`](crate::navtech_msgs::RadarConfigurationMsg).
     struct RadarConfigurationMessage {
         header: Header = "std_msgs/Header header",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         azimuth_samples: Vec<u8> = "uint8[] azimuth_samples",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         encoder_size: Vec<u8> = "uint8[] encoder_size",
         /// Depth of a range bin, 1e-4 m (of the oldest drivers m), a double of eight bytes, least
         /// significant first.
         #[serde(with = "serde_bytes")]
         bin_size: Vec<u8> = "uint8[] bin_size",
-        /// Two bytes.
         #[serde(with = "serde_bytes")]
         range_in_bins: Vec<u8> = "uint8[] range_in_bins",
         /// Turns per second, or per 1000 s, two bytes.

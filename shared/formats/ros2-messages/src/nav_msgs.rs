@@ -19,7 +19,6 @@ package! { nav_msgs:
         twist: TwistWithCovariance = "geometry_msgs/TwistWithCovariance twist",
     }
 
-    /// Size and place of a grid.
     #[derive(Copy)]
     struct MapMetaData {
         map_load_time: Time = "builtin_interfaces/Time map_load_time",

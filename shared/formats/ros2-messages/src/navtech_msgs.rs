@@ -33,7 +33,6 @@ package! { navtech_msgs:
         header: Header = "std_msgs/Header header",
         /// Azimuths per turn.
         azimuth_samples: u16 = "uint16 azimuth_samples",
-        /// Encoder counts per turn.
         encoder_size: u16 = "uint16 encoder_size",
         /// The rotation of images by the driver, in rows; the encoder values beside them are not
         /// rotated.
@@ -56,7 +55,6 @@ package! { navtech_msgs:
     struct RadarBScanMsg {
         /// The powers, `8UC1`, a row for an azimuth; stamped with the time of row 199.
         b_scan_img: Image = "sensor_msgs/Image b_scan_img",
-        /// Encoder count of each row.
         encoder_values: Vec<u16> = "uint16[] encoder_values",
         /// Time of each row, ns of the radar's clock; the driver computes it in floating point, to
         /// 256 ns. FoMo's converter writes microseconds.

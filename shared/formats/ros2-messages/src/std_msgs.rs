@@ -3,7 +3,6 @@
 use crate::{builtin_interfaces::Time, definition::package};
 
 package! { std_msgs:
-    /// Time and frame of a message.
     struct Header {
         stamp: Time = "builtin_interfaces/Time stamp",
         frame_id: String = "string frame_id",
@@ -20,7 +19,6 @@ package! { std_msgs:
 }
 
 impl Header {
-    /// Returns the header of a time in ns since 1970 and a frame.
     pub fn new(stamp_ns: i64, frame_id: &str) -> Self {
         Self {
             stamp: Time::from_ns(stamp_ns),

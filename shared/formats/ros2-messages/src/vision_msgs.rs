@@ -33,7 +33,6 @@ package! { vision_msgs:
         id: String = "string id",
     }
 
-    /// The objects at one time.
     struct Detection3DArray {
         header: Header = "std_msgs/Header header",
         detections: Vec<Detection3D> = "Detection3D[] detections",

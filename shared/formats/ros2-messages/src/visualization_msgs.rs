@@ -56,7 +56,6 @@ package! { visualization_msgs:
         mesh_use_embedded_materials: bool = "bool mesh_use_embedded_materials",
     }
 
-    /// Shapes, in the order of drawing or removal.
     struct MarkerArray {
         markers: Vec<Marker> = "Marker[] markers",
     }

@@ -1,15 +1,12 @@
 //! The checkpoint: a file with the state of the refinement, for resuming a restarted process.
 //!
-//! A local map has no finite look-back, since the keyframes of a stationary vehicle can be
-//! arbitrarily old. So the state after each item is written before its motion is published, and a
-//! restart restores the state before its first item. The file consists of two rings of fixed-size
-//! slots, one of states and one of keyframes, long enough for any restart; it does not grow.
-//! Checksums detect slots that were cut short by a death; their items had not been published.
+//! A local map has no finite look-back, so the state after each item is written before its motion
+//! is published, and a restart restores the state before its first item. The file is two rings of
+//! slots with checksums, one of states and one of keyframes, long enough for any restart.
 //!
-//! A thread synchronises the file about once a second. After a power failure, any part of later
-//! writes may be there or not. So a state names its keyframes by their content, and the motion that
-//! it led to: [`Checkpoint::newest_known`] finds the last pose of a journal whose state is whole,
-//! and the run continues from there.
+//! After a power failure, any part of the last second's writes may be there or not. So a state
+//! names its keyframes by their content, and the motion that it led to:
+//! [`Checkpoint::newest_known`] finds the last pose of a journal whose state is whole.
 
 mod codec;
 
@@ -83,7 +80,6 @@ struct Layout {
     count: usize,
 }
 
-/// Returns the path of the checkpoint of the run that writes to `out`.
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("refinement.map")
 }

@@ -10,7 +10,6 @@ use thiserror::Error;
 
 use crate::JournalError;
 
-/// An error of the keyframes or of the scans of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
     #[error(transparent)]
@@ -22,7 +21,6 @@ pub enum KeyframesError {
     Missing(String),
 }
 
-/// The keyframes of a run, open for appending.
 #[derive(Debug)]
 pub struct Keyframes {
     log: RecordLog<Keyframe>,

@@ -2,11 +2,9 @@
 //! SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
 //! [`checkpoint`] of its refinement.
 //!
-//! The journal is a file of poses, each with its motion and a checksum. All results of a run are
-//! made from it. Each record is one `write`, before its pose is published. A record that is cut
-//! short by a death is found by its checksum; its pose had not been published. A thread
-//! synchronises the file about once a second, so a power failure destroys the poses of the last
-//! second: [`check`] finds their remains and cuts them off, and they are computed again.
+//! The journal has each pose with its motion and a checksum, written before the pose is published;
+//! all results of a run are made from it. [`check`] finds what a death or a power failure has left
+//! of the last records; those poses are computed again.
 
 mod check;
 pub mod checkpoint;
@@ -40,7 +38,6 @@ pub struct Journal {
     buffer: [u8; RECORD],
 }
 
-/// Returns the path of the journal of the run that writes to `out`.
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("poses.journal")
 }

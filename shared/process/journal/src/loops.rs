@@ -17,7 +17,6 @@ pub struct LoggedLoops {
 }
 
 impl LoggedLoops {
-    /// Opens the logs of the run that writes to `out`.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Ok(Self {
             keyframes: RecordReader::open(out)?,

@@ -10,7 +10,6 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::record::split;
 
-/// The objects at the time of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedObjects {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
@@ -20,7 +19,6 @@ pub struct LoggedObjects {
     pub objects: Vec<Object>,
 }
 
-/// Returns an object as messages list it.
 pub fn listed(object: &Object) -> ListedObject {
     ListedObject {
         id: object.id,

@@ -12,7 +12,6 @@ use gyre_storage::{LogError, LogMagic};
 pub use crate::keyframes::KeyframesError as ScansError;
 use crate::record::split;
 
-/// A scan with its pose and its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
     /// The scan's number in the run, from 0 without gaps, which is its record's number.
@@ -91,7 +90,6 @@ impl Record for LoggedScan {
     }
 }
 
-/// The scans of a run, open for appending.
 #[derive(Debug)]
 pub struct Scans {
     log: RecordLog<LoggedScan>,

@@ -133,7 +133,6 @@ impl LogReader {
         self.unchanged
     }
 
-    /// Returns the offset behind the last record.
     pub(super) fn end(&self) -> u64 {
         self.start(self.len())
     }
@@ -260,7 +259,6 @@ impl LogReader {
         Ok(())
     }
 
-    /// Reads a record, which replaces the content of `bytes`.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         let header = self.read_start(index, usize::MAX, bytes)?;
         bytes.truncate(header.length as usize);
@@ -309,7 +307,6 @@ impl LogReader {
         Ok(found)
     }
 
-    /// Returns the error for a record that its reader cannot decode.
     pub fn malformed(&self, record: usize) -> LogError {
         let path = self.path.clone();
         LogError::Malformed { path, record }

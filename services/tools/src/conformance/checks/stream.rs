@@ -162,7 +162,7 @@ impl Session<'_> {
             while late.receive().is_ok_and(|message| message.is_some()) {
                 received += 1;
             }
-            if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
+            if rig.sleep(&[&late], POLL_PERIOD)? {
                 return Err(Interrupted.into());
             }
         }

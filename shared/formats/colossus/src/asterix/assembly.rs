@@ -3,7 +3,6 @@
 use super::{Special, Video};
 use crate::message::{Azimuth, Powers};
 
-/// The most messages of an azimuth.
 const MAX_PARTS: usize = 1024;
 
 #[derive(Clone, Debug, Default)]
@@ -24,7 +23,6 @@ impl Assembly {
         self.of == Some((video.angle, video.special)) && self.bin_bytes == video.bin_bytes
     }
 
-    /// Begins an azimuth without parts.
     pub(super) fn begin(&mut self, video: &Video<'_>) {
         self.of = Some((video.angle, video.special));
         self.bin_bytes = video.bin_bytes;

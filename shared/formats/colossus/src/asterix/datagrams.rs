@@ -7,21 +7,15 @@ use crate::configuration::Configuration;
 use crate::message::Message;
 use crate::parser::Event;
 
-/// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
 /// The largest step of the number of a message: a larger step means that the radar has restarted.
 const MAX_STEP: i32 = 1 << 16;
 
-/// A buffer that is filled with one datagram after the other, and the messages in them, as in the
-/// TCP protocol.
-///
-/// Read a datagram into [`Datagrams::space`], pass its length to [`Datagrams::filled`], and take
-/// all events with [`Datagrams::next`]. The first event is the radar's description of itself, which
-/// each datagram carries.
+/// A [`Parser`](crate::Parser) for datagrams. The first event is the radar's description of itself,
+/// which each datagram carries.
 ///
 /// An azimuth is returned when its last part is there, in whatever order they come. It is lost if a
-/// part of another azimuth comes before that: no azimuth waits for another. So the scan reports its
-/// lost azimuths.
+/// part of another azimuth comes before that.
 #[derive(Clone, Debug)]
 pub struct Datagrams {
     encoder_size: u16,
@@ -65,7 +59,6 @@ impl Datagrams {
         &mut self.buffer
     }
 
-    /// Marks the first `bytes` of the space as a datagram.
     pub fn filled(&mut self, bytes: usize) {
         self.filled = bytes.min(MAX_BYTES);
     }

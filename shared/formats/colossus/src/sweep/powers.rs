@@ -19,7 +19,6 @@ pub(super) struct PowerOrder {
 }
 
 impl PowerOrder {
-    /// Writes the powers to the first bytes of `row`.
     pub(super) fn write(&mut self, powers: Powers<'_>, row: &mut [u8]) {
         match powers {
             Powers::Eight(bytes) => row.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from),

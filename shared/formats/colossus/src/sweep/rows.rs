@@ -18,7 +18,6 @@ pub(super) struct Empty {
     pub(super) ns: f64,
 }
 
-/// Writes the rows of a scan in order.
 #[derive(Clone, Debug)]
 pub(super) struct RowWriter {
     pub(super) limits: ScanLimits,

@@ -5,6 +5,5 @@
 mod clocks;
 mod messages;
 mod parsing;
-mod scans;
 mod support;
 mod sweeps;

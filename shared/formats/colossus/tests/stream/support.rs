@@ -1,9 +1,10 @@
 //! A radar that turns.
 
 use gyre_colossus::{
-    Azimuth, ClockFormat, Configuration, Constants, Counters, Event, Parser, Powers, RadarClock,
-    Sweep, SweepAssembler,
+    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, Powers, RadarClock, Sweep,
+    SweepAssembler,
 };
+use gyre_datasets::DatasetOptions;
 use gyre_radar::OwnedScan;
 
 /// 2019-01-10 14:37:26 UTC, ns.
@@ -72,11 +73,8 @@ pub struct Assembly {
 
 impl Assembly {
     pub fn new(configuration: &Configuration) -> Self {
-        Self::with(configuration, Constants::default())
-    }
-
-    pub fn with(configuration: &Configuration, constants: Constants) -> Self {
-        let assembler = SweepAssembler::new(configuration, constants).unwrap();
+        let none = DatasetOptions::default();
+        let assembler = SweepAssembler::new(configuration, none).unwrap();
         let mut slot = OwnedScan::with_limits(assembler.limits());
         // Earlier content of a slot must not show.
         slot.bytes.fill(0xaa);

@@ -1,8 +1,9 @@
 //! Azimuths to scans.
 
 use gyre_colossus::{
-    Azimuth, ByteOrder, ClockFormat, Configuration, Constants, Counters, Powers, SweepAssembler,
+    Azimuth, ByteOrder, ClockFormat, Configuration, Counters, Powers, SweepAssembler,
 };
+use gyre_datasets::{DatasetOptions, correct_eccentricity};
 use gyre_radar::{OwnedScan, Sense, scan::flag};
 use proptest::prelude::*;
 
@@ -202,11 +203,12 @@ fn the_order_of_16_bit_powers_is_found() {
 #[test]
 fn a_scan_has_the_constants_given() {
     let radar = configuration(5600, 4);
-    let constants = Constants {
+    let constants = DatasetOptions {
         range_resolution_m: Some(0.0596),
-        range_offset_m: -0.31,
-        doppler_s: 0.04,
-        azimuth_eccentricity_rad: -0.01,
+        range_offset_m: Some(-0.31),
+        doppler_s: Some(0.04),
+        azimuth_eccentricity_rad: Some(-0.01),
+        ..DatasetOptions::default()
     };
     let mut assembler = SweepAssembler::new(&radar, constants).unwrap();
     let mut scan = OwnedScan::with_limits(assembler.limits());
@@ -220,7 +222,7 @@ fn a_scan_has_the_constants_given() {
     assert_eq!([geometry.range_offset_m, geometry.doppler_s], [-0.31, 0.04]);
     assert_eq!(geometry.sense, Sense::Clockwise);
     let mut expected = [angle(5586, 5600)];
-    gyre_datasets::correct_eccentricity(&mut expected, -0.01);
+    correct_eccentricity(&mut expected, -0.01);
     assert_eq!(scan.azimuth_rad[399], expected[0]);
 }
 
@@ -232,10 +234,10 @@ fn a_configuration_out_of_bounds_is_refused() {
         bin_size: 0,
         ..configuration(5600, 4)
     };
-    let given = Constants {
+    let given = DatasetOptions {
         range_resolution_m: Some(0.05),
-        ..Constants::default()
+        ..DatasetOptions::default()
     };
-    assert!(SweepAssembler::new(&none, Constants::default()).is_err());
+    assert!(SweepAssembler::new(&none, DatasetOptions::default()).is_err());
     assert!(SweepAssembler::new(&none, given).is_ok());
 }

@@ -43,7 +43,6 @@ impl Found {
         Ok(Self::new(format, folder, images))
     }
 
-    /// Returns a recording that is not on disk.
     pub(crate) fn source(
         source: Box<dyn ImageSource>,
         forced: Option<Format>,
@@ -57,7 +56,6 @@ impl Found {
     }
 }
 
-/// The remedy where a format is looked for.
 const SET_FORMAT: &str = "if it is one, set its `format`";
 
 /// Returns whether a folder has images where a dataset has them.
@@ -66,7 +64,6 @@ pub fn is_dataset(root: &Path) -> bool {
     folders.any(|folder| has_png(&root.join(folder)))
 }
 
-/// Locates the images at `root`, in the format `forced` or as detected.
 pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenError> {
     check_folder(root)?;
     let folder = find_folder(root, forced);
@@ -120,7 +117,6 @@ fn has_boreas_folders(root: &Path) -> bool {
     ["applanix", "calib"].iter().any(|f| root.join(f).is_dir())
 }
 
-/// Returns an error if a folder is a dataset of another format than is configured.
 fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
     let (configured, found) = (configured?, locate(root, None).ok()?.format);
     let fault = format!(
@@ -244,7 +240,6 @@ fn evidence(image: &FirstImage) -> String {
     format!("{} range bins, {named}{chirps}{unit}.", image.bins())
 }
 
-/// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
 fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {

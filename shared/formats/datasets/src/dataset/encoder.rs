@@ -8,12 +8,10 @@ use gyre_radar::median;
 const STEP_TOLERANCE: f64 = 0.25;
 /// Azimuths that can be missing at the seam, as a share of those that are there.
 const MISSING_SHARE: f64 = 0.05;
-/// Minimum number of azimuths that show the size of an encoder.
 const MIN_AZIMUTHS: usize = 8;
 /// Times that the azimuths of a turn take, turns. A sector that is blanked over the encoder's zero
 /// makes a turn look like one of a smaller encoder, but shorter by as much.
 const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
-/// Number of turns that show the size of an encoder.
 pub const FIRST_TURNS: usize = 8;
 
 /// The encoder counts of the azimuths of a turn, which may begin anywhere, and the time that the
@@ -27,13 +25,11 @@ pub struct EncoderTurn {
 }
 
 impl EncoderTurn {
-    /// Returns the turn of azimuths with these counts and times, where they have one.
     pub fn new(counts: Vec<u16>, time_ns: impl Fn(usize) -> Option<i64>) -> Self {
         let turn_ns = turn_ns(&counts, time_ns);
         Self { counts, turn_ns }
     }
 
-    /// Returns the duration of the turn by the times of its azimuths, ns.
     pub(crate) fn turn_ns(&self) -> Option<i64> {
         self.turn_ns
     }
@@ -92,7 +88,6 @@ impl EncoderStep {
         u16::try_from(self.span + u32::from(self.step)).ok()
     }
 
-    /// Returns the counts over the seam, for an encoder of `counts` per turn.
     pub(crate) fn seam(self, counts: u16) -> Option<u32> {
         u32::from(counts).checked_sub(self.span)
     }
@@ -127,32 +122,9 @@ pub fn encoder_counts(turns: &[EncoderTurn], turn_ns: Option<i64>, usual: u16) -
 mod tests {
     use super::*;
 
-    fn turn(azimuths: u32, size: u32, first: u32) -> Vec<u16> {
-        let count = |k| ((first + k * size / azimuths) % size) as u16;
-        (0..azimuths).map(count).collect()
-    }
-
-    fn found(turns: &[&[u16]]) -> Option<u16> {
-        let turns = turns
-            .iter()
-            .map(|counts| EncoderTurn::new(counts.to_vec(), |_| None));
-        encoder_counts(&turns.collect::<Vec<_>>(), None, 5600)
-    }
-
-    #[test]
-    fn azimuths_that_are_missing_at_the_seam_make_no_smaller_encoder() {
-        let whole = turn(400, 5_600, 7);
-        for missing in 0..20 {
-            assert_eq!(found(&[&whole[..400 - missing]]), Some(5600));
-        }
-        let other = turn(400, 16_000, 20);
-        let turns = [&other[3..], &other[..], &other[..390]];
-        assert_eq!(found(&turns), Some(16_000));
-    }
-
     #[test]
     fn a_turn_that_took_another_time_shows_no_size() {
-        let counts = turn(400, 5_600, 7)[..360].to_vec();
+        let counts = (0..360).map(|k| 7 + 14 * k).collect();
         let turn = EncoderTurn::new(counts, |row| Some(row as i64 * 625_000));
         assert_eq!(turn.turn_ns(), Some(225_000_000));
         let turns = [turn];
@@ -165,7 +137,8 @@ mod tests {
     fn counts_that_are_no_turn_show_no_size() {
         let back_and_forth = [9, 3].repeat(5);
         for counts in [&[][..], &[5, 19, 33], &[7; 400], &back_and_forth] {
-            assert_eq!(found(&[counts]), None, "{counts:?}");
+            let turn = EncoderTurn::new(counts.to_vec(), |_| None);
+            assert_eq!(encoder_counts(&[turn], None, 5600), None, "{counts:?}");
         }
     }
 }

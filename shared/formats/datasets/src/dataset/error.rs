@@ -8,7 +8,6 @@ use std::{
 
 use super::format::Format;
 
-/// A dataset that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// An option that is out of bounds, or does not apply to the format.
@@ -53,32 +52,23 @@ impl OpenError {
     }
 }
 
-/// A scan that cannot be read. Other scans may be readable.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     #[error("scan {index} does not exist: the dataset has {len} scans")]
     NoSuchScan { index: usize, len: usize },
     #[error("cannot read {path}: {source}")]
     Io { path: PathBuf, source: io::Error },
-    #[error("{path} has no scan {index}: the run did not read it, or the recorder missed it")]
-    NotRecorded { path: PathBuf, index: usize },
     #[error("{path} is corrupt: {reason}; copy or download it again")]
     Damaged { path: PathBuf, reason: String },
-    /// Any other fault of an image: what follows its path in the sentence.
-    #[error("{path}{fault}")]
-    Image { path: PathBuf, fault: String },
     #[error("the slot holds {actual} {what}, but this scan needs {needed}")]
     SlotTooSmall {
         what: &'static str,
         needed: usize,
         actual: usize,
     },
-    #[error("the message of scan {index} in {path} cannot be decoded: {reason}")]
-    Message {
-        path: PathBuf,
-        index: usize,
-        reason: String,
-    },
+    /// Any other fault: a sentence.
+    #[error("{0}")]
+    Scan(String),
 }
 
 impl ReadError {
@@ -88,11 +78,8 @@ impl ReadError {
     }
 
     /// A fault of an image, in words that follow its path at once.
-    pub(crate) fn image(path: &Path, fault: impl Into<String>) -> Self {
-        Self::Image {
-            path: path.to_owned(),
-            fault: fault.into(),
-        }
+    pub(crate) fn image(path: &Path, fault: impl Display) -> Self {
+        Self::Scan(format!("{}{fault}", path.display()))
     }
 
     pub(crate) fn row(path: &Path, row: usize, fault: impl Display) -> Self {

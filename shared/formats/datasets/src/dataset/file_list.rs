@@ -16,7 +16,6 @@ impl FileList {
         self.ends.len()
     }
 
-    /// Returns whether there is no file.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }

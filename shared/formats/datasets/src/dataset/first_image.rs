@@ -31,7 +31,6 @@ impl NamedBy {
 pub(crate) struct FirstImage {
     rows: Vec<RowMetadata>,
     bins: usize,
-    /// Time in the name of the file, ns.
     pub(crate) name_ns: Option<i64>,
 }
 
@@ -57,13 +56,11 @@ impl FirstImage {
         (0..self.rows.len()).all(|row| self.row_ns(row).is_some())
     }
 
-    /// Returns whether the stamps of the rows are in ns.
     pub(crate) fn nanoseconds(&self) -> bool {
         let first = self.rows.first();
         first.is_some_and(|row| stamp::plausible(row.stamp))
     }
 
-    /// Time of a row, ns.
     pub(crate) fn row_ns(&self, row: usize) -> Option<i64> {
         stamp::to_ns(self.rows.get(row)?.stamp)
     }

@@ -59,13 +59,11 @@ impl Format {
         Self::Fomo,
     ];
 
-    /// Returns the format of this name.
     pub fn by_name(name: &str) -> Option<Self> {
         let mut all = Self::ALL.into_iter().chain([Self::Mcap, Self::Ros2Bag]);
         all.find(|format| format.name() == name)
     }
 
-    /// The name in configurations.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Oxford => "oxford",

@@ -2,12 +2,9 @@
 
 use std::fmt;
 
-/// Size of an image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct ImageSize {
-    /// Columns.
     pub width: usize,
-    /// Rows.
     pub height: usize,
 }
 

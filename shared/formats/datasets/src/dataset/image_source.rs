@@ -10,7 +10,6 @@ use super::image_size::ImageSize;
 pub trait ImageSource: Send {
     fn format(&self) -> Format;
 
-    /// Size of all images.
     fn size(&self) -> ImageSize;
 
     /// The folder of images in the corresponding recording on disk, relative to its root.

@@ -14,7 +14,6 @@ use super::png_image::{self, ImageReader};
 use super::stamp;
 use gyre_radar::scan::MAX_AZIMUTHS;
 
-/// Number of images tried until one can be read.
 const FIRST_TRIES: usize = 8;
 /// Number of images, spread over all of them, whose sizes are looked at.
 const SIZES: usize = 32;
@@ -36,7 +35,6 @@ impl Images {
         Ok((Self::listed(folder, files)?, note.into_iter().collect()))
     }
 
-    /// Reads the sizes of some of the `files` in `folder`.
     pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
         if files.is_empty() {
             return Err(OpenError::no_images(folder));
@@ -78,7 +76,6 @@ impl Images {
         file_number(self.file(index))
     }
 
-    /// The time in the name of a file, ns.
     pub(crate) fn name_stamp_ns(&self, index: usize) -> Option<i64> {
         self.number(index).and_then(stamp::to_ns)
     }
@@ -125,7 +122,6 @@ impl Images {
         }
     }
 
-    /// Keeps the images at these indices, in this order.
     pub(crate) fn keep(&mut self, indices: &[usize]) {
         let paths = indices.iter().map(|index| self.file(*index).to_owned());
         self.files = paths.collect();

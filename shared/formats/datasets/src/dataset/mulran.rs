@@ -32,7 +32,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
             logged_ns: end_ns,
         }
     };
-    scans.period_ns = turn_ns;
+    scans.properties.period_ns = turn_ns;
     scans.turns = ends_ns.iter().enumerate().map(turn).collect();
     Ok(scans)
 }

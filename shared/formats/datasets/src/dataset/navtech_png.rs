@@ -24,7 +24,6 @@ pub(crate) struct RowMetadata {
 }
 
 impl RowMetadata {
-    /// Reads the first [`METADATA_BYTES`] of a row.
     pub(crate) fn parse(row: &[u8]) -> Self {
         let mut stamp = [0; 8];
         stamp.copy_from_slice(&row[..8]);
@@ -69,7 +68,6 @@ pub(crate) enum ByteTen {
     Unused,
 }
 
-/// Writes the flags of each row, see [`flag`].
 pub(crate) fn fill_flags(pixels: &[u8], size: ImageSize, meaning: ByteTen, flags: &mut [u8]) {
     let chirps = chirps_alternate(rows(pixels, size).map(|row| row.byte_ten));
     for (row, into) in rows(pixels, size).zip(flags) {
@@ -210,7 +208,6 @@ pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     }
 }
 
-/// Angle of an azimuth relative to the first, rad.
 fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
     (f64::from(azimuth_rad) - f64::from(first_rad)).rem_euclid(std::f64::consts::TAU)
 }

@@ -16,7 +16,7 @@ use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
 use super::row_order;
 use super::stamp;
-use super::{Dataset, check_capacity};
+use super::{Dataset, Properties, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
@@ -25,15 +25,13 @@ use std::ops::RangeInclusive;
 /// metadata.
 pub(crate) struct NavtechScans {
     images: Images,
-    format: Format,
+    properties: Properties,
     profile: Profile,
-    period_ns: i64,
     max_sweep_ns: i64,
     /// True if the names of the files are times of their sweeps.
     named_by_time: bool,
     /// Times of the first rows, ns, if the names of the files are not times of their sweeps.
     starts_ns: Option<Vec<i64>>,
-    notes: Vec<String>,
 }
 
 /// Longest sweep where the period is unknown, ns. The slowest scanning radars turn once in 2 s.
@@ -64,29 +62,40 @@ impl NavtechScans {
             notes.extend(order.notes);
         }
         let named_by = first_image.as_ref().and_then(FirstImage::named_by);
+        let meaning = match starts_ns {
+            Some(_) => profile.scan_time.of_rows(),
+            None => profile.stamp_meaning,
+        };
         let mut scans = Self {
+            properties: Properties {
+                limits: ScanLimits {
+                    bytes: images.size.width * images.max_rows,
+                    azimuths: images.max_rows,
+                },
+                notes,
+                ..Properties::of(format, images.len(), images.size, meaning)
+            },
             profile: profile.with(format, first_image.as_ref(), options),
-            format,
-            period_ns: stamp::DEFAULT_TURN_NS,
             max_sweep_ns: MAX_SWEEP_NS,
             named_by_time: named_by.is_some(),
             starts_ns,
             images,
-            notes,
         };
         let logged = (0..scans.images.len()).filter_map(|index| scans.logged_stamp_ns(index));
         let turn_ns = stamp::turn_ns(logged);
         if let Some(turn_ns) = turn_ns {
-            scans.period_ns = turn_ns;
+            scans.properties.period_ns = turn_ns;
             scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
         }
         if let Some(image) = &first_image {
             if scans.has_encoder() {
                 scans.find_encoder(image, turn_ns, options.encoder_counts.is_some());
             }
-            let notes = observations(image, scans.format, &scans.profile);
-            scans.notes.extend(notes);
+            let notes = observations(image, format, &scans.profile);
+            scans.properties.notes.extend(notes);
         }
+        let counts = scans.profile.encoder_counts;
+        scans.properties.encoder_counts = scans.has_encoder().then_some(counts);
         Ok(scans)
     }
 
@@ -96,7 +105,8 @@ impl NavtechScans {
         let usual = self.profile.encoder_counts;
         let by_first = encoder_counts(&[image.turn()], turn_ns, usual);
         if is_configured || by_first.is_none() {
-            return self.notes.extend(note_encoder(image, &self.profile));
+            let note = note_encoder(image, &self.profile);
+            return self.properties.notes.extend(note);
         }
         if by_first == Some(usual) {
             return;
@@ -104,7 +114,7 @@ impl NavtechScans {
         let found = encoder_counts(&self.first_turns(), turn_ns, usual);
         if let Some(found) = found.filter(|found| *found != usual) {
             self.profile.encoder_counts = found;
-            self.notes.push(format!(
+            self.properties.notes.push(format!(
                 "The encoder has {found} counts per turn, not {usual}: with these the step from the last row to the first is as the others."
             ));
         }
@@ -167,8 +177,9 @@ impl NavtechScans {
         let stamp_ns = |index| self.logged_stamp_ns(index);
         let next_ns = index.checked_add(1).and_then(stamp_ns);
         let interval_ns = next_ns.zip(stamp_ns(index)).map(|(b, a)| b - a);
-        let is_turn = |ns: &i64| (ns - self.period_ns).abs() < self.period_ns / 5;
-        interval_ns.filter(is_turn).unwrap_or(self.period_ns)
+        let period_ns = self.period_ns();
+        let is_turn = |ns: &i64| (ns - period_ns).abs() < period_ns / 5;
+        interval_ns.filter(is_turn).unwrap_or(period_ns)
     }
 }
 
@@ -185,23 +196,8 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
 }
 
 impl Dataset for NavtechScans {
-    fn format(&self) -> Format {
-        self.format
-    }
-
-    fn len(&self) -> usize {
-        self.images.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        ScanLimits {
-            bytes: self.images.size.width * self.images.max_rows,
-            azimuths: self.images.max_rows,
-        }
-    }
-
-    fn image_size(&self) -> ImageSize {
-        self.images.size
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn files(&self) -> &FileList {
@@ -219,30 +215,11 @@ impl Dataset for NavtechScans {
         })
     }
 
-    fn period_ns(&self) -> i64 {
-        self.period_ns
-    }
-
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         match &self.starts_ns {
             Some(starts_ns) => starts_ns.get(index).copied(),
             None => self.images.name_stamp_ns(index),
         }
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        match self.starts_ns {
-            Some(_) => self.profile.scan_time.of_rows(),
-            None => self.profile.stamp_meaning,
-        }
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        self.has_encoder().then_some(self.profile.encoder_counts)
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

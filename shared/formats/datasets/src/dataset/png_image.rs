@@ -110,7 +110,6 @@ fn damaged(path: &Path, reason: &str) -> ReadError {
     }
 }
 
-/// Decodes images, and reuses the memory for the bytes of the file.
 #[derive(Default)]
 pub(crate) struct ImageReader {
     file: Vec<u8>,

@@ -57,7 +57,6 @@ pub(crate) struct Profile {
     pub(crate) stamp_meaning: &'static str,
     /// The range bins of an image; `None` if only the folder shows the format.
     pub(crate) bins: Option<usize>,
-    /// True if its chirps alternate.
     pub(crate) chirps: bool,
 }
 
@@ -158,7 +157,6 @@ pub(crate) const KNOWN: [Known; 8] = [
 ];
 
 impl Profile {
-    /// The parameters of images without metadata columns.
     pub(crate) fn without_rows(range_resolution_m: f32, options: &DatasetOptions) -> Self {
         let profile = Self {
             range_resolution_m,

@@ -21,7 +21,6 @@ use gyre_storage::quoted;
 
 /// The largest list of stamps: months of scans.
 const MAX_LIST_BYTES: u64 = 1 << 30;
-/// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
 /// Bounds of the period, ns: the radar turns four times per second.
 const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;
@@ -40,7 +39,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     scans.stale = scans.stale.map(StaleRows::of_compressed);
     add_turns(&mut scans, &stamps, &list)?;
     if unpadded > 0 {
-        scans.notes.push(format!(
+        scans.properties.notes.push(format!(
             "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
              read as decimals, time would run backwards.",
             stamps.len(),
@@ -48,7 +47,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         ));
     }
     if stamps.len() > scans.turns.len() {
-        scans.notes.push(format!(
+        scans.properties.notes.push(format!(
             "{} lists {} scans, but there are {} images.",
             file_name(&list),
             stamps.len(),
@@ -141,13 +140,13 @@ fn add_turns(
         })
     };
     scans.turns = received.iter().filter_map(turn).collect();
-    scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
+    scans.properties.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
     let is_early = |frame: &i64| early.iter().any(|(other, _)| other == frame);
     let far = received.iter().map(|(frame, _)| frame);
     let far = far.filter(|frame| !used.contains(*frame) && !is_early(frame));
     let far: Vec<String> = far.map(ToString::to_string).collect();
     let notes = note_times(&far, &early, segments.len(), list);
-    scans.notes.extend(notes);
+    scans.properties.notes.extend(notes);
     Ok(())
 }
 

@@ -12,7 +12,6 @@ const TOUCHING_NS: f64 = 1_000.0;
 const PROMPT_SHARE: f64 = 0.25;
 /// One time in so many may be early, and one more.
 const TIMES_PER_EARLY: usize = 30;
-/// Minimum number of times for the detection of an early one.
 const MIN_TIMES: usize = 8;
 
 /// The number of a scan, and when it was received, ns.
@@ -115,7 +114,6 @@ impl SensorClock {
         self.after_ns(time) < -EARLY_NS
     }
 
-    /// Start of the sweep of a scan, ns since 1970.
     pub(crate) fn start_ns(&self, number: i64) -> i64 {
         let after = (self.start + self.period * number as f64).round() as i64;
         self.origin_ns + after.clamp(-MAX_NS, MAX_NS)

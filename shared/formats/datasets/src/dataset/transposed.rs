@@ -5,14 +5,12 @@ use super::detect::Found;
 use super::eccentricity::correct_eccentricity;
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
-use super::format::Format;
-use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
 use super::profiles::Profile;
 use super::stale::StaleRows;
-use super::{Dataset, check_capacity};
+use super::{Dataset, Properties, check_capacity};
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
@@ -30,16 +28,13 @@ pub(crate) struct Turn {
 /// high are not transposed.
 pub(crate) struct TransposedScans {
     pub(crate) images: Images,
+    /// The caller sets the period with the turns.
+    pub(crate) properties: Properties,
     /// One per image.
     pub(crate) turns: Vec<Turn>,
-    /// Time of a turn, of those without gaps between, ns. The caller sets it with the turns.
-    pub(crate) period_ns: i64,
     /// The azimuth of the first column, steps clockwise from ahead. The caller sets it if it is not
     /// 0.
     pub(crate) first_azimuth: f64,
-    pub(crate) notes: Vec<String>,
-    format: Format,
-    stamp_meaning: &'static str,
     profile: Profile,
     scratch: Vec<u8>,
     /// Without angles, only stale rows show that the host has lost azimuths; `None`: they are
@@ -63,25 +58,33 @@ impl TransposedScans {
             ..
         } = found;
         options.check_without_encoder(format)?;
+        let size = images.size;
+        let (azimuths, bins) = (size.height.min(size.width), size.height.max(size.width));
+        if !(2..=MAX_AZIMUTHS).contains(&azimuths) {
+            let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
+            return Err(images.wrong(format, &reason));
+        }
         let mut scans = Self {
+            properties: Properties {
+                limits: ScanLimits {
+                    bytes: size.bytes(),
+                    azimuths,
+                },
+                is_transposed: size.height > size.width,
+                notes,
+                ..Properties::of(format, images.len(), size, stamp_meaning)
+            },
             images,
             turns: Vec::new(),
-            period_ns: 0,
             first_azimuth: 0.0,
-            notes,
-            format,
-            stamp_meaning,
-            profile: Profile::without_rows(0.0, options),
+            profile: Profile::without_rows(metres_per_bin(bins), options),
             scratch: Vec::new(),
             stale: (options.lost_azimuths != Some(LostAzimuthOption::Ignore))
                 .then(StaleRows::default),
         };
-        scans.check_shape()?;
-        scans.profile = Profile::without_rows(metres_per_bin(scans.bins()), options);
         if scans.is_transposed() {
-            let size = scans.images.size;
             scans.scratch = vec![0; size.bytes()];
-            scans.notes.push(format!(
+            scans.properties.notes.push(format!(
                 "Images are transposed ({} rows of range x {} columns of azimuth): they are transposed back when read.",
                 size.height, size.width
             ));
@@ -89,20 +92,8 @@ impl TransposedScans {
         Ok(scans)
     }
 
-    fn check_shape(&self) -> Result<(), OpenError> {
-        if (2..=MAX_AZIMUTHS).contains(&self.azimuths()) {
-            return Ok(());
-        }
-        let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
-        Err(self.images.wrong(self.format, &reason))
-    }
-
     pub(crate) fn azimuths(&self) -> usize {
-        self.images.size.height.min(self.images.size.width)
-    }
-
-    fn bins(&self) -> usize {
-        self.images.size.height.max(self.images.size.width)
+        self.limits().azimuths
     }
 
     /// Decodes an image, azimuth x range bin.
@@ -129,27 +120,8 @@ impl TransposedScans {
 }
 
 impl Dataset for TransposedScans {
-    fn format(&self) -> Format {
-        self.format
-    }
-
-    fn len(&self) -> usize {
-        self.images.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        ScanLimits {
-            bytes: self.images.size.bytes(),
-            azimuths: self.azimuths(),
-        }
-    }
-
-    fn image_size(&self) -> ImageSize {
-        self.images.size
-    }
-
-    fn is_transposed(&self) -> bool {
-        self.images.size.height > self.images.size.width
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn files(&self) -> &FileList {
@@ -160,20 +132,8 @@ impl Dataset for TransposedScans {
         self.turns.get(index).map(|turn| self.stamp_ns(turn))
     }
 
-    fn period_ns(&self) -> i64 {
-        self.period_ns
-    }
-
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         self.turns.get(index).map(|turn| turn.logged_ns)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        self.stamp_meaning
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
@@ -181,7 +141,8 @@ impl Dataset for TransposedScans {
             index,
             len: self.len(),
         })?;
-        let (azimuths, bins) = (self.azimuths(), self.bins());
+        let azimuths = self.azimuths();
+        let bins = self.images.size.bytes() / azimuths;
         check_capacity(self.limits(), &slot)?;
         let bytes = &mut slot.bytes[..azimuths * bins];
         // No image is before the first one.

@@ -33,13 +33,11 @@ pub struct GnssFaults {
     pub first_unreadable: usize,
     /// Messages of a bag, and rows with a stamp but no place: the receiver had no fix.
     pub without_fix: usize,
-    /// Fixes with a coordinate that is not finite.
     pub not_a_number: usize,
     /// Fixes that are on no place of the earth.
     pub off_the_earth: usize,
     /// Fixes at latitude 0, longitude 0: what receivers write without a fix.
     pub zero: usize,
-    /// Fixes with a repeated stamp.
     pub repeated: usize,
     /// Fixes at the very place of the fix before, as of a frozen receiver or a standing vehicle:
     /// only the first is used.
@@ -59,7 +57,6 @@ fn is_zero(count: &usize) -> bool {
 }
 
 impl GnssFaults {
-    /// Returns the number of rows that are not among the fixes.
     pub fn left_out(&self) -> usize {
         let used = self.out_of_order + self.of_unknown_status + self.too_certain;
         let all = self.named().iter().map(|(count, _)| count).sum::<usize>();
@@ -74,7 +71,6 @@ impl GnssFaults {
         format!("none of its {all} entries is a usable fix{named}")
     }
 
-    /// Returns the counts that are not zero as a text; `None` without faults.
     pub(crate) fn listed(&self) -> Option<String> {
         let named = self.named().into_iter();
         let named = named.map(|(count, what)| format!("{count} {what}"));
@@ -82,7 +78,6 @@ impl GnssFaults {
         (!listed.is_empty()).then_some(listed)
     }
 
-    /// Returns the counts that are not zero, with their names.
     pub fn named(&self) -> Vec<(usize, &'static str)> {
         let all = [
             (self.unreadable, "unreadable"),

@@ -21,7 +21,6 @@ pub struct ReceivedFixes {
 }
 
 impl ReceivedFixes {
-    /// Begins with the log at this path.
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -30,7 +29,6 @@ impl ReceivedFixes {
         }
     }
 
-    /// Reads the rows that were appended since.
     pub fn read_on(&mut self) -> Result<(), LogError> {
         let bytes = self.appended();
         let bytes = bytes.map_err(|source| LogError::unreadable(OF, &self.path, source))?;
@@ -46,12 +44,10 @@ impl ReceivedFixes {
         Ok(())
     }
 
-    /// Returns the number of fixes so far.
     pub fn count(&self) -> usize {
         self.rows.as_ref().map_or(0, |rows| rows.raw.entries.len())
     }
 
-    /// Returns the log of all that was read.
     pub fn log(&self) -> GnssLog {
         let rows = self.rows.clone();
         let (raw, is_plane) = rows.map_or((Raw::of(Vec::new()), false), |rows| {

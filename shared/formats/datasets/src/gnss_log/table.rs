@@ -41,7 +41,6 @@ const SIGMA_EAST: &str = "longitude_sigma";
 const STATUS: &str = "status_status";
 const STATUS_UNKNOWN: &str = "-2";
 
-/// The remedy for a line of a trajectory.
 const TUM: &str = "a line has seconds, x and y, with spaces between";
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
 

@@ -87,8 +87,6 @@ pub fn write_kitti(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<
     Ok(())
 }
 
-/// Returns the planar pose of x, y, and the cosine and sine of its heading.
-///
 /// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results
 /// come from matrices rounded to six decimals, and normalising them changes the fifth decimal of
 /// the result.

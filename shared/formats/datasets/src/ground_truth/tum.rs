@@ -61,8 +61,6 @@ fn matrix([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Matrix {
     ]
 }
 
-/// Writes TUM poses with stamps in ns.
-///
 /// A trajectory without times is `InvalidInput`.
 pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     let stamps = trajectory.stamp_ns.as_ref();
@@ -73,7 +71,6 @@ pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()
     poses.try_for_each(|(ns, pose)| write_tum_pose(*ns, pose, out))
 }
 
-/// Writes a TUM pose with its stamp in ns.
 pub fn write_tum_pose(ns: i64, pose: &Pose, out: &mut impl Write) -> io::Result<()> {
     let (sin, cos) = (pose.rotation.angle() / 2.0).sin_cos();
     let (sign, size) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());

@@ -23,7 +23,6 @@ pub(super) struct GyroColumns {
 /// Names of angular rates, `*` for the axis; the last is EuRoC's, as of accelerations.
 const RATES: &str = "gyro_* gyr_* w* w_* omega_* angular_velocity_* angular_rate_* angvel_* \
     ang_vel_* rate_* angularvelocity* gyroscope_* gyro* g* g_* w_rs_s_*";
-/// Units at the end of a rate's name.
 const RATE_UNITS: [(&str, f64); 3] = [
     ("_rad_s^-1 _radps _rad_s _rad_per_s _rps", 1.0),
     ("_°_s _degps _deg_s _deg_per_s _dps", PI / 180.0),
@@ -32,7 +31,6 @@ const RATE_UNITS: [(&str, f64); 3] = [
 
 const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
     lin_acc_* a_rs_s_*";
-/// Units at the end of an acceleration's name.
 const ACCELERATION_UNITS: [(&str, f64); 3] = [
     ("_m_s^-2 _mps2 _m_s2 _m_per_s2", 1.0),
     ("_g", 9.80665),
@@ -58,7 +56,6 @@ const MULRAN_WITHOUT_RATES: usize = 8;
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
 impl GyroColumns {
-    /// Columns in rad/s and m/s².
     fn known(stamp: Stamp, rates: [usize; 3], accelerations: [usize; 3]) -> Self {
         Self {
             stamp,
@@ -138,7 +135,6 @@ pub(super) fn sample(stamp_ns: i64, [rates, accelerations]: [[f64; 3]; 2]) -> Sa
     }
 }
 
-/// The columns of a vector, and its unit if the names have one.
 type Vector = ([usize; 3], Option<f64>);
 
 fn vector(header: &Header, patterns: &str, units: &[(&'static str, f64)]) -> Option<Vector> {

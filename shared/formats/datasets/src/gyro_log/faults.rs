@@ -61,17 +61,14 @@ pub struct LogFaults {
     pub unit_is_assumed: bool,
 }
 
-/// A time without samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LogGap {
     /// The last sample before it, s since the first of the log.
     pub after_s: f64,
-    /// The duration, s.
     pub seconds: f64,
 }
 
 impl LogFaults {
-    /// Returns the number of rows that are not among the samples.
     pub fn left_out(&self) -> usize {
         self.unreadable
             + self.not_a_number
@@ -154,17 +151,14 @@ impl LogFaults {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plausible {
-    /// The sensor.
     pub of: SampleKind,
     /// The number of values of a sample that count.
     pub values: usize,
-    /// The largest of them.
     pub most: f64,
     /// That in words, and the remedy where many are beyond.
     pub beyond: &'static str,
 }
 
-/// The rates of a gyro.
 pub(super) const RATES: Plausible = Plausible {
     of: SampleKind::Gyro,
     values: 3,

@@ -10,7 +10,6 @@ use super::jumps;
 pub struct SampleTrack(Vec<Sample>);
 
 impl SampleTrack {
-    /// Takes samples that are on the radar's clock, in their order.
     pub(crate) fn of(samples: impl Iterator<Item = Sample>) -> Self {
         Self(samples.collect())
     }
@@ -21,7 +20,6 @@ impl SampleTrack {
         jumps::leave_out(&mut self.0, kind).sentence()
     }
 
-    /// Returns the samples of both tracks.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.0.extend(other.0);
@@ -46,7 +44,6 @@ impl SampleTrack {
         self.0.get(from..to).unwrap_or_default()
     }
 
-    /// Returns the first stamp and the last; `None` without samples.
     pub fn span_ns(&self) -> Option<[i64; 2]> {
         Some([self.0.first()?.stamp_ns, self.0.last()?.stamp_ns])
     }

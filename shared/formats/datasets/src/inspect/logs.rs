@@ -190,7 +190,6 @@ struct Times {
 }
 
 impl Times {
-    /// Examines stamps, ns, in their order.
     fn of(stamps: impl Iterator<Item = i64>, timing: Option<&Timing>) -> Self {
         let stamps: Vec<i64> = stamps.collect();
         let steps = stamps.windows(2).map(|pair| apart_s(pair[1], pair[0]));
@@ -300,7 +299,6 @@ fn quiet(samples: &[Sample], period_s: f64) -> Option<Quiet> {
     })
 }
 
-/// The means and the variances of the rates.
 fn moments(samples: &[Sample]) -> ([f64; 3], [f64; 3]) {
     let count = samples.len() as f64;
     let mean = [0, 1, 2].map(|k| samples.iter().map(|it| it.values[k]).sum::<f64>() / count);

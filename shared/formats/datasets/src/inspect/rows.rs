@@ -28,7 +28,6 @@ pub(super) struct Survey {
     stale: u64,
     stale_scans: usize,
     lost: u64,
-    /// The median step between azimuths of each scan.
     steps_rad: Vec<f64>,
     first_rad: Option<(f32, f32)>,
     power_rows: u64,

@@ -19,7 +19,6 @@ use crate::{
     file::{Span, Times, joined},
 };
 
-/// The description that a radar gives of itself, or why that cannot be used.
 type OwnDescription = Result<Described, String>;
 
 pub(crate) struct Bag {

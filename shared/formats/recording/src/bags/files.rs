@@ -64,7 +64,6 @@ fn profile(path: &Path) -> Option<String> {
     }
 }
 
-/// The description of a bag, as far as it is needed.
 #[derive(Deserialize)]
 struct Metadata {
     rosbag2_bagfile_information: Information,
@@ -109,7 +108,6 @@ pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
     })
 }
 
-/// Returns the files that the description of a bag names.
 fn described(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let path = folder.join(METADATA);
     let text = gyre_storage::read_text(&path, MAX_METADATA_BYTES)

@@ -16,7 +16,6 @@ use crate::bags::{
     topics::{Form, Kind},
 };
 
-/// Encoder counts of Navtech's radars.
 pub(crate) const ENCODER_COUNTS: u16 = 5600;
 /// Azimuths, several turns, that determine the number per turn and the size of the encoder.
 pub(crate) const MAX_SAMPLES: usize = 2000;

@@ -8,12 +8,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_colossus::{Azimuth, Constants, SweepAssembler};
+use gyre_colossus::{Azimuth, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, ReadError, check_capacity, turn_ns,
+    OpenError, Properties, ReadError, check_capacity, turn_ns,
 };
-use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::bags::{
@@ -62,17 +62,18 @@ fn open_files(
     Ok(Box::new(Scans::open(path, files, options)?))
 }
 
+const MEANING: &str = "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
+                       is the middle of its first and last.";
+
 struct Scans {
     path: PathBuf,
+    properties: Properties,
     bag: Bag,
     topics: Topics,
     described: Described,
-    constants: Constants,
+    options: DatasetOptions,
     index: Index,
     files: FileList,
-    period_ns: i64,
-    notes: Vec<String>,
-    damage: Option<String>,
     /// The spans that were read last, and their messages of scans.
     kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
 }
@@ -83,8 +84,7 @@ impl Scans {
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
         let (described, source) = bag.describe(&topics, options)?;
-        let constants = Constants::from(options);
-        let assembler = SweepAssembler::new(&described.radar, constants).map_err(|error| {
+        let assembler = SweepAssembler::new(&described.radar, *options).map_err(|error| {
             RecordingError::unreadable(path, format_args!("cannot be read: {error}"))
         })?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
@@ -97,16 +97,25 @@ impl Scans {
         let mut notes = vec![format!("Scans are on {}{source}.", topics.scans.name)];
         notes.extend(index.notes());
         notes.extend(damages.iter().map(|sentence| format!("{sentence}.")));
+        let size = ImageSize {
+            width: usize::from(described.radar.range_in_bins),
+            height: usize::from(described.radar.azimuth_samples),
+        };
         Ok(Self {
-            damage: damages.into_iter().next(),
-            period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
-            notes,
+            properties: Properties {
+                limits: index.limits,
+                period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
+                encoder_counts: Some(described.radar.encoder_size),
+                notes,
+                damage: damages.into_iter().next(),
+                ..Properties::of(Format::Ros2Bag, index.entries.len(), size, MEANING)
+            },
             files: bag.files.iter().map(|file| file.path.clone()).collect(),
             path: path.to_owned(),
             bag,
             topics,
             described,
-            constants,
+            options: *options,
             index,
             kept: (None, BTreeMap::new()),
         })
@@ -125,7 +134,6 @@ impl Scans {
         Ok(())
     }
 
-    /// Returns why the message of a scan cannot be decoded.
     fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
         self.keep(&entry.spans)?;
         let message = self.kept.1.get(&entry.start.message);
@@ -135,14 +143,13 @@ impl Scans {
         Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
     }
 
-    /// Assembles a scan from the azimuths from its entry's start on.
     fn assemble(
         &mut self,
         index: usize,
         entry: &Entry,
         mut slot: ScanSlot<'_>,
     ) -> Result<Option<SweepGeometry>, RecordingError> {
-        let assembler = SweepAssembler::new(&self.described.radar, self.constants);
+        let assembler = SweepAssembler::new(&self.described.radar, self.options);
         let Ok(mut assembler) = assembler else {
             return Ok(None);
         };
@@ -187,23 +194,8 @@ fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
 }
 
 impl Dataset for Scans {
-    fn format(&self) -> Format {
-        Format::Ros2Bag
-    }
-
-    fn len(&self) -> usize {
-        self.index.entries.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        self.index.limits
-    }
-
-    fn image_size(&self) -> ImageSize {
-        ImageSize {
-            width: usize::from(self.described.radar.range_in_bins),
-            height: usize::from(self.described.radar.azimuth_samples),
-        }
+    fn properties(&self) -> &Properties {
+        &self.properties
     }
 
     fn files(&self) -> &FileList {
@@ -220,29 +212,8 @@ impl Dataset for Scans {
         Some(self.index.entries.get(index)?.stamp_ns)
     }
 
-    fn period_ns(&self) -> i64 {
-        self.period_ns
-    }
-
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         Some(self.index.entries.get(index)?.logged_ns)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
-         is the middle of its first and last."
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        Some(self.described.radar.encoder_size)
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn damage(&self) -> Option<&str> {
-        self.damage.as_deref()
     }
 
     fn logged(
@@ -266,11 +237,10 @@ impl Dataset for Scans {
         let failed = |error: RecordingError| error.of_scan(&path);
         if entry.is_damaged {
             let reason = self.why_damaged(&entry).map_err(failed)?;
-            return Err(ReadError::Message {
-                path,
-                index,
-                reason,
-            });
+            return Err(ReadError::Scan(format!(
+                "the message of scan {index} in {} cannot be decoded: {reason}",
+                path.display()
+            )));
         }
         let assembled = self.assemble(index, &entry, slot).map_err(failed)?;
         assembled.ok_or_else(|| ReadError::Damaged {

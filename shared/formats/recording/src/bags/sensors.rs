@@ -51,7 +51,6 @@ impl<T> Sensor<T> {
         Ok(Some((topic, measurements)))
     }
 
-    /// Returns the names of the topics that may be of the sensor, in a sentence.
     pub fn listed(&self, bag: &Bag) -> String {
         listed(&self.topics(bag))
     }

@@ -199,15 +199,6 @@ mod tests {
     }
 
     #[test]
-    fn numbers_as_bytes_are_told_by_the_definition() {
-        let mut newer = channel("/fft", "nav_messages/msg/RadarFftDataMsg");
-        let kind = |newer: &Channel| Topic::of(newer).unwrap().kind;
-        assert_eq!(kind(&newer), Kind::Azimuths(Form::Numbers));
-        newer.schema = "uint8[] angle\nuint8[] azimuth\n".to_owned();
-        assert_eq!(kind(&newer), Kind::Azimuths(Form::Bytes));
-    }
-
-    #[test]
     fn images_are_a_radars_if_the_driver_names_them_so() {
         assert!(choose(&[("/camera", "sensor_msgs/msg/Image")]).is_err());
         let image = [("/radar_data/b_scan_image", "sensor_msgs/msg/Image")];

@@ -149,7 +149,6 @@ impl BagWriter {
         written.map_err(|error| unwritable(&self.path, error))
     }
 
-    /// Returns the names of the topics, and how many messages each has.
     pub fn counts(&self) -> impl Iterator<Item = (&str, u64)> {
         let topics = self.topics.iter();
         topics.map(|topic| (topic.name.as_str(), topic.messages))

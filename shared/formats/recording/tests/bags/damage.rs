@@ -26,10 +26,8 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
     let Err(error) = read(dataset.as_mut(), 2) else {
         panic!("a damaged scan was read");
     };
-    assert!(
-        matches!(error, ReadError::Message { index: 2, .. }),
-        "{error}"
-    );
+    let words = "the message of scan 2 in ";
+    assert!(error.to_string().starts_with(words), "{error}");
     for turn in [0, 1, 3, 4] {
         assert_is(&read(dataset.as_mut(), turn).unwrap(), turn);
     }

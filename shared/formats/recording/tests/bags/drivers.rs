@@ -4,19 +4,6 @@ use gyre_ros2_messages::messages::RadarConfigurationMessage;
 
 use super::*;
 
-/// The messages of turns, each changed.
-fn changed(turns: usize, change: impl Fn(&mut RadarBScanMsg)) -> Messages {
-    let (writer, mut messages) = (ScanMessages::new(radar(), "radar"), Messages::default());
-    messages.add(CONFIGURATION, START_NS, &writer.configuration(START_NS));
-    for turn in 0..turns {
-        let mut message = writer.b_scan(scan(turn).view());
-        change(&mut message);
-        let end_ns = START_NS + TURN_NS * (turn as i64 + 1);
-        messages.add(B_SCANS, end_ns, &message);
-    }
-    messages
-}
-
 /// Replaces the configuration of a bag by the configuration of a driver before 2024.
 fn with_older_configuration(mut messages: Messages, bin_size: f64) -> Messages {
     let older = RadarConfigurationMessage {
@@ -49,18 +36,6 @@ fn a_configuration_that_no_radar_has_is_refused_with_its_reason() {
     assert_has_turns(dataset.as_mut(), 4);
     let notes = dataset.notes().join(" ");
     assert!(notes.contains("cannot be used"), "{notes}");
-}
-
-#[test]
-fn images_that_are_no_powers_are_refused_and_named() {
-    let folder = Folder::new();
-    let sixteen = changed(3, |message| {
-        message.b_scan_img.encoding = "mono16".to_owned()
-    });
-    let sentence = refused(&folder.bag(&sixteen));
-    for words in ["none can be decoded", "`mono16`", "`mono8`"] {
-        assert!(sentence.contains(words), "{sentence}");
-    }
 }
 
 #[test]

@@ -52,41 +52,12 @@ fn log(messages: &Messages) -> GnssLog {
     log
 }
 
-/// A change of fixes with its name, the fault that names it, and how many fixes it takes away.
-type Change = (&'static str, fn(i64, &mut NavSatFix), usize);
-
 #[test]
-fn fixes_of_a_bag_have_their_accuracy_and_faults_are_named() {
-    let changes: [Change; 3] = [
-        ("", |_, _| {}, 0),
-        (
-            "not a number",
-            |number, fix| {
-                if number % 10 == 3 {
-                    fix.latitude = f64::NAN;
-                }
-            },
-            3,
-        ),
-        (
-            "repeated",
-            |number, fix| {
-                if number == 9 {
-                    fix.header = Header::new(START_NS + 8_000_000_000, "gnss");
-                }
-            },
-            1,
-        ),
-    ];
-    for (name, change, lost) in changes {
-        let log = log(&with(&[FIX], change));
-        assert_eq!(log.fixes.len() as i64, FIXES - lost as i64, "{name}");
-        assert_eq!(log.faults.left_out(), lost, "{name}");
-        assert_eq!(log.fixes[2].sigma_m, Some(3.5_f64.sqrt()), "{name}");
-        let named = log.faults.named();
-        let named: Vec<&str> = named.into_iter().map(|(_, name)| name).collect();
-        assert_eq!(named.join(" "), name);
-    }
+fn fixes_of_a_bag_have_their_accuracy() {
+    let log = log(&with(&[FIX], |_, _| {}));
+    assert_eq!(log.fixes.len() as i64, FIXES);
+    assert_eq!(log.fixes[2].sigma_m, Some(3.5_f64.sqrt()));
+    assert!(log.faults.named().is_empty());
 }
 
 #[test]

@@ -335,6 +335,17 @@ fn bags_that_cannot_be_used_say_why_in_one_sentence() {
     }
     assert!(refused(&folder.bag(&compressed)).contains("compression_mode: none"));
 
+    let mut sixteen = b_scans(3);
+    for (.., data) in &mut sixteen.0[1..] {
+        let mut message: RadarBScanMsg = decode(data).unwrap();
+        message.b_scan_img.encoding = "mono16".to_owned();
+        *data = encode(&message).unwrap();
+    }
+    let sentence = refused(&folder.bag(&sixteen));
+    for words in ["none can be decoded", "`mono16`", "`mono8`"] {
+        assert!(sentence.contains(words), "{sentence}");
+    }
+
     let path = folder.path("empty.mcap");
     fs::write(&path, []).unwrap();
     assert!(refused(&path).contains("signature of MCAP"));

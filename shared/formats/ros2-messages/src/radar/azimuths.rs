@@ -21,7 +21,6 @@ impl RadarFftDataMsg {
 }
 
 impl RadarFftDataMessage {
-    /// Returns the azimuth as the radar sent it.
     pub fn azimuth(&self) -> Result<Azimuth<'_>, BadMessage> {
         let sweep_counter = number::<Self, 2>("sweep_counter", &self.sweep_counter)?;
         Ok(Azimuth {

@@ -15,7 +15,6 @@ use crate::{
 /// bits.
 const ROUNDING_RAD: f64 = 2e-6;
 
-/// The counts of an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
     pub counts: u16,

@@ -60,14 +60,9 @@ fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
 }
 
 /// Refines items and writes the state after each, as the stage does.
-fn process(
-    refinement: &mut Refiner,
-    checkpoint: &mut Checkpoint,
-    world: u64,
-    items: std::ops::Range<u64>,
-) {
+fn process(refinement: &mut Refiner, checkpoint: &mut Checkpoint, items: std::ops::Range<u64>) {
     for item in items {
-        step(refinement, world, item);
+        step(refinement, 1, item);
         checkpoint.write(item, 0, refinement).unwrap();
     }
 }
@@ -98,11 +93,11 @@ fn state_of(refinement: &Refiner) -> String {
 
 /// The states after the items 0, 1, ... of one process; the state is empty after item 0, where the
 /// chain starts.
-fn history(world: u64, items: u64) -> Vec<String> {
+fn history(items: u64) -> Vec<String> {
     let mut refinement = refinement();
     let mut history = vec![state_of(&refinement)];
     for item in 1..items {
-        step(&mut refinement, world, item);
+        step(&mut refinement, 1, item);
         history.push(state_of(&refinement));
     }
     history
@@ -126,24 +121,8 @@ fn restored(path: &Path, item: u64) -> Result<String, CheckpointError> {
 fn checkpoint_of(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = checkpoint::path(folder.path());
-    process(&mut refinement(), &mut open(&path), 1, 1..items);
+    process(&mut refinement(), &mut open(&path), 1..items);
     (folder, path)
-}
-
-#[test]
-fn every_item_of_the_last_window_is_restored_bit_for_bit() {
-    const ITEMS: u64 = 60;
-    let history = history(1, ITEMS);
-    for items in [3, 9, 20, ITEMS] {
-        let (_folder, path) = checkpoint_of(items);
-        for item in items.saturating_sub(2 * WINDOW as u64).max(1)..items {
-            assert_eq!(
-                restored(&path, item).unwrap(),
-                history[item as usize],
-                "item {item} of {items}"
-            );
-        }
-    }
 }
 
 #[test]
@@ -152,11 +131,11 @@ fn a_truncated_file_loses_only_the_last_write() {
     let before = fs::read(&path).unwrap();
     // Item 4 makes a keyframe, whose slot is at the file's end.
     let (mut refinement, mut checkpoint) = resumed(&path, 3);
-    process(&mut refinement, &mut checkpoint, 1, 4..6);
+    process(&mut refinement, &mut checkpoint, 4..6);
     drop(checkpoint);
     let after = fs::read(&path).unwrap();
     assert!(after.len() > before.len());
-    let history = history(1, 6);
+    let history = history(6);
     for length in [
         after.len() - 1,
         (before.len() + after.len()) / 2,
@@ -183,11 +162,11 @@ fn a_truncated_file_loses_only_the_last_write() {
 
 #[test]
 fn corrupt_bytes_in_the_newest_slots_lose_only_those() {
-    let history = history(1, 31);
+    let history = history(31);
     let (_folder, path) = checkpoint_of(30);
     let before = fs::read(&path).unwrap();
     let (mut refinement, mut checkpoint) = resumed(&path, 29);
-    process(&mut refinement, &mut checkpoint, 1, 30..31);
+    process(&mut refinement, &mut checkpoint, 30..31);
     drop(checkpoint);
     let after = fs::read(&path).unwrap();
     let changed: Vec<usize> = (0..after.len())
@@ -223,7 +202,7 @@ fn the_file_of_another_configuration_is_overwritten() {
     let mut refinement = Refiner::new(&other, 512).unwrap();
     let mut checkpoint = open_with(&path, &other, WINDOW);
     assert!(checkpoint.restore(19, &mut refinement).is_err());
-    process(&mut refinement, &mut checkpoint, 1, 1..10);
+    process(&mut refinement, &mut checkpoint, 1..10);
     drop(checkpoint);
     let mut again = Refiner::new(&other, 512).unwrap();
     open_with(&path, &other, WINDOW)
@@ -235,7 +214,7 @@ fn the_file_of_another_configuration_is_overwritten() {
 
 #[test]
 fn another_window_continues_with_the_same_file() {
-    let history = history(1, 30);
+    let history = history(30);
     let (_folder, path) = checkpoint_of(30);
     for window in [2, 20, 66] {
         let mut refinement = refinement();
@@ -257,20 +236,6 @@ fn a_missing_item_is_reported_in_one_sentence() {
     }
     fs::remove_file(&path).unwrap();
     assert!(restored(&path, 5).is_err());
-}
-
-#[test]
-fn a_new_chain_does_not_restore_the_previous_one() {
-    let (_folder, path) = checkpoint_of(21);
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    refinement.reset();
-    checkpoint.write(15, 0, &refinement).unwrap();
-    drop(checkpoint);
-    assert_eq!(restored(&path, 15).unwrap(), history(1, 1)[0]);
-    let mut checkpoint = open(&path);
-    process(&mut refinement, &mut checkpoint, 2, 16..21);
-    drop(checkpoint);
-    assert_eq!(restored(&path, 20).unwrap(), state_of(&refinement));
 }
 
 /// The pose of an item whose motion moves by so many metres.
@@ -321,7 +286,7 @@ fn the_newest_pose_whose_whole_state_is_there_is_found() {
 
 #[test]
 fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_repeated() {
-    let history = history(1, 31);
+    let history = history(31);
     let (_folder, path) = checkpoint_of_poses(30);
     let mut bytes = fs::read(&path).unwrap();
     let end = bytes.len();
@@ -373,7 +338,7 @@ fn the_file_stops_growing() {
     let path = checkpoint::path(folder.path());
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     let mut length = |items: std::ops::Range<u64>| {
-        process(&mut refinement, &mut checkpoint, 1, items);
+        process(&mut refinement, &mut checkpoint, items);
         fs::metadata(&path).unwrap().len()
     };
     // A keyframe every other item.

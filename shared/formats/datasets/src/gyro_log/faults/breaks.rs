@@ -42,7 +42,6 @@ pub(super) fn repair(samples: Vec<Sample>, faults: &mut LogFaults) -> Result<Vec
     }
 }
 
-/// The step of the stamps to a sample from the one before, ns.
 fn step_ns(samples: &[Sample], k: usize) -> i64 {
     samples[k].stamp_ns - samples[k - 1].stamp_ns
 }

@@ -40,7 +40,6 @@ pub(super) struct Entry {
     pub is_damaged: bool,
 }
 
-/// The scans of a bag, in order.
 pub(super) struct Index {
     pub entries: Vec<Entry>,
     pub limits: ScanLimits,
@@ -104,7 +103,6 @@ impl Index {
         })
     }
 
-    /// Returns notes on the times and on missing scans: whole sentences.
     pub fn notes(&self) -> Vec<String> {
         let found = self.clocks.iter().filter_map(|(_, clock)| clock.found());
         let mut notes: Vec<String> = found.map(|found| found.to_string()).collect();
