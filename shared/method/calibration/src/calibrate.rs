@@ -4,7 +4,7 @@ use gyre_scan_matching::ConfigError;
 use nalgebra::DVector;
 
 use crate::{
-    CalibrationError, Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
+    CalibrationError, Drive, Estimate, Fact, FactVector, Revisit, Track,
     drift::{self, MAX_REVISITS},
     facts::FACTS,
     overlap::{System, along, overlaps, slopes},
@@ -20,7 +20,6 @@ const DRIFT_STEP_RAD: f64 = 3e-3;
 /// No estimate is better than this share of a cell of the local map, or its effect at the range of
 /// most points: the images' own error.
 const CELL_SHARE: f64 = 0.05;
-/// Range of most points, m, and a usual speed, m/s.
 const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
 /// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
@@ -61,7 +60,6 @@ pub struct Calibration {
     pub proposed: Vec<Fact>,
     /// Mean overlap of the pairs as configured, and with the facts that the drive determines.
     pub overlap: [f64; 2],
-    pub mounting: Option<Mounting>,
     /// The track as configured, and the one with the proposed facts.
     pub before: Track,
     pub after: Track,
@@ -118,7 +116,6 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         pairs: solution.round.pairs,
         has_settled: solution.round.has_converged(),
         revisits,
-        mounting: Mounting::of(&after.twists),
         proposed,
         overlap,
         before,
@@ -245,7 +242,6 @@ fn drift_of(
     Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
-/// The revisits with their poses aligned under the facts of a track.
 fn aligned(drive: &Drive, track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
     let poses = revisits.iter().zip(slopes(drive, track, revisits));
     poses

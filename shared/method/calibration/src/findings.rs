@@ -6,11 +6,10 @@ mod tests;
 
 use std::{fmt, iter};
 
-use gyre_radar::{Sense, SweepGeometry};
+use gyre_radar::SweepGeometry;
 
 use crate::{
-    Calibration, CalibrationError, Drive, Fact, FactVector, Mounting, OwnReflections,
-    calibrate::SOLVED,
+    Calibration, CalibrationError, Drive, Fact, FactVector, OwnReflections, calibrate::SOLVED,
 };
 pub use constant::Constant;
 use constant::{Label, constant, resolution};
@@ -88,7 +87,7 @@ impl Found {
             constants: constants.collect(),
             resolution: resolution(path_m, configured)?,
             min_range_m: drive.reflections.min_range_m(configured.min_range_m),
-            others: others(drive, calibration, configured),
+            others: others(drive, calibration, configured.min_range_m),
         })
     }
 
@@ -160,7 +159,7 @@ impl Found {
     }
 }
 
-fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Vec<[String; 2]> {
+fn others(drive: &Drive, calibration: &Calibration, min_range_m: f64) -> Vec<[String; 2]> {
     let fact = |fact: Fact| &calibration.facts[fact as usize].change;
     let (sine, row_time) = (fact(Fact::EccentricitySin), fact(Fact::RowTime));
     vec![
@@ -186,68 +185,24 @@ fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> 
             ),
         ],
         [
-            "sense of rotation".to_owned(),
-            sense(drive, calibration, configured),
+            "own reflections".to_owned(),
+            reflections(&drive.reflections, min_range_m),
         ],
-        [
-            "mounting".to_owned(),
-            calibration.mounting.as_ref().map_or_else(
-                || "too little driving, no bend, or a radar that looks elsewhere than ahead: not told".to_owned(),
-                mounting,
-            ),
-        ],
-        ["own reflections".to_owned(), reflections(drive, configured)],
     ]
 }
 
-/// A mirrored world is as consistent; only the driver knows.
-fn sense(drive: &Drive, calibration: &Calibration, configured: &Configured) -> String {
-    let name = match configured.geometry.sense {
-        Sense::Clockwise => "clockwise",
-        Sense::CounterClockwise => "counter-clockwise",
-    };
-    let poses = &calibration.after.poses;
-    const SCANS: usize = 20;
-    let turn = |k: usize| poses[k - SCANS].inv_mul(&poses[k]).rotation.angle();
-    let largest = (SCANS..poses.len()).max_by(|a, b| turn(*a).abs().total_cmp(&turn(*b).abs()));
-    let Some(at) = largest else {
-        return format!("{name}; a mirrored drive looks the same");
-    };
-    let side = if turn(at) > 0.0 { "left" } else { "right" };
-    format!(
-        "{name}; a mirrored drive looks the same: check that the vehicle turned {side} by {:.0} degrees before scan {}",
-        turn(at).to_degrees().abs(),
-        drive.sweeps[at].number
-    )
-}
-
-fn mounting(mounting: &Mounting) -> String {
-    let Mounting { yaw_rad, ahead_m } = mounting;
-    format!(
-        "yaw {:+.2} \u{b1} {:.2} degrees counter-clockwise of the vehicle's straight ahead, {:.1} \u{b1} {:.1} m ahead of the rear axle, \
-         from the direction of motion; poses are the radar's, so there is no key",
-        yaw_rad.value.to_degrees(),
-        yaw_rad.sigma.to_degrees(),
-        ahead_m.value,
-        ahead_m.sigma
-    )
-}
-
-fn reflections(drive: &Drive, configured: &Configured) -> String {
-    let own = &drive.reflections;
-    match (own.end_m(), own.min_range_m(configured.min_range_m)) {
+fn reflections(own: &OwnReflections, configured_m: f64) -> String {
+    match (own.end_m(), own.min_range_m(configured_m)) {
         (None, _) => "too few moving scans to tell them".to_owned(),
         (Some(end_m), _) if end_m >= OwnReflections::REACH_M => format!(
             "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
         ),
         (Some(end_m), Some(min_range_m)) => format!(
-            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: that and raster.min_range_m are to be {min_range_m:.1}",
-            configured.min_range_m
+            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {configured_m}: that and raster.min_range_m are to be {min_range_m:.1}"
         ),
-        (Some(end_m), None) => format!(
-            "to {end_m:.2} m, within points.min_range_m = {}",
-            configured.min_range_m
-        ),
+        (Some(end_m), None) => {
+            format!("to {end_m:.2} m, within points.min_range_m = {configured_m}")
+        }
     }
 }
 

@@ -72,14 +72,6 @@ impl Default for PlaceIndex {
 }
 
 impl PlaceIndex {
-    /// Memory of a place, bytes: its descriptor with its norm, its id and path, and its distance in
-    /// a query.
-    pub const BYTES_PER_PLACE: usize = Descriptor::SIEVE_BYTES
-        + SPECTRUM_BYTES
-        + size_of::<f32>()
-        + size_of::<PathPoint>()
-        + size_of::<(u32, u32)>();
-
     /// Creates an empty index with memory for a number of places. More places make it grow.
     pub fn with_capacity(places: usize) -> Self {
         Self {
