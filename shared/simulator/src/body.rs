@@ -1,5 +1,3 @@
-//! Bodies: scatterers that reflect and walls that hide the space behind them, standing or moving.
-
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
 

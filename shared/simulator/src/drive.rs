@@ -1,5 +1,3 @@
-//! The path of the vehicle: the section `[simulation.drive]`.
-
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,3 @@
-//! A GNSS receiver: the section `[simulation.gnss]`, and the log that it leaves.
-
 use std::fmt::Write as _;
 
 use gyre_samples::{Geographic, LocalPlane, RawFix};

@@ -1,5 +1,3 @@
-//! Interpolation in tables of measured values.
-
 /// The value of a table at a place: linear between its entries, constant before the first and after
 /// the last.
 pub(crate) fn interpolate(table: &[(f64, f64)], at: f64) -> f64 {

@@ -1,5 +1,3 @@
-//! The format of the dataset: the section `[simulation.output]`.
-
 use std::fmt;
 use std::str::FromStr;
 

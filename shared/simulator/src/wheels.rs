@@ -1,5 +1,3 @@
-//! The speed of the wheels: the section `[simulation.wheels]`, and the log that it leaves.
-
 use std::fmt::Write as _;
 
 use gyre_geometry::Twist;

@@ -47,7 +47,6 @@ pub(crate) fn solve(
     (information > 0.0).then(|| Estimate::new(value, (excess.max(1.0) / information).sqrt()))
 }
 
-/// The covariance of the residuals: of the motions between and of the alignments.
 fn covariance(track: &Track, revisits: &[Revisit]) -> DMatrix<f64> {
     let count = revisits.len();
     let mut all = DMatrix::zeros(3 * count, 3 * count);

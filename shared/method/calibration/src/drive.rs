@@ -48,7 +48,6 @@ pub struct Drive {
     extractor: PointExtractor,
 }
 
-/// The track of the drive under assumed facts.
 #[derive(Clone, Debug)]
 pub struct Track {
     /// The poses in the frame of the first scan.
@@ -142,7 +141,6 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns the stamps of the scans, ns, and whether the chain of motions starts with each.
     pub(crate) fn stamps(&self) -> (Vec<i64>, Vec<bool>) {
         let stamps = self.sweeps.iter().map(|sweep| sweep.stamp_ns);
         (stamps.collect(), self.starts())

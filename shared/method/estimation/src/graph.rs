@@ -34,7 +34,6 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, and dynamic covariance scaling from a quarter of it.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
@@ -240,7 +239,6 @@ impl PoseGraph {
         self.factorised = false;
     }
 
-    /// Returns the chi-square of a loop against the odometry between its keyframes.
     fn against_odometry(&self, edge: &Edge) -> f64 {
         let [from, to] = edge.ends;
         let chain = self.odometry[from.min(to)..from.max(to)]

@@ -3,14 +3,12 @@
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 
-/// A predicted relative pose and its Jacobians.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Relative {
     /// The pose of `to` in the frame of `from`.
     pub motion: Pose,
     /// Jacobian of (x, y, yaw) of the motion with respect to (x, y, yaw) of `from`.
     pub by_from: Matrix3<f64>,
-    /// Jacobian with respect to (x, y, yaw) of `to`.
     pub by_to: Matrix3<f64>,
 }
 

@@ -1,5 +1,3 @@
-//! A map as a folder.
-
 use std::{
     collections::BTreeSet,
     fs,

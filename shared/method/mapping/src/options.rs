@@ -1,5 +1,3 @@
-//! Options of a map.
-
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -1,5 +1,3 @@
-//! Tiles: squares of the map.
-
 use std::{fmt, ops::RangeInclusive};
 
 use nalgebra::{Point2, Vector2};

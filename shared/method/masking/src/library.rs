@@ -1,5 +1,3 @@
-//! The library that computes the networks.
-
 use std::path::{Path, PathBuf};
 
 use crate::networks::runtime::{self, RuntimeError};

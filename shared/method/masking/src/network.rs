@@ -35,7 +35,6 @@ impl NetworkError {
         Self::Model(format!("{by} cannot load {path}: {reason}"))
     }
 
-    /// A model with operators of a version newer than the newest that a backend supports.
     fn opset(by: Backend, model: &Model, opset: i64, known: &str) -> Self {
         let (by, path) = (by.name(), model.file.display());
         Self::Model(format!(
@@ -47,7 +46,6 @@ impl NetworkError {
 #[derive(Debug)]
 pub struct Network {
     engine: Engine,
-    /// The last masks, scans x n x n.
     masks: Array3<f32>,
 }
 

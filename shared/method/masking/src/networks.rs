@@ -1,5 +1,3 @@
-//! Networks, computed by ONNX Runtime or rten.
-
 mod planes;
 pub mod runtime;
 

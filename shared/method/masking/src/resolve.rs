@@ -1,5 +1,3 @@
-//! Resolves the inputs of a network.
-
 use crate::networks::runtime::RuntimeError;
 
 use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};

@@ -1,5 +1,3 @@
-//! The assignment of measurements to tracks.
-
 use pathfinding::kuhn_munkres::kuhn_munkres_min;
 use pathfinding::matrix::Matrix;
 

@@ -1,5 +1,3 @@
-//! The detection of vehicles that move, by the network.
-
 use std::f64::consts::TAU;
 use std::path::Path;
 

@@ -26,7 +26,6 @@ const LATERAL_ACCELERATION_MPS2: f64 = 1.0;
 /// An object that stood may be detected this far behind its place, m: less than its length.
 const BEHIND_M: f64 = 4.0;
 
-/// Position and velocity with their covariance, by models of different turn rates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Filter {
     models: [Model; TURNS.len()],

@@ -1,5 +1,3 @@
-//! The input and the output of the tracking.
-
 use gyre_geometry::{Pose, Twist};
 use nalgebra::{Matrix2, Point2, Vector2};
 

@@ -1,5 +1,3 @@
-//! A track: an object from its birth to its death.
-
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::Object;

@@ -1,5 +1,3 @@
-//! The velocities for motion compensation.
-
 use std::collections::VecDeque;
 
 use gyre_geometry::Twist;

@@ -1,5 +1,3 @@
-//! The scan that is being registered and the one before it.
-
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
@@ -79,7 +77,6 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
-    /// Returns what is known about the motion beside the rasters and the points.
     pub(crate) fn aiding(&self) -> Aiding {
         let [earlier, later] = [&self.earlier, &self.later];
         Aiding {

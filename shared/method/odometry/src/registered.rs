@@ -1,5 +1,3 @@
-//! The results and errors of a registration.
-
 use std::error::Error as StdError;
 
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};

@@ -1,5 +1,3 @@
-//! Searches: the rotation and then the translation, or both together.
-
 use gyre_scan_matching::{
     ConfigError, ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation,
     TranslationConfig, TranslationSearch,
@@ -23,7 +21,6 @@ pub struct DecoupledSearch {
 }
 
 impl DecoupledSearch {
-    /// Plans both searches for rasters of `n` x `n` cells.
     pub fn new(
         n: usize,
         cell_m: f64,

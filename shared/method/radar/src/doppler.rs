@@ -29,7 +29,6 @@ use shifts::Shifts;
 /// bin.
 const MIN_DOPPLER_S: f32 = 1e-3;
 
-/// The reason why a scan does not determine the velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NoDoppler {
     #[error(
@@ -49,17 +48,9 @@ pub enum NoDoppler {
     )]
     NoCoefficient,
     #[error("{bearings} bearings have echoes that both chirps see, but {needed} are needed")]
-    TooFewBearings {
-        bearings: usize,
-        /// The least number.
-        needed: usize,
-    },
+    TooFewBearings { bearings: usize, needed: usize },
     #[error("{agreeing} of {bearings} bearings agree on a velocity, which is too few")]
-    NoAgreement {
-        /// Bearings that agree on the best one.
-        agreeing: usize,
-        bearings: usize,
-    },
+    NoAgreement { agreeing: usize, bearings: usize },
     #[error(transparent)]
     Scan(#[from] ScanError),
 }

@@ -63,7 +63,6 @@ impl LostAzimuths {
         lost
     }
 
-    /// Creates gaps of one azimuth each.
     pub fn between(rows: impl IntoIterator<Item = [u16; 2]>) -> Self {
         Self::of_gaps(rows.into_iter().map(|[first, last]| [first, last, 1]))
     }
@@ -208,7 +207,6 @@ impl LostAzimuthFinder {
     }
 }
 
-/// Memory for the azimuths of a scan whose rows are placed.
 #[derive(Debug, Default)]
 pub struct PlacedRows {
     azimuth_rad: Vec<f32>,
@@ -254,7 +252,6 @@ impl PlacedRows {
     }
 }
 
-/// Returns the number of stale rows at the end of a scan.
 pub fn stale_rows(scan: &PolarScan<'_>) -> usize {
     let rows = scan.flags.iter().rev();
     let stale = rows.take_while(|flags| **flags & flag::STALE != 0).count();

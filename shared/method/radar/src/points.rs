@@ -128,7 +128,6 @@ impl PointExtractor {
     }
 }
 
-/// Returns the lowest power that at most `room` peaks reach.
 fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 {
     if peaks.len() <= room {
         return 1;

@@ -1,5 +1,3 @@
-//! Bounds of the settings of sensors.
-
 use thiserror::Error;
 
 /// A setting out of its bounds.

@@ -1,5 +1,3 @@
-//! From samples of the wheels' speed to the distance between two scans.
-
 use bytemuck::{Pod, Zeroable};
 
 use crate::{SampleKind, WheelsConfig, integral::Integrator};

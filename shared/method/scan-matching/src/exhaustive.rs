@@ -95,7 +95,6 @@ struct JointPeak {
 
 impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    /// The reach must be at most half the raster.
     pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;

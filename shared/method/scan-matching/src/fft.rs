@@ -124,7 +124,6 @@ impl Transform {
             .process_immutable_with_scratch(line, out, &mut self.scratch);
     }
 
-    /// Transforms a line, or several contiguous ones, in place.
     pub fn lines(&mut self, lines: &mut [Complex32]) {
         self.fft.process_with_scratch(lines, &mut self.scratch);
     }

@@ -1,5 +1,3 @@
-//! The energy of a raster within its overlap with a shifted raster.
-
 use nalgebra::Vector2;
 
 /// The energy that is left of a raster in the overlap, for shifts of up to `reach` cells each way.

@@ -107,8 +107,6 @@ pub struct Aiding {
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
-///
-/// Nothing is allocated after construction.
 #[derive(Debug)]
 pub struct Refiner {
     config: RefinementConfig,

@@ -12,7 +12,6 @@ const MOST: f64 = 0.9;
 /// Loops that speak for all, at most.
 const SPEAKERS: usize = 256;
 
-/// The odometry between any two keyframes.
 #[derive(Default)]
 pub struct DeadReckoning {
     poses: Vec<Pose>,
@@ -50,7 +49,6 @@ impl DeadReckoning {
         }
     }
 
-    /// Returns whether two loops and the odometry between their ends make a cycle.
     fn agree(&self, a: &Constraint, b: &Constraint) -> bool {
         let predicted = self
             .motion(b.from, a.from)

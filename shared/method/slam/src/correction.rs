@@ -1,5 +1,3 @@
-//! The correction of poses between keyframes.
-
 use gyre_geometry::{Pose, interpolate};
 
 /// Corrects the poses of all scans like the keyframes around them: a scan continues by odometry from

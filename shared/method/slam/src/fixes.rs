@@ -58,7 +58,6 @@ pub struct FixCounts {
     pub taken: usize,
 }
 
-/// The fixes of a drive, and those that its keyframes have.
 #[derive(Clone, Debug, Default)]
 pub struct Fixes {
     fixes: Vec<GnssFix>,
@@ -72,7 +71,6 @@ pub struct Fixes {
     refusal: Option<FixRefusal>,
 }
 
-/// A keyframe of the odometry.
 #[derive(Clone, Copy)]
 pub(crate) struct Stamped {
     pub stamp_ns: i64,
@@ -115,7 +113,6 @@ impl Fixes {
         &self.taken
     }
 
-    /// Returns the number of fixes that the keyframes have.
     pub fn taken(&self) -> usize {
         self.taken.len()
     }
@@ -219,7 +216,6 @@ impl Fixes {
         };
     }
 
-    /// The delay of the fixes.
     fn offset(&self, keyframes: &[Stamped]) -> Option<ClockOffset> {
         let place = |fix: &GnssFix| Pose::translation(fix.east_m, fix.north_m);
         let fixes = Trajectory {

@@ -1,5 +1,3 @@
-//! A keyframe, and its form in a file.
-
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
 use gyre_storage::{LogError, LogMagic};

@@ -9,7 +9,6 @@ use std::{
 
 use gyre_storage::{Log, LogError, LogMagic, LogReader};
 
-/// An entry of a file of records.
 pub trait Record: Sized {
     const FILE: &'static str;
     /// The start of the file, with the version of the records.
@@ -76,7 +75,6 @@ impl<R: Record> RecordLog<R> {
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
 
-    /// Appends a record. A reader sees it when this returns.
     pub fn append(&mut self, record: &R) -> Result<(), LogError> {
         self.buffer.clear();
         record.encode(&mut self.buffer);

@@ -1,5 +1,3 @@
-//! The verdicts of the estimate of the trajectory on loops.
-
 use std::fmt;
 
 use gyre_estimation::{CHI_SQUARE_99_9, Constraint};

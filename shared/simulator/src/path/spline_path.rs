@@ -1,5 +1,3 @@
-//! A smooth path through poses at discrete times.
-
 use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::Pose;

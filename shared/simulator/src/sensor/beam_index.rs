@@ -1,5 +1,3 @@
-//! The echoes of each azimuth.
-
 use std::ops::Range;
 
 use super::antenna::Antenna;

@@ -1,5 +1,3 @@
-//! Removes a dataset that was written here, and nothing else.
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -22,7 +22,6 @@ type Parameters = Vector4<f64>;
 /// Which of them are solved for.
 type Free = [bool; 4];
 
-/// The parameters by all turns together.
 pub(crate) struct Fit {
     /// Scale, bias (rad/s) and offset (s) without a drift.
     pub(crate) parameters: [Estimate; 3],

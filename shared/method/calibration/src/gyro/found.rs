@@ -53,12 +53,10 @@ impl GyroCalibration {
         Ok(mean)
     }
 
-    /// Returns whether the clock of the gyro drifts against the radar's.
     pub fn drifts(&self) -> bool {
         self.drift.value.abs() > DRIFT_SIGMAS * self.drift.sigma
     }
 
-    /// Returns whether the drive adds to the prior knowledge about the scale of any gyro.
     fn tells_scale(&self) -> bool {
         self.scale.sigma < USEFUL_SCALE_SIGMA
     }

@@ -51,7 +51,6 @@ impl Peak {
         peak.axis != self.axis || (peak.delay_s - self.delay_s).abs() > PEAK_S
     }
 
-    /// The highest correlation within a step.
     fn refined(&self, turns: &[Turn], angles: &Angles) -> Self {
         let near = (-FINE..=FINE).map(|k| self.delay_s + STEP_S * f64::from(k) / f64::from(FINE));
         let near = near.map(|delay_s| correlations(turns, angles, delay_s)[self.axis]);

@@ -1,5 +1,3 @@
-//! The normal equations of a pose graph.
-
 use std::collections::TryReserveError;
 
 use nalgebra::{DVector, Matrix3};

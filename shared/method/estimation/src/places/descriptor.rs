@@ -1,5 +1,3 @@
-//! The descriptor of a place.
-
 use gyre_radar::fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
 use ndarray::Array2;

@@ -1,5 +1,3 @@
-//! The descriptors of all places, and the search for similar ones.
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 

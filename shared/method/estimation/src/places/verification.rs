@@ -1,5 +1,3 @@
-//! Verification of loops by registration.
-
 use std::f64::consts::PI;
 
 use gyre_geometry::{UncertainMotion, pose, wrap_angle};
@@ -16,7 +14,6 @@ const MIN_MARGIN: f64 = 0.1;
 /// most.
 const COARSE_LOSS: f64 = 0.15;
 
-/// The verdict on a candidate, and the reason of a rejection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VerificationOutcome {
     /// The two submaps show the same place.
@@ -46,7 +43,6 @@ pub struct Verification {
     /// runner-up: another translation, or the best at the other angle. Their difference is the
     /// margin.
     pub searched: f64,
-    /// See [`Self::searched`].
     pub runner_up: f64,
     /// The yaw differs from the candidate's by half a turn.
     pub half_turn: bool,
@@ -56,7 +52,6 @@ pub struct Verification {
 pub struct LoopVerifier(Registrar);
 
 impl LoopVerifier {
-    /// As [`Registrar::new`].
     pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         Ok(Self(Registrar::new(refinement, capacity)?))
     }

@@ -1,5 +1,3 @@
-//! GeoTIFF.
-
 use std::{io::Cursor, path::Path};
 
 use tiff::{

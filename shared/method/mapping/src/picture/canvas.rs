@@ -184,7 +184,6 @@ impl Canvas {
         self.text(right + 8.0 * self.unit, &label, colour)
     }
 
-    /// Draws an entry of the legend in the footer; returns where the next one begins.
     pub fn entry(&mut self, left: f32, colour: Colour, label: &str, text: Colour) -> f32 {
         let end = left + 22.0 * self.unit;
         let sample = [(left, self.footer), (end, self.footer)];
@@ -192,7 +191,6 @@ impl Canvas {
         self.text(end + 8.0 * self.unit, label, text)
     }
 
-    /// Writes in the footer; returns where the next entry begins.
     fn text(&mut self, left: f32, text: &str, colour: Colour) -> f32 {
         let scale = TEXT * self.unit / GLYPHS.val() as f32;
         let advance = get_raster_width(FontWeight::Regular, GLYPHS) as f32 * scale;

@@ -26,7 +26,6 @@ pub(super) struct Integers {
     output: Output,
 }
 
-/// A step from images to an image, by their numbers.
 #[derive(Debug)]
 enum Step {
     /// The raster in steps of `step`.
@@ -62,7 +61,6 @@ enum Step {
     },
 }
 
-/// The factors of a mask.
 #[derive(Debug)]
 struct Output {
     from: usize,

@@ -1,5 +1,3 @@
-//! A network in ONNX Runtime.
-
 use std::path::Path;
 
 use ndarray::{ArrayView3, ArrayViewMut3, Axis};

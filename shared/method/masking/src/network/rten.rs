@@ -1,5 +1,3 @@
-//! A network in rten.
-
 use std::{
     fmt::Display,
     panic::{AssertUnwindSafe, catch_unwind},

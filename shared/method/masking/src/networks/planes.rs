@@ -80,7 +80,6 @@ impl PlanesNetwork {
         })
     }
 
-    /// Computes it, for planes row after row.
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];

@@ -106,7 +106,6 @@ impl Fit {
         CUTOFF * (SIGMA_OF_MEDIAN * *median).max(least)
     }
 
-    /// The change of the velocity that the weighted least squares ask for.
     fn step(&self, cutoff_mps: f64) -> Option<Vector2<f64>> {
         let (mut information, mut sum) = (Matrix2::zeros(), Vector2::zeros());
         for seen in &self.seen {

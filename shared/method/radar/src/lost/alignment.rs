@@ -51,7 +51,6 @@ pub(super) struct Alignment {
     noise: f32,
 }
 
-/// The places of lost azimuths, as the number of rows before each.
 #[derive(Clone, Debug, Default)]
 struct Places {
     /// Logarithm of the likelihood of all that is averaged here.
@@ -223,9 +222,7 @@ fn multiply<const WIDTH: usize>(
 #[derive(Clone, Copy, Debug)]
 struct Weights {
     gain: f32,
-    /// The gain over the noise.
     scale: f32,
-    /// Steps for comparing a row.
     steps: usize,
 }
 
@@ -269,7 +266,6 @@ fn weigh<const WIDTH: usize, const MOST_STEPS: usize, const HALF: usize>(
     highest
 }
 
-/// Returns the highest score, without a chain of comparisons.
 #[inline(always)]
 fn highest_of<const STEPS: usize>(steps: &[f32; STEPS]) -> f32 {
     let higher = |a: f32, b: f32| if b > a { b } else { a };
@@ -332,7 +328,6 @@ const fn azimuths(count: usize) -> usize {
     count + 2 + 2 * (TURN + BESIDE)
 }
 
-/// The `k`-th azimuth for comparing a row.
 #[inline(always)]
 const fn azimuth(row: usize, k: usize) -> isize {
     (row + k) as isize - (TURN + BESIDE) as isize

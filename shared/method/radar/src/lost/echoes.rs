@@ -21,7 +21,6 @@ const BLOCK: usize = 16;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     pub azimuths: usize,
-    /// Cells per azimuth.
     pub cells: usize,
     bins_per_cell: usize,
     first_bin: usize,
@@ -82,7 +81,6 @@ struct Row {
 }
 
 impl Echoes {
-    /// Reads the measured rows of a scan.
     pub fn read(&mut self, scan: &PolarScan<'_>) {
         self.begin(Layout::of(scan));
         let Layout {
@@ -160,7 +158,6 @@ impl Echoes {
         self.end_row(at, [sin, cos], self.powers.len());
     }
 
-    /// Ends a row with so many echoes up to its end, if it has any.
     fn end_row(&mut self, at: f32, direction: [f32; 2], end: usize) {
         self.cells.truncate(end);
         self.powers.truncate(end);

@@ -1,5 +1,3 @@
-//! The motion of the sensor within a sweep, in the form that the kernels use.
-
 use super::RasterError;
 use crate::scan::{PolarScan, Sense};
 use gyre_geometry::Twist;

@@ -1,5 +1,3 @@
-//! Configuration of the exhaustive search.
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,3 @@
-//! The keyframes that were read last: consecutive submaps share most keyframes.
-
 use super::KeyframeSource;
 use crate::Keyframe;
 

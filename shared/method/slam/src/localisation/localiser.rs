@@ -1,5 +1,3 @@
-//! The localiser.
-
 use std::f64::consts::PI;
 
 use gyre_estimation::places::{Candidate, Describer, Descriptor};
@@ -168,7 +166,6 @@ impl Localiser {
             && self.map.nearest(place).1 <= REACH_M
     }
 
-    /// Chooses the places and headings that look most similar, each once.
     fn choose_candidates(&mut self) {
         let similar = self.map.similar(&self.descriptor, ANGLES).to_vec();
         self.candidates.clear();
@@ -260,7 +257,6 @@ impl Localiser {
         })
     }
 
-    /// Tracks the next scan from the last known place.
     fn follow(&mut self, track: &Track, observation: &Observation<'_>) -> Localisation {
         let predicted = track.pose.then(&observation.motion);
         self.scan.start(observation.points, &observation.twist);

@@ -1,5 +1,3 @@
-//! The directions that a sensor could see.
-
 use std::f64::consts::TAU;
 
 use gyre_scan_matching::Submap;

@@ -1,5 +1,3 @@
-//! Integers of an image in another order and shape.
-
 use std::rc::Rc;
 
 use rten_onnx::onnx::NodeProto;
