@@ -11,15 +11,3 @@ pub(crate) fn interpolate(table: &[(f64, f64)], at: f64) -> f64 {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_between_before_and_after_the_entries() {
-        let table = [(1.0, 10.0), (3.0, 30.0), (4.0, 0.0)];
-        let found = [-5.0, 1.0, 2.0, 3.5, 4.0, 99.0].map(|at| interpolate(&table, at));
-        assert_eq!(found, [10.0, 10.0, 20.0, 15.0, 0.0, 0.0]);
-    }
-}

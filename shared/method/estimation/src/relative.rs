@@ -64,17 +64,6 @@ mod tests {
         assert!(printed.rotation.angle_to(&relative.motion.rotation).abs() < 1e-15);
     }
 
-    #[test]
-    fn an_innovation_of_yaw_across_half_a_turn_is_small() {
-        let relative = Relative::predict(&pose(0.0, 0.0, 0.0), &pose(0.0, 0.0, PI - 0.1));
-        let measured = UncertainMotion {
-            motion: pose(0.5, 0.0, -PI + 0.1),
-            ..UncertainMotion::identity()
-        };
-        let expected = Vector3::new(0.5, 0.0, 0.2);
-        assert!((relative.innovation(&measured) - expected).norm() < 1e-12);
-    }
-
     proptest! {
         #[test]
         fn jacobians_are_the_differences_of_corrected_poses(

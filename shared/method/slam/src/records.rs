@@ -186,7 +186,7 @@ impl<R: Record> RecordReader<R> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::{Place, Query};
+    use crate::Query;
 
     fn query(keyframe: usize) -> Query {
         Query {
@@ -226,18 +226,6 @@ mod tests {
         assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (2, false));
         assert_eq!(reader.unchanged(), 1);
         assert_eq!(log.read(1).unwrap(), query(7));
-    }
-
-    #[test]
-    fn places_are_no_queries() {
-        let out = tempfile::tempdir().unwrap();
-        let mut log = RecordLog::open(out.path()).unwrap();
-        log.append(&query(0)).unwrap();
-        drop(log);
-        let path = |file| out.path().join("journal").join(file);
-        std::fs::rename(path(Query::FILE), path(Place::FILE)).unwrap();
-        let refused = RecordReader::<Place>::open(out.path()).map(drop);
-        assert!(matches!(refused, Err(LogError::Foreign { .. })));
     }
 
     #[test]

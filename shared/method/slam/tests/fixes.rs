@@ -241,28 +241,6 @@ fn a_log_that_ends_early_leaves_the_rest_to_odometry() {
     assert!((last.translation.vector - motion.translation.vector).norm() < 1e-6);
 }
 
-#[test]
-fn the_solution_does_not_depend_on_when_it_was_asked_for() {
-    let drive = Drive::new(400, 13);
-    let at_once = drive.solved(drive.fixes(14));
-    let mut followed = drive.with(drive.fixes(14));
-    for keyframe in &drive.keyframes {
-        followed.push(keyframe).unwrap();
-        followed.update().unwrap();
-    }
-    let apart = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
-    let most = followed
-        .poses()
-        .iter()
-        .zip(at_once.poses())
-        .map(|(a, b)| apart(a, b));
-    let most = most.fold(0.0, f64::max);
-    assert!(most < 0.2, "{most}");
-    followed.solve().unwrap();
-    assert_eq!(followed.poses(), at_once.poses());
-    assert_eq!(followed.positions(), at_once.positions());
-}
-
 /// Each keyframe comes before the fixes around it, and some fixes come 20 s late.
 #[test]
 fn fixes_that_arrive_with_the_keyframes_and_late_lead_to_the_same_solution() {

@@ -88,14 +88,6 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_selector_continues_the_path() {
-        let mut selector = KeyframeSelector::default();
-        selector.resume(pose(10.0, 0.0, 0.0), 50.0);
-        assert_eq!(selector.next(&pose(11.0, 0.0, 0.0)), None);
-        assert_eq!(selector.next(&pose(13.0, 0.0, 0.0)), Some(53.0));
-    }
-
-    #[test]
     fn a_submap_is_ten_metres_of_the_path_either_way() {
         let path: Vec<f64> = (0..20).map(|k| 2.0 * f64::from(k)).collect();
         assert_eq!(neighbours(&path, 10, 10.0), 5..16);

@@ -208,13 +208,4 @@ mod tests {
         let ahead = poses[59].inv_mul(&poses[60]);
         assert!((ahead.translation.vector - motion.motion.translation.vector).norm() < 0.05);
     }
-
-    #[test]
-    fn a_drive_of_which_nothing_was_found_has_no_place() {
-        let drive = G2o {
-            poses: vec![Pose::identity()],
-            constraints: Vec::new(),
-        };
-        assert!(DriveSearch::default().place(&drive).unwrap().is_none());
-    }
 }
