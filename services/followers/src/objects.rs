@@ -9,7 +9,7 @@ use gyre_journal::{
     objects::{LoggedObjects, listed},
     scans::LoggedScan,
 };
-use gyre_masking::{Library, MaskingConfig};
+use gyre_masking::MaskingConfig;
 use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
@@ -37,9 +37,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 
 /// Returns a tracker whose network is computed by the library of learned masks.
 pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
-    let library = Library::find(masking);
-    let library = library.map_err(StageError::configuration)?;
-    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::configuration)
+    let runtime = masking.onnx_runtime();
+    let runtime = runtime.map_err(StageError::configuration)?;
+    ObjectTracker::new(runtime.as_deref()).map_err(StageError::configuration)
 }
 
 struct Tracking {

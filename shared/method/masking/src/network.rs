@@ -10,7 +10,7 @@ use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::{Backend, Library, MaskingConfig, model::Model, networks::runtime::RuntimeError};
+use crate::{Backend, MaskingConfig, model::Model, networks::runtime::RuntimeError};
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
@@ -60,13 +60,13 @@ impl Network {
     /// Loads the configured model and checks that it fits these rasters.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
-        let (mut engine, inputs, outputs) = match Library::find(config)? {
-            Library::OnnxRuntime(path) => {
+        let (mut engine, inputs, outputs) = match config.onnx_runtime()? {
+            Some(path) => {
                 let engine = OnnxRuntime::load(&path, &model, config)?;
                 let (inputs, outputs) = (engine.inputs(), engine.outputs());
                 (Engine::OnnxRuntime(engine), inputs, outputs)
             }
-            Library::Rten => built_in(&model)?,
+            None => built_in(&model)?,
         };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, &inputs, shape, &model)?;

@@ -1,4 +1,4 @@
-mod planes;
+pub(crate) mod planes;
 pub mod runtime;
 
 pub use planes::{PlanesError, PlanesNetwork};

@@ -4,9 +4,6 @@
 //! of all bearings determine its velocity: approach = vx cos(bearing) + vy sin(bearing), after Le
 //! Gentil et al., "DRO: Doppler-aware direct radar odometry" (2025). Moving objects do not fit this
 //! form and lose their weight.
-//!
-//! A rotation of the radar about itself shifts no range. If the radar is ahead of the centre of the
-//! rotation, the velocity is the radar's, which moves to the side there.
 
 mod fit;
 mod rows;

@@ -4,9 +4,9 @@ use std::{
     sync::Arc,
 };
 
-use crate::networks::one_line;
+use crate::networks::{one_line, planes::by_rten};
 use ndarray::{Array3, ArrayView3, ArrayViewMut3};
-use rten::{ModelOptions, RunOptions, ThreadPool, Value};
+use rten::{ModelOptions, ThreadPool};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, GraphProto, ModelProto, ValueInfoProto,
 };
@@ -80,17 +80,10 @@ impl Rten {
         let (scans, rows, columns) = rasters.dim();
         let shape = [1, scans, rows, columns];
         let cells: Vec<f32> = rasters.iter().copied().collect();
-        let input = Value::from_shape(shape, cells).map_err(failed)?;
-        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
-        let computed = guarded(|| self.network.run_one(input.into(), Some(options)));
-        let computed = computed.map_err(NetworkError::Run)?;
-        let (_, factors) = computed.into_shape_vec::<f32, 4>().map_err(failed)?;
+        let computed = guarded(|| by_rten(&self.network, &self.thread, shape, &cells));
+        let (_, factors) = computed.map_err(NetworkError::Run)?;
         fill(masks, &factors)
     }
-}
-
-fn failed(error: impl Display) -> NetworkError {
-    NetworkError::Run(one_line(&error.to_string()))
 }
 
 /// Calls rten, or what reads a model. A model may have what that does not expect, and then it

@@ -119,7 +119,8 @@ fn by_onnx_runtime(
     compute().map_err(|error| one_line(error.message()))
 }
 
-fn by_rten(
+/// Computes a network in rten. Returns the shape and the values of its output.
+pub(crate) fn by_rten(
     model: &Model,
     thread: &Arc<ThreadPool>,
     shape: [usize; 4],
