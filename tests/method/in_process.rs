@@ -11,7 +11,6 @@ use gyre_radar::OwnedScan;
 use crate::common::{Run, real_data, runtime_is_installed};
 use crate::method::{learned_masks::card, refinement::names};
 
-/// Registers all scans that a finished run played.
 fn register_all(run: &Run) -> Vec<Registered> {
     let resolved = run.out().join("config.toml");
     let configuration = Configuration::read(&resolved, &[]).unwrap();
@@ -32,7 +31,6 @@ fn register_all(run: &Run) -> Vec<Registered> {
         .collect()
 }
 
-/// Asserts that motions and poses of a run and of `Odometry` are the same bits.
 pub fn assert_same_bits(run: &Run) -> usize {
     run.complete();
     let journal = journal::records(&journal::path(run.out()))

@@ -80,7 +80,6 @@ fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_th
 
 // Its map.
 
-/// Interrupts a run in its middle.
 fn interrupted() -> Run {
     let run = Run::of_recording();
     let mut running = run.clone().rate(MODERATE).start();

@@ -97,7 +97,6 @@ impl Cars {
         cars
     }
 
-    /// The cars within a distance of a place at a time of the drive, in the order of their numbers.
     pub fn near(&self, place: Point2<f64>, reach_m: f64, time_s: f64) -> Vec<Moving<'_>> {
         let at = |(body, start_m)| self.at(body, start_m, time_s);
         let all = self.bodies.iter().zip(&self.starts_m).filter_map(at);

@@ -68,7 +68,6 @@ pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
     })
 }
 
-/// The fixes as CSV: a reader gets exactly the numbers of the fixes.
 pub(crate) fn csv(fixes: &[RawFix]) -> String {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {

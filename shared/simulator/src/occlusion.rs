@@ -83,7 +83,6 @@ impl WallGrid {
     }
 }
 
-/// The share of `line` after which it crosses the wall, if it does.
 pub fn crossing(from: Point2<f64>, line: Vector2<f64>, wall: &Wall) -> Option<f64> {
     let along = wall.to - wall.from;
     let determinant = line.perp(&along);

@@ -134,7 +134,6 @@ impl Site<'_> {
         }
     }
 
-    /// A trunk and a crown.
     fn tree(&mut self, frame: &Pose) {
         let trunk = Scatterer::all_round(frame * Point2::origin(), 2.0, NO_BODY);
         self.built.scatterers.push(trunk);

@@ -73,7 +73,6 @@ fn covariance(track: &Track, revisits: &[Revisit]) -> DMatrix<f64> {
     all
 }
 
-/// The effect of an error of one motion on the residual of a revisit.
 fn effect(track: &Track, revisit: &Revisit, motion: usize) -> Matrix3<f64> {
     let base = &track.poses[revisit.earlier];
     let along = |scan: usize| base.inv_mul(&track.poses[scan]);

@@ -6,7 +6,6 @@ use nalgebra::{SMatrix, SVector, Vector2};
 /// Number of facts that are estimated together.
 pub const FACTS: usize = 5;
 
-/// One number for each [`Fact`].
 pub type FactVector = SVector<f64, FACTS>;
 
 pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
@@ -14,7 +13,6 @@ pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 /// A fact that moves the points of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fact {
-    /// Offset of all ranges, m.
     RangeOffset,
     /// Eccentricity of the encoder ahead: the true azimuth is the measured one plus this times its
     /// cosine, rad.

@@ -20,7 +20,6 @@ pub struct Configured {
     pub geometry: SweepGeometry,
     /// The eccentricity of the encoder that was used to read them, rad.
     pub eccentricity_rad: f64,
-    /// The shortest range of the points that are used, m.
     pub min_range_m: f64,
     /// Length of the path by another sensor, m.
     pub distance_m: Option<f64>,

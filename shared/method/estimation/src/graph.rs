@@ -72,7 +72,6 @@ struct State {
 struct Closing {
     edge: Edge,
     group: Option<u64>,
-    /// Chi-square against the odometry alone.
     gate_chi_square: f64,
     weight: f64,
 }

@@ -14,7 +14,6 @@ const APART_CELLS: f64 = 3.0;
 /// frame.
 pub struct Drawing {
     evidence: Evidence,
-    /// The first keyframe, in the frame of the given poses, and in the frame of odometry.
     first: Option<[Pose; 2]>,
     odometry: Vec<Pose>,
     is_corrected: bool,

@@ -22,7 +22,6 @@ impl fmt::Display for TileIndex {
 }
 
 impl TileIndex {
-    /// Returns the corner of lowest x and y, in cells of the map frame.
     pub fn corner(self) -> [i64; 2] {
         [self.x, self.y].map(|index| i64::from(index) * TILE_CELLS as i64)
     }

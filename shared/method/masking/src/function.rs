@@ -32,7 +32,6 @@ pub enum Factors {
 #[derive(Debug)]
 pub(crate) struct AppliedFunction {
     function: Box<dyn MaskFunction>,
-    /// Factors of the raster of the last scan, if it gave such.
     raster: Option<Array2<f32>>,
     /// The powers of the last scan that are left, row after row, if it gave factors of powers.
     powers: Vec<u8>,

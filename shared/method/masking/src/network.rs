@@ -22,7 +22,6 @@ const OUTPUT: &str = "masks";
 pub enum NetworkError {
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// A model or an execution provider that cannot be used.
     #[error("{0}")]
     Model(String),
     #[error("the learned mask cannot be computed: {0}")]
@@ -57,7 +56,6 @@ enum Engine {
 }
 
 impl Network {
-    /// Loads the configured model and checks that it fits these rasters.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
         let (mut engine, inputs, outputs) = match config.onnx_runtime()? {

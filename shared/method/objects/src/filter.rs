@@ -50,14 +50,12 @@ struct Estimate {
 pub(crate) struct Sighting {
     /// The position, m, as if the object stood.
     pub at: Point2<f64>,
-    /// Covariance of it, m².
     pub noise: Matrix2<f64>,
     /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
     /// shortened by the Doppler shift.
     pub by_velocity: Matrix2<f64>,
 }
 
-/// The difference between a measurement and its prediction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     /// Measured less predicted, m.

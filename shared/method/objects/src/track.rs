@@ -30,7 +30,6 @@ const MAX_SCORE: f64 = 4.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
 const END_SCORE: f64 = -2.0;
-/// Loss of the score by a scan that does not show the object.
 const MISSED_LOSS: f64 = 1.0;
 /// Scans that show a track before it is an object.
 const BIRTH_HITS: u32 = 2;

@@ -13,7 +13,6 @@ use rand_chacha::ChaCha8Rng;
 
 const PERIOD_S: f64 = 0.25;
 const DOPPLER_S: f64 = 0.046;
-/// Half of the length and width of a car, m.
 const HALF_M: (f64, f64) = (2.2, 0.9);
 /// Returns of a car in a scan.
 const RETURNS: usize = 25;

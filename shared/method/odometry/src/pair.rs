@@ -14,7 +14,6 @@ pub struct Pair {
     /// The raster of the earlier scan, masked for this pair, if the mask takes two scans.
     pub(crate) earlier_for_pair: Option<Array2<f32>>,
     pub(crate) seq: u64,
-    /// The turn and the distance from the earlier scan to the later one, by gyro and wheels.
     pub(crate) turn: Option<GyroTurn>,
     pub(crate) distance: Option<WheelDistance>,
 }

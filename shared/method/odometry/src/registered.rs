@@ -34,7 +34,6 @@ impl Registered {
 pub enum Outcome {
     /// No previous scan: the chain of motions starts here.
     Start,
-    /// The search: no refinement is configured.
     Searched,
     /// The refinement against the local map.
     Refined,

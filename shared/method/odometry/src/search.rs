@@ -5,7 +5,6 @@ use gyre_scan_matching::{
 
 use crate::{OdometryError, Pair};
 
-/// Searches the motion between two scans.
 pub trait Search: Send + Sync {
     /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
     /// motions starts.

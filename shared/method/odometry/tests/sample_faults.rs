@@ -187,7 +187,6 @@ const KINDS: [&str; 7] = [
     "unit",
 ];
 
-/// Samples of a sweep.
 const SWEEP: [usize; 2] = [26, 13];
 
 /// Draws a number of samples of a gyro (0) or of wheels (1): those of a sweep or more, or less.

@@ -122,7 +122,6 @@ impl LostAzimuths {
 
 #[derive(Clone, Debug, Default)]
 pub struct LostAzimuthFinder {
-    /// The echoes of the rows as they follow each other.
     rows: Echoes,
     previous: Option<Previous>,
     /// The echoes of that scan, each at its azimuth: only where the next scan has lost some.

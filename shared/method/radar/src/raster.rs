@@ -28,7 +28,6 @@ use std::fmt;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 
-/// The largest number of cells per side of a raster.
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
 /// The rule that computes the value of a cell from the range bins.

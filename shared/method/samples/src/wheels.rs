@@ -13,7 +13,6 @@ pub struct WheelDistance {
     pub distance_m: f64,
     /// Variance but for the scale, m².
     pub variance_m2: f64,
-    /// Variance of the place across the path, m².
     pub side_variance_m2: f64,
     pub interval_s: f64,
 }

@@ -155,7 +155,6 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Scores all shifts at the first `count` of two angles.
     fn score(&mut self, angles: [f64; 2], count: usize, offset: f64, energy: f64) {
         for (k, turned) in self.turned.iter_mut().enumerate() {
             if k < count {

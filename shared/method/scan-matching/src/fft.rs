@@ -81,7 +81,6 @@ impl Columns {
         }
     }
 
-    /// Reads the first `width` values of some rows into `block`, row after row.
     pub fn read_rows(
         &self,
         rows: impl Iterator<Item = usize> + Clone,

@@ -18,7 +18,6 @@ fn search(
         .unwrap()
 }
 
-/// Errors (m, m, degrees).
 fn errors(found: &JointMatch, motion: Motion) -> [f64; 3] {
     let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI)
         .rem_euclid(std::f64::consts::TAU);

@@ -196,7 +196,6 @@ fn stamps_that_do_not_advance_are_bridged() {
     }
 }
 
-/// A refiner with a different state, restored to the state of `from`.
 fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
     into.restore(*from.state(), |to| {

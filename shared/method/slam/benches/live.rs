@@ -43,7 +43,6 @@ fn main() {
     new_loops(out.path(), &queries);
 }
 
-/// The time and the memory of what `work` returns.
 fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
     let (before, began) = (resident_mb(), thread_time());
     let result = work();
@@ -52,7 +51,6 @@ fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Reads what loop-closure reads when it starts.
 fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     let keyframes = RecordReader::<Keyframe>::open(out).unwrap();
     let mut closer = LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), POINTS).unwrap();
@@ -125,7 +123,6 @@ fn new_loops(out: &Path, queries: &[Query]) {
     );
 }
 
-/// Writes the logs of a drive, and returns the queries.
 fn write_logs(out: &Path) -> Vec<Query> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let step = pose(2.0, 0.0, TAU / AROUND as f64);

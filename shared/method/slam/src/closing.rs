@@ -55,10 +55,8 @@ pub struct LoopCloser {
     odometry: PoseGraph,
     path_m: Vec<f64>,
     has_ended: bool,
-    /// Number of the keyframe that is queried next.
     next_query: usize,
     cache: Cache,
-    /// The submap of a query and the submap of a candidate.
     submaps: [Submap; 2],
 }
 

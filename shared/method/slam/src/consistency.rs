@@ -7,7 +7,6 @@ use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
 use nalgebra::Matrix3;
 
-/// A loop is consistent with a set if it agrees with this share of it.
 const MOST: f64 = 0.9;
 /// Loops that speak for all, at most.
 const SPEAKERS: usize = 256;

@@ -22,7 +22,6 @@ const LEAST_WEIGHT: f64 = 0.25;
 /// The share of the fixes that must agree with each other and with the rest.
 const LEAST_SHARE: f64 = 0.5;
 
-/// Why no fix of a drive is used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FixRefusal {
     /// None was measured between two keyframes.

@@ -39,7 +39,6 @@ impl<R: Record> RecordLog<R> {
         Self::open_file(&records_path::<R>(out))
     }
 
-    /// As [`open`](Self::open), of a file that is not in the results of a run.
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let log = Log::open(path, R::MAGIC)?;
         let mut buffer = Vec::new();
@@ -125,7 +124,6 @@ impl<R: Record> RecordReader<R> {
         Self::open_file(&records_path::<R>(out))
     }
 
-    /// As [`open`](Self::open), of a file that is not in the results of a run.
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
             log: LogReader::open(path, R::MAGIC)?,

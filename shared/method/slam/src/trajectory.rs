@@ -324,7 +324,6 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Judges all loops: by the odometry, then by each other.
     fn judge_all(&mut self) {
         self.loops
             .iter_mut()

@@ -116,7 +116,6 @@ impl Drive {
         estimator
     }
 
-    /// The error of a keyframe on the earth, m.
     fn error_m(&self, estimator: &mut TrajectoryEstimator, keyframe: usize) -> f64 {
         let frame = estimator.east_north_from_map().unwrap().unwrap().motion;
         let found = frame * estimator.poses()[keyframe];

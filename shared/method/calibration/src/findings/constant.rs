@@ -12,7 +12,6 @@ const PATH_ERROR: f64 = 1e-3;
 /// Key, name, unit for printing, and factor to that unit.
 pub(crate) type Label = (&'static str, &'static str, &'static str, f64);
 
-/// A constant that the configuration has a key for.
 #[derive(Clone)]
 pub struct Constant {
     /// Key in the section `[dataset]`, name, unit for printing, and factor to that unit.

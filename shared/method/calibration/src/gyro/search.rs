@@ -68,7 +68,6 @@ impl Peak {
     }
 }
 
-/// Why no offset is found.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum NoPeak {
     /// The log covers so few turns at any offset.

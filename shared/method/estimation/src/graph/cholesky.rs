@@ -26,7 +26,6 @@ pub(super) struct Cholesky {
 /// A block of the matrix, left of the diagonal in the order of elimination.
 struct Entry {
     column: usize,
-    /// Number of the block within the matrix.
     number: usize,
     /// The block is stored with its row as the column.
     is_transposed: bool,
@@ -137,7 +136,6 @@ impl Cholesky {
         }
     }
 
-    /// Returns the rows and the blocks of a column of the factor, below the diagonal.
     fn column(&self, column: usize) -> impl Iterator<Item = (usize, &Matrix3<f64>)> {
         let blocks = &self.below[self.rows.starts[column]..self.rows.starts[column + 1]];
         self.rows.of(column).iter().copied().zip(blocks)

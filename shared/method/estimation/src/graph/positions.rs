@@ -27,7 +27,6 @@ pub struct Position {
     pub lever_m: Vector2<f64>,
     /// The measured position in the frame of the positions, m.
     pub position_m: Vector2<f64>,
-    /// Variance along each axis, m².
     pub variance_m2: f64,
     /// The factor of its information, above 0 up to 1: less than 1 if its error depends on other
     /// errors.

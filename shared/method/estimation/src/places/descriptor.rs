@@ -46,7 +46,6 @@ impl Default for Descriptor {
 
 impl Descriptor {
     pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
-    /// Size of a descriptor in a file, bytes.
     pub const BYTES: usize = Self::SIEVE_BYTES + SPECTRUM_BYTES;
 
     /// Appends the form in a file: the sieve, then the spectrum.

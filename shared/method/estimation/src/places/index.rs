@@ -26,7 +26,6 @@ pub struct Candidate {
     pub yaw_rad: f64,
 }
 
-/// A place whose path does not continue from the place before.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"

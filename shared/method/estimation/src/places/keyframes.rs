@@ -21,7 +21,6 @@ pub struct KeyframeSelector {
 }
 
 impl KeyframeSelector {
-    /// Continues after a keyframe at `pose`, `path_m` along the path.
     pub fn resume(&mut self, pose: Pose, path_m: f64) {
         self.last = Some((pose, path_m));
     }

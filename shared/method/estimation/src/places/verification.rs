@@ -5,7 +5,6 @@ use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 
 use super::{Candidate, Registrar};
 
-/// Smallest correlation of a loop that is accepted.
 const MIN_CORRELATION: f64 = 0.65;
 /// Smallest difference of the correlations of an accepted loop and of any other motion between the
 /// two places.
@@ -22,7 +21,6 @@ pub enum VerificationOutcome {
     LowCorrelation,
     /// Another motion correlates nearly as well: less than 0.1 below.
     Ambiguous,
-    /// The points of the two keyframes do not determine the motion.
     Undetermined,
     /// The motion contradicts the odometry between the two keyframes, which the verifier does not
     /// know.

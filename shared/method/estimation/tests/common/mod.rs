@@ -57,7 +57,6 @@ impl Drive {
         drive
     }
 
-    /// Measures the pose of `to` in the frame of `from`, with an error of its covariance.
     pub fn measure(&mut self, from: usize, to: usize, sigma: Sigma) -> UncertainMotion {
         let covariance = covariance(sigma);
         let normal: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut self.random));
@@ -69,7 +68,6 @@ impl Drive {
         }
     }
 
-    /// Measures a loop.
     pub fn close(&mut self, from: usize, to: usize) -> Constraint {
         Constraint::closing(from, to, self.measure(from, to, LOOP))
     }
@@ -101,7 +99,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Solves for the poses with `steps` steps of Gauss-Newton from `poses`.
     pub fn solve(poses: &[Pose], constraints: &[Constraint], steps: usize) -> Self {
         let mut poses = poses.to_vec();
         let mut covariance = DMatrix::zeros(0, 0);
@@ -117,7 +114,6 @@ impl Batch {
     }
 }
 
-/// Returns a pose with x, y and yaw changed.
 pub fn moved(from: &Pose, by: &Vector3<f64>) -> Pose {
     let [x, y, yaw] = xy_yaw(from);
     pose(x + by.x, y + by.y, yaw + by.z)

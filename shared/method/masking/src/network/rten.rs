@@ -49,7 +49,6 @@ fn rejected(model: &Model, reason: &str) -> NetworkError {
 }
 
 impl Rten {
-    /// Loads a model from its file as it was [parsed](parse).
     pub fn load(model: &Model, mut file: ModelProto) -> Result<Self, NetworkError> {
         if let Some(graph) = &mut file.graph {
             state_kernel_sizes(graph);

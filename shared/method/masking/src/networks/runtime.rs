@@ -214,7 +214,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A folder with an empty file of this name.
     fn folder_with(file: &str) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().canonicalize().unwrap().join(file);

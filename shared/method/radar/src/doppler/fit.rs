@@ -20,7 +20,6 @@ const CUTOFF: f64 = 4.685;
 const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// The least standard deviation of a shift, cells: smaller steps are rounding.
 const MIN_SIGMA_CELLS: f64 = 0.02;
-/// The least number of bearings that determine a velocity.
 const MIN_BEARINGS: usize = 20;
 /// The highest peak of so many of them must be at the velocity. One in twenty is by chance.
 const MIN_AGREEING: f64 = 0.25;
@@ -165,7 +164,6 @@ fn vote(rows: &[RowShifts]) -> Vector2<f64> {
     best.0
 }
 
-/// The weight of a residual that is this share of the cutoff.
 fn biweight(share: f64) -> f64 {
     let rest = (1.0 - share * share).max(0.0);
     rest * rest

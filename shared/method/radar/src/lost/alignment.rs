@@ -17,7 +17,6 @@ const STEPS: usize = 2;
 const AMID: [f32; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
 /// Azimuths beyond the turn on each side that the interpolation takes.
 const BESIDE: usize = 1;
-/// The least share of noise in the energy of a scan.
 const LEAST_NOISE: f32 = 1e-3;
 /// Likelihood of a row that is not as predicted, whatever number it has: of something that moves.
 const OUTLIER: f32 = 1e-3;

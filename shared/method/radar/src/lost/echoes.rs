@@ -24,7 +24,6 @@ pub(super) struct Layout {
     pub cells: usize,
     bins_per_cell: usize,
     first_bin: usize,
-    /// Range of the first cell's centre, m.
     pub first_m: f32,
     pub cell_m: f32,
 }

@@ -7,7 +7,6 @@ use crate::scan::{PolarScan, flag};
 /// Maximum number of bins per cell: the sum must fit an i16, which every vector unit can compare.
 const MAX_BINS_PER_CELL: usize = 128;
 
-/// Maximum power of a cell.
 pub(super) const MAX_POWER: usize = MAX_BINS_PER_CELL * 255;
 
 /// Powers of the cells between minimum and maximum range: sums over the bins of a cell.

@@ -22,7 +22,6 @@ pub struct Keyframe {
     pub id: u64,
     /// Pose in the first scan's frame.
     pub pose: Pose,
-    /// [`super::TrackerState::ahead_m`] of its scan.
     pub ahead_m: Vector2<f64>,
     images: [Image; 2],
 }

@@ -18,7 +18,6 @@ pub struct WheelState {
     pub scale: f64,
     /// Error of the last pose along the path, against the map, m.
     pub offset_m: f64,
-    /// Covariance of the errors of that offset and of the scale.
     pub covariance: Matrix2<f64>,
     /// The last registered distance differed from the wheels' distance, or the implied scale is
     /// implausible.

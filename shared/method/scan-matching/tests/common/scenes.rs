@@ -103,7 +103,6 @@ impl Drive {
     }
 }
 
-/// The motion along an arc of this length that turns by this angle.
 fn arc(length: f64, turn: f64) -> Pose {
     let (sin, cos) = turn.sin_cos();
     let [ahead, aside] = if turn.abs() < 1e-9 {
@@ -114,10 +113,8 @@ fn arc(length: f64, turn: f64) -> Pose {
     Pose::new(Vector2::new(ahead, aside) * length, turn)
 }
 
-/// The errors of the sensor's ranges.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sensor {
-    /// Standard deviation of the ranges, m.
     pub noise_m: f64,
     /// Ranges are too short by this for each m/s of approach, s.
     pub doppler_s: f64,
@@ -170,7 +167,6 @@ impl Sensor {
     }
 }
 
-/// The point `[x_m, y_m, time_s, weight, doppler_s]`.
 pub fn point(values: [f64; 5]) -> SparsePoint {
     let [x_m, y_m, time_s, weight, doppler_s] = values.map(|v| v as f32);
     SparsePoint {
@@ -224,7 +220,6 @@ pub struct Run {
     pub refined: Vec<Refined>,
 }
 
-/// The error at the end of a run, and the error of its worst motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
     /// Yaw error at the end, degrees counter-clockwise.
@@ -240,7 +235,6 @@ impl Run {
         self.errors_from(0)
     }
 
-    /// The errors of the motions from scan `first` on.
     pub fn errors_from(&self, first: usize) -> Errors {
         let (mut pose, mut worst_m, mut worst_deg) = (self.drive.pose(first), 0.0_f64, 0.0_f64);
         for k in first..self.refined.len() {
@@ -288,7 +282,6 @@ pub fn off(drive: &Drive, refined: &[Refined], over: std::ops::Range<usize>) -> 
     )
 }
 
-/// The scans of a drive.
 pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<SparsePoint>> {
     (0..drive.scans)
         .map(|k| sensor.scan(scene, drive, k))
@@ -303,7 +296,6 @@ pub fn refiner() -> Refiner {
     Refiner::new(&config, CAPACITY).unwrap()
 }
 
-/// Refines the motions between these scans of a drive.
 pub fn refine(drive: &Drive, scans: &[Vec<SparsePoint>]) -> Run {
     let mut refiner = refiner();
     Run {
@@ -378,7 +370,6 @@ pub fn into_a_tunnel(drive: &Drive, more: Vec<Reflector>) -> Vec<Vec<SparsePoint
     scans(&scene, drive, &LITTLE_NOISE)
 }
 
-/// Simulates and refines a drive.
 pub fn run(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Run {
     refine(drive, &scans(scene, drive, sensor))
 }

@@ -38,9 +38,7 @@ pub struct DriveSearch {
 
 #[derive(Clone, Debug)]
 pub struct PlacedDrive {
-    /// The poses of all keyframes in the map frame.
     pub poses: Vec<Pose>,
-    /// The keyframes whose fixes agree with the others.
     pub agreeing: Vec<FoundKeyframe>,
 }
 

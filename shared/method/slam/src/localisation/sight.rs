@@ -69,7 +69,6 @@ mod tests {
 
     use super::*;
 
-    /// A point in each direction from `first` to `last`, degrees.
     fn scan(first: u16, last: u16) -> Submap {
         let point = |degrees: u16| {
             let (sin, cos) = f32::from(degrees).to_radians().sin_cos();

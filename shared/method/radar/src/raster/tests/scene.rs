@@ -48,7 +48,6 @@ impl Sensor {
         }
     }
 
-    /// An empty scan.
     pub fn scan(&self) -> OwnedScan {
         let azimuths = self.azimuth_rad.len();
         let stride = METADATA + self.bins;
@@ -122,7 +121,6 @@ impl Sensor {
     }
 }
 
-/// The raster of a scan without floor.
 pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
     let mut raster = Array2::from_elem((config.n, config.n), f32::NAN);
     let mut rasteriser = Rasteriser::new(config).unwrap();
@@ -132,7 +130,6 @@ pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> 
     raster.into_raw_vec_and_offset().0
 }
 
-/// The centre of a cell, x and y in m.
 pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64> {
     let middle = 0.5 * (config.n as f64 - 1.0);
     let cell_m = f64::from(config.cell_m);

@@ -64,7 +64,6 @@ impl Drive {
             .collect()
     }
 
-    /// The next scan, whose estimate is off by `off_m`.
     fn step(&mut self, outcome: Outcome, off_m: f64) -> Step {
         let [x_m, y_m, yaw_rad] = SIGMA.map(|sigma| sigma * self.noise());
         let previous = self.estimate;

@@ -8,7 +8,6 @@ use crate::network::{
     tensors::{Attributes, Constants},
 };
 
-/// The most values of a tensor.
 const MOST_VALUES: usize = 1 << 26;
 
 /// Values of an image, as a tensor.
