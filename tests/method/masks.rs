@@ -75,7 +75,6 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The table's lines, number by number.
 fn figures(ended: &Ended) -> Vec<Vec<f64>> {
     let figure = |text: &str| text.parse().unwrap_or(f64::NAN);
     ended

@@ -10,7 +10,6 @@ use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
 const MAP: &str = "journal/refinement.map";
-/// The searched part of a row.
 const SEARCHED: [&str; 5] = [
     "searched_x_m",
     "searched_y_m",

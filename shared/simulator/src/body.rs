@@ -1,7 +1,6 @@
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
 
-/// The body number of scatterers and walls that belong to no body.
 pub const NO_BODY: u32 = 0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

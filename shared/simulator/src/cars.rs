@@ -18,7 +18,6 @@ pub(crate) const HALF_M: [f64; 2] = [2.15, 0.9];
 /// Two-way share of the power that passes each diagonal of a car, which stands for its outline: a
 /// line through a car crosses at least one.
 const TRANSMISSION: f64 = 0.9;
-/// Numbers of the bodies of moving cars, above all others.
 pub(crate) const FIRST_BODY: u32 = 1 << 24;
 /// Speed of the oncoming cars, metres a second, and the distance between two, metres.
 const SPEED_MPS: f64 = 8.0;

@@ -11,7 +11,6 @@ const CELL_M: f64 = 5.0;
 /// is not found from the cell beside it.
 const MARGIN_M: f64 = 1.618_034;
 
-/// Walls indexed by the cells that they touch.
 #[derive(Clone, Debug)]
 pub struct WallGrid {
     walls: Vec<Wall>,

@@ -225,7 +225,6 @@ impl Site<'_> {
         }
     }
 
-    /// A fence or a hedge between houses.
     fn fence(&mut self, side: Side, [from_m, to_m]: [f64; 2]) {
         let Some(frame) = self.route.beside(side, 0.5 * (from_m + to_m), FENCES_M) else {
             return;

@@ -8,7 +8,6 @@ use crate::{Estimate, Track, revisits::Revisit};
 
 /// Standard deviation of the relative pose of two scans of one place: m, m, rad.
 const ALIGNMENT_SIGMA: [f64; 3] = [0.1, 0.1, 3e-3];
-/// Revisits that are used, evenly spread.
 pub(crate) const MAX_REVISITS: usize = 80;
 
 /// The residuals of all revisits: x, y (m) and yaw (rad) of the later scan as driven less as seen,

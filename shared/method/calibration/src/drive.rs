@@ -50,7 +50,6 @@ pub struct Drive {
 
 #[derive(Clone, Debug)]
 pub struct Track {
-    /// The poses in the frame of the first scan.
     pub poses: Vec<Pose>,
     pub motions: Vec<UncertainMotion>,
     pub twists: Vec<Twist>,

@@ -3,14 +3,12 @@
 use gyre_geometry::{SparsePoint, Twist};
 use nalgebra::{SMatrix, SVector, Vector2};
 
-/// Number of facts that are estimated together.
 pub const FACTS: usize = 5;
 
 pub type FactVector = SVector<f64, FACTS>;
 
 pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 
-/// A fact that moves the points of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fact {
     RangeOffset,

@@ -139,14 +139,12 @@ impl Found {
         solved.chain(self.resolution.as_ref().ok())
     }
 
-    /// Returns the constants that stay as configured.
     pub fn kept(&self) -> impl Iterator<Item = &Constant> {
         self.constants
             .iter()
             .filter(|constant| !constant.is_proposed)
     }
 
-    /// Returns the sentence on the overlap of the scans before and after.
     pub fn overlap(&self) -> String {
         let [before, after] = self.overlap;
         let with = match after < before {

@@ -90,7 +90,6 @@ impl Estimate {
     }
 }
 
-/// Blocks of the drive for the jackknife.
 pub(crate) const BLOCKS: usize = 12;
 
 /// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block of

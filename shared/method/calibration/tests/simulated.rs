@@ -40,7 +40,6 @@ fn calibrated(profile: Profile) -> Calibration {
     calibrate(&drive).unwrap()
 }
 
-/// Asserts that the constants are found within their uncertainty, and called wrong.
 fn assert_found(profile: Profile) {
     let found = calibrated(profile);
     let [before, after] = found.overlap;

@@ -88,7 +88,6 @@ impl Constraint {
     }
 }
 
-/// The chi-square test of a loop against an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
     /// Squared normalised difference of the measured motion from the predicted one; 3 is expected

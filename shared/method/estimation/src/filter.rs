@@ -25,7 +25,6 @@ pub struct TrajectoryFilter {
     /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
     /// beyond the poses are reserve.
     covariance: DMatrix<f64>,
-    /// Groups that a loop has been counted of.
     groups: BTreeSet<u64>,
 }
 

@@ -76,7 +76,6 @@ struct Closing {
     weight: f64,
 }
 
-/// A loop of a [`PoseGraph`] that passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedLoop {
     pub from: usize,

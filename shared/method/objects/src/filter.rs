@@ -29,7 +29,6 @@ const BEHIND_M: f64 = 4.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Filter {
     models: [Model; TURNS.len()],
-    /// Mean and covariance of all models.
     mean: Estimate,
 }
 
@@ -192,7 +191,6 @@ impl Filter {
         self.weigh(&costs);
     }
 
-    /// Returns the squared Mahalanobis distance of another state from this one.
     pub fn apart(&self, other: &Self) -> f64 {
         let difference = self.mean.state - other.mean.state;
         mahalanobis(difference, self.mean.covariance + other.mean.covariance)
@@ -290,7 +288,6 @@ impl Estimate {
     }
 }
 
-/// Returns mean and covariance of several estimates, each with its weight.
 fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Estimate {
     let sum: f64 = parts.clone().map(|(weight, _)| weight).sum();
     let sum = sum.max(f64::MIN_POSITIVE);

@@ -31,7 +31,6 @@ const MAX_SCORE: f64 = 4.0;
 const KEEP_SCORE: f64 = 0.0;
 const END_SCORE: f64 = -2.0;
 const MISSED_LOSS: f64 = 1.0;
-/// Scans that show a track before it is an object.
 const BIRTH_HITS: u32 = 2;
 /// Time that a track is continued without being seen, s: a car that passes hides another for about
 /// one.

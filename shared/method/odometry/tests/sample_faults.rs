@@ -148,7 +148,6 @@ fn values(sample: &Sample) -> usize {
     if sample.is(SampleKind::Gyro) { 3 } else { 1 }
 }
 
-/// The row of a sample in its log.
 fn line(sample: &Sample) -> String {
     let values = sample.values[..values(sample)].iter();
     let values: String = values.map(|value| format!(",{value}")).collect();

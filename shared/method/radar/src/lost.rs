@@ -35,7 +35,6 @@ pub const MAX_GAPS: usize = 8;
 /// The largest number of lost azimuths that are placed one by one. More are lost in bursts.
 const MAX_SINGLE: usize = 7;
 
-/// The least azimuths of a turn for finding places.
 const MIN_AZIMUTHS: usize = 64;
 
 /// By how much faster the vehicle may have become since the motion that predicts: it brakes or

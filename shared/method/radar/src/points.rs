@@ -71,7 +71,6 @@ impl PointsConfig {
     }
 }
 
-/// Extracts the points of scans. The first scan of a size allocates the memory.
 #[derive(Debug)]
 pub struct PointExtractor {
     config: PointsConfig,

@@ -175,7 +175,6 @@ pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     }
 }
 
-/// cross += g conj(f)
 #[simd]
 pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
     for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {

@@ -10,7 +10,6 @@ pub(crate) struct OverlapEnergy {
     reach: usize,
     rows: Vec<f32>,
     columns: Vec<f32>,
-    /// Sums over the first (last) k rows (columns).
     edges: [Vec<f64>; 4],
     /// Sums over b columns of the rows of one corner so far.
     corner: Vec<f64>,

@@ -123,7 +123,6 @@ pub struct Refiner {
 }
 
 impl Refiner {
-    /// Plans the refinement of scans of at most `capacity` points.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         config.validate()?;
         Ok(Self {

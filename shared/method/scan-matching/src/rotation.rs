@@ -79,7 +79,6 @@ pub struct RotationSearch {
 }
 
 impl RotationSearch {
-    /// Plans a search over rasters of `n` x `n` cells.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         check_side(n)?;

@@ -8,7 +8,6 @@ use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{Aiding, Outcome, Refined, Verdict};
 
 const SCANS: usize = 60;
-/// Scans with a wrong gyro.
 const WRONG: Range<usize> = 30..33;
 
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {

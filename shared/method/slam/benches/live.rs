@@ -19,7 +19,6 @@ use rand_distr::{Distribution, Normal};
 use rustix::time::{ClockId, clock_gettime};
 
 const KEYFRAMES: usize = 20_000;
-/// Keyframes of one round of the route.
 const AROUND: usize = 2_000;
 const LOOPS: usize = 500;
 /// The last loops, whose times are reported.
@@ -67,7 +66,6 @@ fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     (closer, keyframes)
 }
 
-/// Does what trajectory does when it starts.
 fn trajectory(out: &Path) -> TrajectoryEstimator {
     let mut estimator = pushed(out);
     let mut queries = RecordReader::<Query>::open(out).unwrap();
@@ -89,7 +87,6 @@ fn pushed(out: &Path) -> TrajectoryEstimator {
     estimator
 }
 
-/// The loops come one by one after all keyframes.
 fn new_loops(out: &Path, queries: &[Query]) {
     let mut estimator = pushed(out);
     let with_loops = queries.iter().filter(|query| !query.candidates.is_empty());

@@ -84,7 +84,6 @@ impl LoopCloser {
         })
     }
 
-    /// Takes the next keyframe and keeps its path and motion.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         self.extend(keyframe.path_m, &keyframe.motion)
     }

@@ -35,7 +35,6 @@ impl DeadReckoning {
         self.covariances.push(covariance);
     }
 
-    /// Returns the motion from keyframe `from` to keyframe `to`, which may be the earlier one.
     pub fn motion(&self, from: usize, to: usize) -> UncertainMotion {
         let (first, last) = (from.min(to), from.max(to));
         let to_pose = lever(self.poses[to].translation.x, self.poses[to].translation.y);

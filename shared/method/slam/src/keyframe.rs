@@ -31,7 +31,6 @@ pub struct Keyframe {
     pub points: Vec<SparsePoint>,
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {

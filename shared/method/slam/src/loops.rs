@@ -6,7 +6,6 @@ use gyre_storage::LogMagic;
 
 use crate::{Record, exact::ExactMotion};
 
-/// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
     pub place: usize,

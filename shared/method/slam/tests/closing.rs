@@ -31,7 +31,6 @@ impl Logs {
         }
     }
 
-    /// Continues with the remaining keyframes of the drive.
     fn complete(mut self, drive: &Drive) -> Self {
         let mut closer = closer();
         for place in &self.places {

@@ -85,7 +85,6 @@ fn unwrapped(poses: &[(f64, Pose)]) -> Vec<Sample<3>> {
     poses.iter().map(sample).collect()
 }
 
-/// Sets all samples of a stand to their median.
 fn hold_stands(samples: &mut [Sample<3>]) {
     let mut first = 0;
     while first < samples.len() {

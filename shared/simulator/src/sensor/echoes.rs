@@ -14,7 +14,6 @@ const NEAREST_M: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Position at the middle of the sweep, world frame.
     position: Point2<f64>,
     /// Velocity, metres a second, world frame.
     pub velocity: Vector2<f64>,

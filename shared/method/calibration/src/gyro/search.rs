@@ -70,10 +70,14 @@ impl Peak {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum NoPeak {
-    /// The log covers so few turns at any offset.
-    Apart { turns: usize },
+    Apart {
+        turns: usize,
+    },
     /// Two offsets or axes fit about as well.
-    Ambiguous { best: Peak, rival: Peak },
+    Ambiguous {
+        best: Peak,
+        rival: Peak,
+    },
 }
 
 /// Finds the offset and the axis of the highest correlation.
@@ -143,7 +147,6 @@ fn independent(turns: &[Turn]) -> f64 {
     turning * (interval_s / (INDEPENDENT * BASELINE_S)).min(1.0)
 }
 
-/// The correlations with the angles about each axis at one offset.
 fn correlations(turns: &[Turn], angles: &Angles, delay_s: f64) -> [Peak; 3] {
     let common = turns.iter().filter_map(|turn| {
         let turned = angles.between(turn.from_s + delay_s, turn.to_s + delay_s)?;

@@ -53,7 +53,6 @@ pub struct PlaceIndex {
 }
 
 struct Query {
-    /// Distance in the sieve, and place.
     distances: Vec<(u32, u32)>,
     inverse: Arc<dyn ComplexToReal<f32>>,
     cross: Vec<Complex32>,

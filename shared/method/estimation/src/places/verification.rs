@@ -46,7 +46,6 @@ pub struct Verification {
     pub half_turn: bool,
 }
 
-/// Registers the submap of a query with the submaps of candidates.
 pub struct LoopVerifier(Registrar);
 
 impl LoopVerifier {

@@ -22,7 +22,6 @@ pub fn covariance([x, y, yaw]: Sigma) -> Matrix3<f64> {
     Matrix3::new(x * x, xy, 0.0, xy, y * y, 0.0, 0.0, 0.0, yaw * yaw)
 }
 
-/// Returns the motion with a covariance, without error.
 pub fn exact(motion: Pose, sigma: Sigma) -> UncertainMotion {
     UncertainMotion {
         motion,
@@ -30,7 +29,6 @@ pub fn exact(motion: Pose, sigma: Sigma) -> UncertainMotion {
     }
 }
 
-/// A drive whose true poses are known.
 pub struct Drive {
     pub truth: Vec<Pose>,
     pub odometry: Vec<Constraint>,
@@ -72,7 +70,6 @@ impl Drive {
         Constraint::closing(from, to, self.measure(from, to, LOOP))
     }
 
-    /// Returns the filter after all odometry.
     pub fn filter(&self) -> TrajectoryFilter {
         let mut filter = TrajectoryFilter::new(self.truth[0], TrajectoryFilter::MAX_KEYFRAMES);
         for motion in &self.odometry {
@@ -82,7 +79,6 @@ impl Drive {
     }
 }
 
-/// Returns the poses that the odometry leads to.
 pub fn dead_reckoning(start: Pose, odometry: &[Constraint]) -> Vec<Pose> {
     let mut poses = vec![start];
     for constraint in odometry {

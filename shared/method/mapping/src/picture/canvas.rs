@@ -30,7 +30,6 @@ impl Pen {
 }
 
 const GLYPHS: RasterHeight = RasterHeight::Size32;
-/// Least width of a picture, in units of length.
 const MIN_WIDTH: f32 = 900.0;
 const FOOTER: f32 = 44.0;
 const MARGIN: f32 = 20.0;

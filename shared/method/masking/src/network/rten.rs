@@ -127,7 +127,6 @@ fn state_kernel_sizes(graph: &mut GraphProto) {
     }
 }
 
-/// Returns the name, type and shape of each input. Old files list weights among them.
 pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
     let Some(graph) = &file.graph else {
         return Vec::new();

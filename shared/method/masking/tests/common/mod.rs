@@ -64,7 +64,6 @@ pub fn learned(card: &Path) -> MaskingConfig {
     }
 }
 
-/// The same, computed by this backend.
 pub fn learned_by(backend: Backend, card: &Path) -> MaskingConfig {
     MaskingConfig {
         backend,

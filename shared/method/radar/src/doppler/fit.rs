@@ -169,7 +169,6 @@ fn biweight(share: f64) -> f64 {
     rest * rest
 }
 
-/// The derivative of a residual times its weight.
 fn biweight_slope(share: f64) -> f64 {
     let square = share * share;
     match square < 1.0 {

@@ -11,7 +11,6 @@ use passes::{pass_backward, pass_forward};
 
 /// Largest turn of the whole scan against a prediction, in azimuths to either side.
 const TURN: usize = 3;
-/// Steps of that turn for each azimuth.
 const STEPS: usize = 2;
 /// The weights of four neighbours for a value amid them: the cubic of Catmull and Rom.
 const AMID: [f32; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
@@ -322,7 +321,6 @@ fn exponential(x: f32) -> f32 {
     sum * f32::from_bits(power)
 }
 
-/// Azimuths for comparing a row.
 const fn azimuths(count: usize) -> usize {
     count + 2 + 2 * (TURN + BESIDE)
 }

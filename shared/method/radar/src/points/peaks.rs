@@ -14,7 +14,6 @@ pub(super) struct Peak {
     pub power: i16,
 }
 
-/// Finds the local maxima within the width of the beam.
 #[derive(Debug)]
 pub(super) struct Beam {
     half_width_rad: f32,

@@ -2,7 +2,6 @@ use crate::scan::Sense;
 use std::f32::consts::SQRT_2;
 use std::f64::consts::TAU;
 
-/// Cells per iteration of the vectorised loops.
 pub(super) const BLOCK: usize = 32;
 
 pub(super) type Block<T> = [T; BLOCK];

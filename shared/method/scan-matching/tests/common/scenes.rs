@@ -96,7 +96,6 @@ impl Drive {
         (self.speed_mps + 0.5 * self.acceleration_mps2 * time_s) * time_s
     }
 
-    /// Pose of scan `k` in the first one's frame.
     pub fn pose(&self, k: usize) -> Pose {
         let time_s = k as f64 * SWEEP_S;
         arc(self.length_m(time_s), self.yaw_rate_radps * time_s)
@@ -178,7 +177,6 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
-/// Points unrelated to any scene, as strong as points of a scene.
 pub fn noise(seed: u64) -> Vec<SparsePoint> {
     let mut numbers = Numbers(seed);
     let mut place = || {
@@ -213,7 +211,6 @@ fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     None
 }
 
-/// A drive and its refined motions.
 pub struct Run {
     pub drive: Drive,
     /// Motion from scan k to k + 1.
@@ -222,7 +219,6 @@ pub struct Run {
 
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
-    /// Yaw error at the end, degrees counter-clockwise.
     pub yaw_deg: f64,
     /// Distance from the true position at the end, m.
     pub shift_m: f64,
@@ -338,7 +334,6 @@ pub fn refine_aided(
     (1..scans.len()).map(&mut refine).collect()
 }
 
-/// The true distance to scan `k` times a factor, as wheels measure it.
 pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> WheelDistance {
     let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
     WheelDistance {

@@ -16,7 +16,6 @@ impl Cache {
         }
     }
 
-    /// Returns a keyframe, and reads it if its slot has a different one.
     pub fn get<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -52,9 +52,7 @@ pub enum Status {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
-    /// The pose in the map, with its covariance along the map's axes.
     pub pose: UncertainMotion,
-    /// Masked correlation of the scan with the submap.
     pub correlation: f64,
     /// Difference of the correlation from the next best pose that was tried; for a first fix only.
     pub margin: f64,

@@ -63,7 +63,6 @@ impl Map {
         Ok(log.end()?)
     }
 
-    /// Reads the map in a folder. All of it is kept in memory.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let mut reader = RecordReader::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();

@@ -21,7 +21,6 @@ const DEPENDENT_M: f64 = 5.0;
 const OF_MAP: u64 = u32::MAX as u64;
 /// The uncertainty of the first pose before any fix: standard deviations in m and rad.
 const ANYWHERE: [f64; 3] = [1e5, 1e5, 3.0];
-/// Fixes that are compared as the start, at most.
 const STARTS: usize = 100;
 
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +113,6 @@ impl DriveSearch {
             .map(|(_, start)| start)
     }
 
-    /// The graph of the map's frame and the keyframes of the drive, which begin at `poses`.
     fn graph(&self, drive: &G2o, poses: &[Pose]) -> Result<PoseGraph, EstimationError> {
         let anywhere = UncertainMotion {
             motion: poses[1],

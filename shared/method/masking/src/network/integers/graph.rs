@@ -184,7 +184,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds the step that computes the integers of a tensor.
     fn quantised(&mut self, node: &NodeProto) -> Option<Integer> {
         let to = self.quantisation(node)?;
         let layout = match self.input(node, 0)? {

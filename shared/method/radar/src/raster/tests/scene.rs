@@ -11,7 +11,6 @@ use std::f64::consts::TAU;
 const METADATA: usize = 11;
 pub const STAMP_NS: i64 = 1_547_131_046_353_776_000;
 
-/// A sensor and its motion during the sweep.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     pub azimuth_rad: Vec<f32>,
@@ -21,7 +20,6 @@ pub struct Sensor {
     pub range_resolution_m: f32,
     pub range_offset_m: f32,
     pub doppler_s: f32,
-    /// True if chirps alternate, and the scan reports them.
     pub chirps_alternate: bool,
     pub sense: Sense,
     pub twist: Twist,

@@ -9,7 +9,6 @@ const INTERVAL_S: f64 = 0.25;
 /// Standard deviations of an estimate: x, y (m), yaw (rad).
 const SIGMA: [f64; 3] = [0.055, 0.055, 0.0035];
 
-/// A drive along x, with its estimated and reported positions.
 struct Drive {
     standstill: Standstill,
     random: u64,
