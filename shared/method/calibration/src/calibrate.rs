@@ -22,12 +22,7 @@ const DRIFT_STEP_RAD: f64 = 3e-3;
 const CELL_SHARE: f64 = 0.05;
 const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
-/// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
-const ROW_TIME_SHARE: f64 = 0.05;
 const MIN_REVISITS: usize = 5;
-/// Facts that are solved for together, as far as the drive determines them. The others only
-/// confirm: odometry needs no correction of them.
-pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
@@ -47,8 +42,7 @@ impl FactEstimate {
 
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// All facts in their order. The eccentricity to the side and the times of rows are checks,
-    /// with the other facts as found.
+    /// All facts in their order.
     pub facts: [FactEstimate; FACTS],
     pub revisits: Vec<Revisit>,
     pub pairs: usize,
@@ -88,7 +82,7 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         )));
     }
     let revisits = evenly(revisits::find(drive, &before)?, &before);
-    let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
+    let mut solution = Solution::find(drive, &before, &revisits, &Fact::ALL)?;
     let mut facts = solution.facts;
     let mut proposed = solution.determined();
     // Facts that the drive does not determine stay as configured, and the others are estimated
@@ -146,7 +140,7 @@ impl Solution {
             at = drive.mean_track_with(&(at.change + found.step()))?;
             found = round(drive, &at, revisits, free)?;
         }
-        let by_drift = match free.contains(&Fact::EccentricityCos) {
+        let by_drift = match free.contains(&Fact::Eccentricity) {
             true => drift_of(drive, &at, revisits)?,
             false => None,
         };
@@ -170,7 +164,6 @@ impl Solution {
 struct Round {
     free: Vec<Fact>,
     solved: [Estimate; FACTS],
-    checked: [Estimate; FACTS],
     pairs: usize,
 }
 
@@ -210,11 +203,9 @@ fn round(
         let reason = "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones";
         CalibrationError::Unusable(reason.to_owned())
     };
-    let unknown = [Estimate::UNKNOWN; FACTS];
     Ok(Round {
         free: free.to_vec(),
         solved: system.solve(free).ok_or_else(undetermined)?,
-        checked: system.solve(&Fact::ALL).unwrap_or(unknown),
         pairs: system.len(),
     })
 }
@@ -231,14 +222,14 @@ fn drift_of(
     }
     let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
         let mut shifted = at.change;
-        shifted[Fact::EccentricityCos as usize] += by_rad;
+        shifted[Fact::Eccentricity as usize] += by_rad;
         let track = drive.mean_track_with(&shifted)?;
         Ok(drift::residuals(&track, &aligned(drive, &track, revisits)))
     };
     let slopes = (shifted(DRIFT_STEP_RAD)? - shifted(-DRIFT_STEP_RAD)?) / (2.0 * DRIFT_STEP_RAD);
     let here = aligned(drive, at, revisits);
     let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
-    let configured = at.change[Fact::EccentricityCos as usize];
+    let configured = at.change[Fact::Eccentricity as usize];
     Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
@@ -263,16 +254,12 @@ fn facts(
         let k = fact as usize;
         let floor = match fact {
             Fact::RangeOffset => error_m,
-            Fact::EccentricityCos | Fact::EccentricitySin => error_m / USUAL_RANGE_M,
+            Fact::Eccentricity => error_m / USUAL_RANGE_M,
             Fact::Doppler => error_m / USUAL_SPEED_MPS,
-            Fact::RowTime => ROW_TIME_SHARE,
         };
-        let solved = match found.free.contains(&fact) {
-            true => found.solved[k],
-            false => found.checked[k],
-        };
+        let solved = found.solved[k];
         let by_overlap = Estimate::new(solved.value + change[k], solved.sigma.hypot(floor));
-        let by_drift = by_drift.filter(|_| fact == Fact::EccentricityCos);
+        let by_drift = by_drift.filter(|_| fact == Fact::Eccentricity);
         let change = by_drift.map_or(by_overlap, |by_drift| by_overlap.combined(&by_drift));
         FactEstimate {
             fact,

@@ -8,9 +8,7 @@ use std::{fmt, iter};
 
 use gyre_radar::SweepGeometry;
 
-use crate::{
-    Calibration, CalibrationError, Drive, Fact, FactVector, OwnReflections, calibrate::SOLVED,
-};
+use crate::{Calibration, CalibrationError, Drive, FACTS, Fact, FactVector, OwnReflections};
 pub use constant::Constant;
 use constant::{Label, constant, resolution};
 
@@ -26,8 +24,8 @@ pub struct Configured {
 }
 
 /// The key in `[dataset]`, the name, the unit for printing and the factor to it of each constant in
-/// the order of [`SOLVED`].
-const LABELS: [Label; SOLVED.len()] = [
+/// the order of [`Fact::ALL`].
+const LABELS: [Label; FACTS] = [
     ("range_offset_m", "range offset", "m", 1.0),
     (
         "azimuth_eccentricity_rad",
@@ -50,8 +48,7 @@ pub struct Found {
     resolution: Result<Constant, String>,
     /// Range that leaves out the vehicle's own reflections, m, if it is more than configured.
     pub min_range_m: Option<f64>,
-    /// Further properties, a line each.
-    others: Vec<[String; 2]>,
+    reflections: Option<String>,
 }
 
 impl Found {
@@ -69,15 +66,13 @@ impl Found {
             (true, configured) => configured.abs(),
             (false, configured) => configured,
         };
-        let values: [f64; 3] = [
+        let values: [f64; FACTS] = [
             geometry.range_offset_m.into(),
             configured.eccentricity_rad,
             doppler_s,
         ];
-        let constants = (0..SOLVED.len()).map(|k| {
-            let fact = &calibration.facts[SOLVED[k] as usize];
-            constant(LABELS[k], values[k], fact, calibration)
-        });
+        let constants =
+            (0..FACTS).map(|k| constant(LABELS[k], values[k], &calibration.facts[k], calibration));
         Ok(Self {
             scans: drive.sweeps.len(),
             path_m,
@@ -86,7 +81,7 @@ impl Found {
             constants: constants.collect(),
             resolution: resolution(path_m, configured)?,
             min_range_m: drive.reflections.min_range_m(configured.min_range_m),
-            others: others(drive, calibration, configured.min_range_m),
+            reflections: Some(reflections(&drive.reflections, configured.min_range_m)),
         })
     }
 
@@ -106,13 +101,13 @@ impl Found {
             constants: constants.collect(),
             resolution: Err("as configured: --distance-m tells it from one drive alone".to_owned()),
             min_range_m: drives().filter_map(|it| it.min_range_m).reduce(f64::max),
-            others: Vec::new(),
+            reflections: None,
         }
     }
 
     pub(crate) fn change(&self) -> FactVector {
         let mut change = FactVector::zeros();
-        for (fact, constant) in SOLVED.into_iter().zip(&self.constants) {
+        for (fact, constant) in Fact::ALL.into_iter().zip(&self.constants) {
             if constant.is_proposed {
                 change[fact as usize] = constant.found.value - constant.configured;
             }
@@ -156,38 +151,6 @@ impl Found {
     }
 }
 
-fn others(drive: &Drive, calibration: &Calibration, min_range_m: f64) -> Vec<[String; 2]> {
-    let fact = |fact: Fact| &calibration.facts[fact as usize].change;
-    let (sine, row_time) = (fact(Fact::EccentricitySin), fact(Fact::RowTime));
-    vec![
-        [
-            "eccentricity aside".to_owned(),
-            format!(
-                "{:.2} \u{b1} {:.2} mrad times the azimuth's sine, overlap alone; it makes no drift and has no key",
-                sine.value * 1e3,
-                sine.sigma * 1e3
-            ),
-        ],
-        [
-            "row times".to_owned(),
-            format!(
-                "a sweep takes {:.3} \u{b1} {:.3} of what they say{}; an offset of all times cannot be told from a drive: \
-             it moves each pose along the path",
-                1.0 + row_time.value,
-                row_time.sigma,
-                match row_time.contradicts(0.0) {
-                    true => ", which contradicts them",
-                    false => "",
-                }
-            ),
-        ],
-        [
-            "own reflections".to_owned(),
-            reflections(&drive.reflections, min_range_m),
-        ],
-    ]
-}
-
 fn reflections(own: &OwnReflections, configured_m: f64) -> String {
     match (own.end_m(), own.min_range_m(configured_m)) {
         (None, _) => "too few moving scans to tell them".to_owned(),
@@ -218,8 +181,8 @@ impl fmt::Display for Found {
         if let Err(reason) = &self.resolution {
             write!(f, "\n{:<21} {reason}", "range resolution")?;
         }
-        for [name, sentence] in &self.others {
-            write!(f, "\n{name:<21} {sentence}")?;
+        if let Some(sentence) = &self.reflections {
+            write!(f, "\n{:<21} {sentence}", "own reflections")?;
         }
         Ok(())
     }
