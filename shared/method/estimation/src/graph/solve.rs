@@ -20,8 +20,8 @@ const POOR_GAIN: f64 = 0.25;
 /// rounding.
 const SHORTEST_STEP: f64 = 1e-12;
 
-/// The tolerance of the first descent, which only has to bring the poses near their place.
-const COARSE: f64 = 0.1;
+/// The tolerance of descents that only have to bring the poses near their place.
+pub(super) const COARSE: f64 = 0.1;
 
 /// True if loops keep their weights while the poses are moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
