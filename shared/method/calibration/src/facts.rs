@@ -45,7 +45,7 @@ pub(crate) fn correct(
     sense: Sign,
     alternates: bool,
 ) -> SparsePoint {
-    let [offset_m, cosine, doppler_s] = (*change).into();
+    let [offset_m, cosine, doppler_s]: [f64; FACTS] = (*change).into();
     let (x, y) = (f64::from(point.x_m), f64::from(point.y_m));
     let (range_m, angle) = (x.hypot(y), y.atan2(x));
     let angle = angle + sense * cosine * angle.cos();
