@@ -73,17 +73,6 @@ fn expect_shape(what: &str, actual: [usize; 2], expected: [usize; 2]) -> Result<
     }
 }
 
-/// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
-pub fn square<'a>(
-    what: &str,
-    cells: &'a [f32],
-    n: usize,
-) -> Result<ArrayView2<'a, f32>, ShapeError> {
-    let count = cells.len();
-    ArrayView2::from_shape((n, n), cells)
-        .map_err(|_| ShapeError(format!("{what} is 1 x {count}: expected {n} x {n}")))
-}
-
 fn cells<'a>(what: &str, raster: &ArrayView2<'a, f32>, n: usize) -> Result<&'a [f32], ShapeError> {
     expect_shape(what, [raster.nrows(), raster.ncols()], [n, n])?;
     raster.to_slice().ok_or_else(|| ShapeError::layout(what))
