@@ -60,7 +60,10 @@ pub fn along(name: &str, trajectory: &str) -> PathBuf {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(&file, trajectory).unwrap();
     let config = SimulationConfig {
-        drive: DriveConfig::along_file(file.path().to_owned()),
+        drive: DriveConfig {
+            file: Some(file.path().to_owned()),
+            ..DriveConfig::default()
+        },
         ..SimulationConfig::default()
     };
     of(name, &config)

@@ -1,6 +1,6 @@
 //! `Odometry` in one process finds the bits that the processes of a run find.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_journal as journal;
@@ -9,9 +9,8 @@ use gyre_odometry::{Odometry, OdometryConfig, Outcome, Registered};
 use gyre_radar::OwnedScan;
 
 use crate::common::{Run, real_data, runtime_is_installed};
-use crate::method::learned_masks::card;
+use crate::method::{learned_masks::card, refinement::names};
 
-/// Registers all scans that a finished run played.
 fn register_all(run: &Run) -> Vec<Registered> {
     let resolved = run.out().join("config.toml");
     let configuration = Configuration::read(&resolved, &[]).unwrap();
@@ -32,7 +31,6 @@ fn register_all(run: &Run) -> Vec<Registered> {
         .collect()
 }
 
-/// Asserts that motions and poses of a run and of `Odometry` are the same bits.
 pub fn assert_same_bits(run: &Run) -> usize {
     run.complete();
     let journal = journal::records(&journal::path(run.out()))
@@ -105,8 +103,21 @@ fn with_the_gyro_of_a_real_drive() {
 fn with_every_angle_tried() {
     let run = Run::of_recording()
         .set("search.kind=exhaustive")
-        .set("source.scans=6");
-    assert_eq!(assert_same_bits(&run), 6);
+        .set("source.scans=10");
+    assert_eq!(assert_same_bits(&run), 10);
+    let summary = run.summary();
+    let stages = [
+        "radar-replay",
+        "masking",
+        "joint-search",
+        "refinement",
+        "pose-integration",
+    ];
+    let stages = BTreeSet::from(stages.map(str::to_owned));
+    assert_eq!(names(&summary["stages"]), stages);
+    assert_eq!(names(&summary["latency"]["stages"]), stages);
+    let allocations = &summary["stages"]["joint-search"]["allocations_after_five"];
+    assert_eq!(*allocations, 0);
 }
 
 #[test]

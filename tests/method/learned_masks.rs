@@ -18,7 +18,6 @@ pub fn card(model: &str) -> PathBuf {
         .with_extension("toml")
 }
 
-/// A run of the small recording with a learned mask.
 fn masked_by(model: &str) -> Run {
     Run::of_recording().masked_by(&card(model))
 }

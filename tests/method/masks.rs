@@ -19,7 +19,6 @@ const PANEL: usize = 254;
 const MARGIN: usize = 6;
 const WIDTH: usize = 4 * PANEL + 5 * MARGIN;
 
-/// `gyre masks` of the small recording, in a folder.
 fn masks(folder: &Path, arguments: &[&str]) -> Ended {
     masks_of(recording::small(), folder, arguments)
 }
@@ -34,7 +33,6 @@ fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
     Ended::of(command)
 }
 
-/// A picture, row by row.
 struct Picture {
     rows: Vec<Vec<[u8; 3]>>,
 }
@@ -58,7 +56,6 @@ impl Picture {
         }
     }
 
-    /// The colours of a panel.
     fn colours(&self, row: usize, column: usize) -> BTreeSet<[u8; 3]> {
         let [top, left] = [row, column].map(|place| MARGIN + place * (PANEL + MARGIN));
         self.rows[top..top + PANEL]
@@ -69,7 +66,6 @@ impl Picture {
     }
 }
 
-/// The names of the pictures in a folder's `out`.
 fn names(folder: &Path) -> Vec<String> {
     let files = fs::read_dir(folder.join("out")).unwrap();
     let mut names: Vec<String> = files
@@ -79,7 +75,6 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The table's lines, number by number.
 fn figures(ended: &Ended) -> Vec<Vec<f64>> {
     let figure = |text: &str| text.parse().unwrap_or(f64::NAN);
     ended

@@ -2,7 +2,6 @@
 //! kept.
 
 pub mod in_process;
-mod joint_search;
 pub mod learned_masks;
 mod masks;
 mod pipeline;

@@ -98,16 +98,6 @@ fn a_repetition_gives_the_same_bytes() {
 }
 
 #[test]
-fn the_window_does_not_change_the_result() {
-    for window in [1, 8] {
-        let odometry = Run::of_recording()
-            .set(&format!("run.window={window}"))
-            .complete();
-        assert_eq!(odometry, undisturbed(), "window {window}");
-    }
-}
-
-#[test]
 fn the_resolved_configuration_repeats_the_run() {
     let run = Run::of_recording()
         .set("masking.threshold=70")

@@ -10,7 +10,6 @@ use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
 const MAP: &str = "journal/refinement.map";
-/// The searched part of a row.
 const SEARCHED: [&str; 5] = [
     "searched_x_m",
     "searched_y_m",
@@ -51,8 +50,10 @@ fn each_motion_is_counted_by_how_its_refinement_ended() {
     assert_eq!(outcomes.len(), recording::SCANS - 1);
 }
 
+/// Masking compensates with searched motions, so the search sees the same rasters whether its
+/// motions are refined or not.
 #[test]
-fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts() {
+fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_the_truth() {
     let run = without();
     let odometry = run.complete();
     let summary = run.summary();
@@ -63,35 +64,21 @@ fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts
     assert_eq!(motions, searched);
     let outcomes = columns(&odometry, &["outcome"]).concat();
     assert!(outcomes.iter().all(|outcome| outcome == "searched"));
-}
-
-/// Masking compensates with searched motions, so the search sees the same rasters whether its
-/// motions are refined or not.
-#[test]
-fn refining_changes_nothing_for_the_search() {
-    let alone = without().complete();
+    let refined = Run::of_recording();
+    refined.complete();
     assert_eq!(
         columns(undisturbed(), &SEARCHED),
-        columns(&alone, &SEARCHED)
+        columns(&odometry, &SEARCHED)
     );
-    assert_ne!(columns(undisturbed(), &MOTION), columns(&alone, &MOTION));
-}
-
-#[test]
-fn refined_motions_are_nearer_to_the_truth() {
-    let error = |run: Run| {
-        run.complete();
-        run.summary()["evaluation"]["ate"]["rmse_m"]
-            .as_f64()
-            .unwrap()
-    };
-    let (refined, searched) = (error(Run::of_recording()), error(without()));
-    assert!(refined < searched, "{refined} m, {searched} m as searched");
+    let [of_refined, of_searched] = [refined, run].map(|run| {
+        let error_m = &run.summary()["evaluation"]["ate"]["rmse_m"];
+        error_m.as_f64().unwrap()
+    });
+    assert!(of_refined < of_searched, "{of_refined} m, {of_searched} m");
 }
 
 // Its map.
 
-/// Interrupts a run in its middle.
 fn interrupted() -> Run {
     let run = Run::of_recording();
     let mut running = run.clone().rate(MODERATE).start();

@@ -33,10 +33,8 @@ fn trajectory() -> String {
     text
 }
 
-/// Scans of the recording.
 pub const SCANS: usize = DRIVE_S * RATE_HZ;
 
-/// The recording of the drive.
 pub fn recording() -> PathBuf {
     common::recording::along("stop-and-go", &trajectory())
 }

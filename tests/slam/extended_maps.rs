@@ -7,7 +7,6 @@ use gyre_slam::localisation::Map;
 
 use crate::common::{Ended, Run, gyre};
 
-/// A drive through the streets of this seed, with cars and noise of its own.
 fn drive(streets: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
         .set(&format!("simulation.seed={streets}"))

@@ -66,7 +66,6 @@ fn fixes(delay_s: f64) -> Vec<(i64, Geographic)> {
     stamps.map(fix).collect()
 }
 
-/// The log of that receiver as a table.
 pub fn log(delay_s: f64) -> String {
     let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
     for (stamp_ns, place) in fixes(delay_s) {
@@ -76,7 +75,6 @@ pub fn log(delay_s: f64) -> String {
     text
 }
 
-/// Copies a bag, and adds the messages of the receiver on `/fix`.
 fn with_fixes(of: &Path, to: &Path) {
     let (bytes, file) = (fs::read(of).unwrap(), fs::File::create(to).unwrap());
     let mut bag = WriteOptions::new().profile("ros2").create(file).unwrap();
@@ -112,7 +110,6 @@ fn without() -> Run {
     Run::small().data(around_a_block()).set("slam.kind=graph")
 }
 
-/// A run with the log of a receiver whose clock is late by this.
 pub fn run(delay_s: f64) -> Run {
     let run = without();
     let file = run.folder().join("gnss.csv");

@@ -8,7 +8,6 @@ use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
 use crate::common::{Run, recording, undisturbed};
 
-/// A run with keyframes.
 fn run() -> Run {
     Run::of_recording().set("slam.kind=graph")
 }

@@ -15,7 +15,6 @@ use serde_json::Value;
 use crate::common::{Ended, Run, Shared, folder, gyre, recording};
 
 const CONFIGURATION: &str = "[raster]\nn = 255\ncell_m = 0.4\n";
-/// The mapped town, and a different town.
 const TOWN: u64 = 3;
 const OTHER_TOWN: u64 = 4;
 
@@ -28,12 +27,10 @@ enum Day {
     Third,
 }
 
-/// The drive that is mapped.
 fn first_drive() -> PathBuf {
     drive(TOWN, Day::First)
 }
 
-/// A drive around a block of the town with the seed `town`, with traffic and noise of its own.
 fn drive(town: u64, day: Day) -> PathBuf {
     let settings = match day {
         Day::First => format!("seed = {town}\n"),
@@ -46,7 +43,6 @@ fn drive(town: u64, day: Day) -> PathBuf {
     )
 }
 
-/// A run of a drive with SLAM, and its map in the run's folder.
 fn mapped() -> Arc<Run> {
     static RUN: Shared<Run> = Shared::new();
     RUN.get(|| {
@@ -68,7 +64,6 @@ fn map_of(run: &Run) -> PathBuf {
     run.folder().join("map")
 }
 
-/// Localises a drive of another day in a town, in this map.
 fn localise(map: &Path, town: u64, out: &Path) -> Ended {
     Ended::of(localising(map, town, out))
 }
@@ -83,7 +78,6 @@ fn localising(map: &Path, town: u64, out: &Path) -> Command {
     command
 }
 
-/// The time, the status and the place of each row of `fixes.csv`.
 fn rows(out: &Path) -> Vec<(i64, String, Option<Pose>)> {
     let text = fs::read_to_string(out.join("fixes.csv")).unwrap();
     let row = |line: &str| {

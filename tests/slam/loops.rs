@@ -7,7 +7,6 @@ use gyre_geometry::xy_yaw;
 
 use crate::common::{Ended, Run, Shared, python};
 
-/// Reads a graph by GTSAM, and prints its factors, its values, and the last pose.
 const GTSAM: &str = "import gtsam, sys
 graph, poses = gtsam.readG2o(sys.argv[1], False)
 last = poses.atPose2(poses.size() - 1)

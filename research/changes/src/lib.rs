@@ -25,6 +25,7 @@ use std::fmt;
 
 use gyre_mapping::{TILE_CELLS, TileIndex};
 use gyre_masking::networks::{PlanesError, PlanesNetwork};
+use gyre_slam::localisation::PlacedDrive;
 use serde::Serialize;
 
 use clusters::Cluster;
@@ -46,6 +47,25 @@ const MIN_CELLS: usize = 4;
 const MARGIN: usize = 64;
 /// Cells a side that it is shown.
 const SIDE: usize = TILE_CELLS + 2 * MARGIN;
+
+/// Stretches of the path, 5 m long, to either side of a fix within which odometry hardly leaves it:
+/// 20 m.
+const STRETCH_M: f64 = 5.0;
+const NEAR_STRETCHES: u64 = 4;
+
+/// Returns for each keyframe, by its place along the path, whether it is near one whose fix agrees
+/// with the others: then its place relative to the map is known.
+pub fn near_fixes(path_m: &[f64], placed: &PlacedDrive) -> Vec<bool> {
+    let stretch = |keyframe: usize| (path_m[keyframe] / STRETCH_M) as u64;
+    let fixed = placed.agreeing.iter().map(|it| stretch(it.keyframe));
+    let fixed: BTreeSet<u64> = fixed.collect();
+    let is_near = |keyframe: usize| {
+        let at = stretch(keyframe);
+        let near = at.saturating_sub(NEAR_STRETCHES)..=at + NEAR_STRETCHES;
+        fixed.range(near).next().is_some()
+    };
+    (0..path_m.len()).map(is_near).collect()
+}
 
 /// The sense of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

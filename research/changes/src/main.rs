@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::Parser;
-use gyre_changes::{Change, ChangeKind, Changes, Survey, changes};
+use gyre_changes::{Change, ChangeKind, Changes, Survey, changes, near_fixes};
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_slam::localisation::{Localiser, PlacedDrive};
@@ -111,8 +111,13 @@ fn survey(
     for keyframe in localiser.map().keyframes() {
         before.add(keyframe, &keyframe.pose.motion);
     }
+    let mut path_m = Vec::new();
+    for index in 0..placed.poses.len() {
+        path_m.push(keyframes.read_without_points(index)?.path_m);
+    }
+    let near = near_fixes(&path_m, placed);
     for (index, pose) in placed.poses.iter().enumerate() {
-        if placed.is_near_fix(index) {
+        if near[index] {
             after.add(&keyframes.read(index)?, pose);
         }
     }

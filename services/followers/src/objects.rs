@@ -9,7 +9,7 @@ use gyre_journal::{
     objects::{LoggedObjects, listed},
     scans::LoggedScan,
 };
-use gyre_masking::{Library, MaskingConfig};
+use gyre_masking::MaskingConfig;
 use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
@@ -35,9 +35,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
-    let library = Library::find(masking);
-    let library = library.map_err(StageError::input)?;
-    ObjectTracker::new(library.onnx_runtime()).map_err(StageError::input)
+    let runtime = masking.onnx_runtime().map_err(StageError::input)?;
+    ObjectTracker::new(runtime.as_deref()).map_err(StageError::input)
 }
 
 struct Tracking {

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use gyre_masking::networks::runtime::{INSTALL, RuntimeError};
-use gyre_masking::{Library, MaskKind, MaskingConfig, model::Card};
+use gyre_masking::{MaskKind, MaskingConfig, model::Card};
 use gyre_messages::StageId;
 use gyre_odometry::OdometryConfig;
 
@@ -64,11 +64,11 @@ pub fn describe_objects(
 }
 
 fn computed(what: &str, masking: &MaskingConfig) -> Result<String, RuntimeError> {
-    Ok(match Library::find(masking)? {
-        Library::OnnxRuntime(path) => {
+    Ok(match masking.onnx_runtime()? {
+        Some(path) => {
             format!("{what} computed by ONNX Runtime, {}", path.display())
         }
-        Library::Rten => format!(
+        None => format!(
             "{what} computed by rten, in one thread; ONNX Runtime is several times faster: `{INSTALL}` installs it"
         ),
     })

@@ -1,9 +1,6 @@
-//! Bodies: scatterers that reflect and walls that hide the space behind them, standing or moving.
-
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
 
-/// The body number of scatterers and walls that belong to no body.
 pub const NO_BODY: u32 = 0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

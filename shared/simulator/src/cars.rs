@@ -18,7 +18,6 @@ pub(crate) const HALF_M: [f64; 2] = [2.15, 0.9];
 /// Two-way share of the power that passes each diagonal of a car, which stands for its outline: a
 /// line through a car crosses at least one.
 const TRANSMISSION: f64 = 0.9;
-/// Numbers of the bodies of moving cars, above all others.
 pub(crate) const FIRST_BODY: u32 = 1 << 24;
 /// Speed of the oncoming cars, metres a second, and the distance between two, metres.
 const SPEED_MPS: f64 = 8.0;
@@ -97,7 +96,6 @@ impl Cars {
         cars
     }
 
-    /// The cars within a distance of a place at a time of the drive, in the order of their numbers.
     pub fn near(&self, place: Point2<f64>, reach_m: f64, time_s: f64) -> Vec<Moving<'_>> {
         let at = |(body, start_m)| self.at(body, start_m, time_s);
         let all = self.bodies.iter().zip(&self.starts_m).filter_map(at);

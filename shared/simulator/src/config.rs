@@ -1,5 +1,3 @@
-//! The configuration of a simulation.
-
 use gyre_datasets::DatasetOptions;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,3 @@
-//! The path of the vehicle: the section `[simulation.drive]`.
-
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -43,13 +41,6 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
-    pub fn along_file(file: PathBuf) -> Self {
-        Self {
-            file: Some(file),
-            ..Self::default()
-        }
-    }
-
     /// Builds the path, for a radar with so many sweeps a second.
     pub fn path(&self, rate_hz: f64) -> Result<Box<dyn Path>, SimulatorError> {
         let [length_m, width_m] = self.block_m;

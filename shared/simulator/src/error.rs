@@ -1,5 +1,3 @@
-//! Errors of generating a dataset.
-
 use std::fmt::Display;
 
 use gyre_datasets::TrajectoryError;

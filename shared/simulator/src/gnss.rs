@@ -1,5 +1,3 @@
-//! A GNSS receiver: the section `[simulation.gnss]`, and the log that it leaves.
-
 use std::fmt::Write as _;
 
 use gyre_samples::{Geographic, LocalPlane, RawFix};
@@ -74,7 +72,6 @@ pub(crate) fn fixes(
     })
 }
 
-/// The fixes as CSV: a reader gets exactly the numbers of the fixes.
 pub(crate) fn csv(fixes: &[RawFix]) -> String {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {

@@ -1,5 +1,3 @@
-//! The gyro beside the radar: the section `[simulation.gyro]`, and the log that it leaves.
-
 mod attitude;
 mod clock;
 mod errors;

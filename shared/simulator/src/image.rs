@@ -1,5 +1,3 @@
-//! Scans as images.
-
 use std::path::Path;
 
 use gyre_datasets::ImageSize;

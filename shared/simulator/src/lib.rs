@@ -37,7 +37,7 @@ pub use error::SimulatorError;
 pub use gnss::SimulatedGnssConfig;
 pub use gyro::{GyroProfile, SimulatedGyroConfig};
 pub use output::{HostStamps, OutputFormat};
-pub use path::{BlockLoop, Path, SplinePath};
+pub use path::{BlockLoop, Path};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};

@@ -11,7 +11,6 @@ const CELL_M: f64 = 5.0;
 /// is not found from the cell beside it.
 const MARGIN_M: f64 = 1.618_034;
 
-/// Walls indexed by the cells that they touch.
 #[derive(Clone, Debug)]
 pub struct WallGrid {
     walls: Vec<Wall>,
@@ -83,7 +82,6 @@ impl WallGrid {
     }
 }
 
-/// The share of `line` after which it crosses the wall, if it does.
 pub fn crossing(from: Point2<f64>, line: Vector2<f64>, wall: &Wall) -> Option<f64> {
     let along = wall.to - wall.from;
     let determinant = line.perp(&along);

@@ -1,10 +1,9 @@
-//! The format of the dataset: the section `[simulation.output]`.
-
 use std::fmt;
 use std::str::FromStr;
 
 use gyre_datasets::Format;
 use schemars::JsonSchema;
+use serde::de::{IntoDeserializer, value};
 use serde::{Deserialize, Serialize};
 
 /// The format of the dataset.
@@ -38,34 +37,19 @@ pub enum OutputFormat {
 
 impl fmt::Display for OutputFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        self.serialize(f)
     }
 }
 
 impl FromStr for OutputFormat {
-    type Err = String;
+    type Err = value::Error;
 
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| format!("it is one of {}", known()))
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::deserialize(name.into_deserializer())
     }
 }
 
 impl OutputFormat {
-    pub const ALL: [Self; 3] = [Self::Oxford, Self::Boreas, Self::Radiate];
-
-    /// The name in configurations and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Oxford => "oxford",
-            Self::Boreas => "boreas",
-            Self::Radiate => "radiate",
-        }
-    }
-
     /// The format that is read as `format`, if it can be written.
     pub fn read_as(format: Format) -> Option<Self> {
         match format {

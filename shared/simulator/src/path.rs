@@ -1,5 +1,3 @@
-//! The path of the sensor: its pose at every instant.
-
 mod block;
 mod continuous;
 pub mod recorded;

@@ -37,7 +37,6 @@ pub enum Chirp {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     pub azimuths: usize,
-    /// Range bins of an azimuth.
     pub bins: usize,
     /// Range resolution, metres a bin.
     pub range_resolution_m: f64,
@@ -72,9 +71,7 @@ pub struct Receiver {
     /// Range below which power rises with the square, metres: near objects lie below the beam of
     /// the antenna on the roof.
     pub near_m: f64,
-    /// Saturation power of the receiver, in its units.
     pub full_scale: f32,
-    /// True if powers are rounded to whole units.
     pub whole_powers: bool,
     /// Mean power of the receiver's noise by range: (m, dB above the unit), interpolated.
     pub floor_db: &'static [(f64, f64)],

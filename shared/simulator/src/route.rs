@@ -1,5 +1,3 @@
-//! The way of the vehicle as places at equal distances.
-
 use std::f64::consts::PI;
 
 use gyre_geometry::Pose;

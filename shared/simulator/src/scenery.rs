@@ -134,7 +134,6 @@ impl Site<'_> {
         }
     }
 
-    /// A trunk and a crown.
     fn tree(&mut self, frame: &Pose) {
         let trunk = Scatterer::all_round(frame * Point2::origin(), 2.0, NO_BODY);
         self.built.scatterers.push(trunk);
@@ -226,7 +225,6 @@ impl Site<'_> {
         }
     }
 
-    /// A fence or a hedge between houses.
     fn fence(&mut self, side: Side, [from_m, to_m]: [f64; 2]) {
         let Some(frame) = self.route.beside(side, 0.5 * (from_m + to_m), FENCES_M) else {
             return;

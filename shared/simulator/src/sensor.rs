@@ -64,7 +64,6 @@ pub struct Sensor {
     receiver: Receiver,
     antenna: Antenna,
     spectrum: RangeSpectrum,
-    /// Mean power of the receiver's noise in each noise cell.
     noise: Vec<f32>,
     sweep_poses: SweepPoses,
     line_of_sight: LineOfSight,
@@ -144,7 +143,6 @@ impl Sensor {
             .sort(&self.echoes, &self.antenna, &self.sweep_poses);
     }
 
-    /// Computes the spectrum that one azimuth receives.
     fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
         let azimuth_pose = *self.sweep_poses.at(azimuth as f64);
         let doppler_s = self.doppler_s(azimuth);

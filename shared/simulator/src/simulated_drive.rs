@@ -42,7 +42,6 @@ impl SimulatedDrive {
         &self.simulator
     }
 
-    /// The format as readers of datasets name it.
     pub fn format(&self) -> Format {
         match self.output {
             OutputFormat::Oxford => Format::Oxford,
@@ -65,7 +64,6 @@ impl SimulatedDrive {
         self.simulator.scans()
     }
 
-    /// The folder of the images, relative to the dataset's.
     pub fn image_folder(&self) -> &'static str {
         match self.output {
             OutputFormat::Oxford | OutputFormat::Boreas => "radar",

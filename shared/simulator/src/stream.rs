@@ -12,11 +12,9 @@ impl Stream {
     pub const SCENERY: Self = Self(1 << 40);
     pub const CARS: Self = Self(1 << 41);
     pub const TUNNEL: Self = Self(1 << 42);
-    /// Bias, scale, misalignment and noise of the gyro.
     pub const GYRO_ERRORS: Self = Self(1 << 48);
     pub const GYRO_CLOCK: Self = Self(1 << 49);
     pub const GYRO_STALLS: Self = Self(1 << 50);
-    /// Scale, noise and losses of the wheels.
     pub const WHEEL_ERRORS: Self = Self(1 << 51);
     pub const WHEEL_SLIPS: Self = Self(1 << 52);
     pub const GNSS_ERRORS: Self = Self(1 << 54);

@@ -76,7 +76,7 @@ mod tests {
             let second = f64::from(k);
             (second, gyre_geometry::pose(5.0 * second, 0.0, 0.0))
         });
-        Route::along(&SplinePath::new(&nodes.collect::<Vec<_>>(), 0.7))
+        Route::along(&SplinePath::measured(&nodes.collect::<Vec<_>>()))
     }
 
     #[test]

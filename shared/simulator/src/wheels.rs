@@ -1,5 +1,3 @@
-//! The speed of the wheels: the section `[simulation.wheels]`, and the log that it leaves.
-
 use std::fmt::Write as _;
 
 use gyre_geometry::Twist;
@@ -61,7 +59,6 @@ pub(crate) fn samples(
     })
 }
 
-/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

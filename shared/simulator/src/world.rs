@@ -1,5 +1,3 @@
-//! All that stands still around the sensor, indexed by place.
-
 use nalgebra::Point2;
 
 use crate::body::{Body, Scatterer};

@@ -30,7 +30,6 @@ pub struct Summary {
     pub duration_s: f64,
 }
 
-/// Calls [`write_dataset_on`] with one thread for each processor.
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,
@@ -77,7 +76,6 @@ fn in_use(folder: &Path, other: &str) -> SimulatorError {
     ))
 }
 
-/// Locks the folder for this process until the returned file is dropped.
 fn lock(folder: &Path) -> Result<File, SimulatorError> {
     let failed = StorageError::at("write", folder);
     let handle = File::open(folder).map_err(&failed)?;

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::num::NonZeroUsize;
 use std::path::Path;
 
 use crate::common::all_files;
@@ -13,7 +12,7 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
-    write_dataset, write_dataset_on,
+    write_dataset,
 };
 
 const FORMATS: [OutputFormat; 3] = [
@@ -172,24 +171,6 @@ fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
         let error_ns = dataset.nominal_stamp_ns(index).unwrap() - drive.stamp_ns(index);
         assert!(error_ns.abs() < 1_000_000, "scan {index}: {error_ns} ns");
     }
-}
-
-#[test]
-fn the_number_of_threads_does_not_change_a_byte() {
-    let config = config(OutputFormat::Oxford, 7);
-    let on = |threads| {
-        let folder = tempfile::tempdir().unwrap();
-        write_dataset_on(
-            NonZeroUsize::new(threads).unwrap(),
-            &config,
-            folder.path(),
-            &mut |_, _| {},
-        )
-        .unwrap();
-        all_files(folder.path())
-    };
-    let alone = on(1);
-    assert!(alone == on(2) && alone == on(5));
 }
 
 #[test]

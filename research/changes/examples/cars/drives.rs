@@ -148,8 +148,10 @@ fn placed([first, second]: [Vec<Keyframe>; 2]) -> Outcome<[Vec<Keyframe>; 2]> {
     let placed = search
         .place(&drive)?
         .ok_or("the second drive is not on the first one")?;
+    let path_m: Vec<f64> = second.iter().map(|it| it.path_m).collect();
+    let near = gyre_changes::near_fixes(&path_m, &placed);
     let second = second.into_iter().zip(&placed.poses).enumerate();
-    let second = second.filter(|(index, _)| placed.is_near_fix(*index));
+    let second = second.filter(|(index, _)| near[*index]);
     let second = second.map(|(_, (mut keyframe, pose))| {
         keyframe.pose.motion = *pose;
         keyframe

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, time::Duration};
 
-use gyre_estimation::places::{Candidate, Descriptor, PlaceIndex, VerificationOutcome};
+use gyre_estimation::places::{Candidate, Descriptor, VerificationOutcome};
 
 use super::Checked;
 use crate::{
@@ -156,7 +156,7 @@ impl Counts {
                  candidate verified in {:.3} ms.",
                 drive.keyframes.len(),
                 points.sum::<usize>() / count,
-                PlaceIndex::BYTES_PER_PLACE,
+                Descriptor::BYTES,
                 Descriptor::SIEVE_BYTES,
                 self.describe.as_secs_f64() * 1e3 / count as f64,
                 self.query.mean_ms(),

@@ -4,7 +4,7 @@ use gyre_scan_matching::ConfigError;
 use nalgebra::DVector;
 
 use crate::{
-    CalibrationError, Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
+    CalibrationError, Drive, Estimate, Fact, FactVector, Revisit, Track,
     drift::{self, MAX_REVISITS},
     facts::FACTS,
     overlap::{System, along, overlaps, slopes},
@@ -20,15 +20,9 @@ const DRIFT_STEP_RAD: f64 = 3e-3;
 /// No estimate is better than this share of a cell of the local map, or its effect at the range of
 /// most points: the images' own error.
 const CELL_SHARE: f64 = 0.05;
-/// Range of most points, m, and a usual speed, m/s.
 const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
-/// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
-const ROW_TIME_SHARE: f64 = 0.05;
 const MIN_REVISITS: usize = 5;
-/// Facts that are solved for together, as far as the drive determines them. The others only
-/// confirm: odometry needs no correction of them.
-pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
@@ -48,8 +42,7 @@ impl FactEstimate {
 
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// All facts in their order. The eccentricity to the side and the times of rows are checks,
-    /// with the other facts as found.
+    /// All facts in their order.
     pub facts: [FactEstimate; FACTS],
     pub revisits: Vec<Revisit>,
     pub pairs: usize,
@@ -61,7 +54,6 @@ pub struct Calibration {
     pub proposed: Vec<Fact>,
     /// Mean overlap of the pairs as configured, and with the facts that the drive determines.
     pub overlap: [f64; 2],
-    pub mounting: Option<Mounting>,
     /// The track as configured, and the one with the proposed facts.
     pub before: Track,
     pub after: Track,
@@ -90,7 +82,7 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         )));
     }
     let revisits = evenly(revisits::find(drive, &before)?, &before);
-    let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
+    let mut solution = Solution::find(drive, &before, &revisits, &Fact::ALL)?;
     let mut facts = solution.facts;
     let mut proposed = solution.determined();
     // Facts that the drive does not determine stay as configured, and the others are estimated
@@ -118,7 +110,6 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         pairs: solution.round.pairs,
         has_settled: solution.round.has_converged(),
         revisits,
-        mounting: Mounting::of(&after.twists),
         proposed,
         overlap,
         before,
@@ -149,7 +140,7 @@ impl Solution {
             at = drive.mean_track_with(&(at.change + found.step()))?;
             found = round(drive, &at, revisits, free)?;
         }
-        let by_drift = match free.contains(&Fact::EccentricityCos) {
+        let by_drift = match free.contains(&Fact::Eccentricity) {
             true => drift_of(drive, &at, revisits)?,
             false => None,
         };
@@ -173,7 +164,6 @@ impl Solution {
 struct Round {
     free: Vec<Fact>,
     solved: [Estimate; FACTS],
-    checked: [Estimate; FACTS],
     pairs: usize,
 }
 
@@ -213,11 +203,9 @@ fn round(
         let reason = "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones";
         CalibrationError::Unusable(reason.to_owned())
     };
-    let unknown = [Estimate::UNKNOWN; FACTS];
     Ok(Round {
         free: free.to_vec(),
         solved: system.solve(free).ok_or_else(undetermined)?,
-        checked: system.solve(&Fact::ALL).unwrap_or(unknown),
         pairs: system.len(),
     })
 }
@@ -234,18 +222,17 @@ fn drift_of(
     }
     let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
         let mut shifted = at.change;
-        shifted[Fact::EccentricityCos as usize] += by_rad;
+        shifted[Fact::Eccentricity as usize] += by_rad;
         let track = drive.mean_track_with(&shifted)?;
         Ok(drift::residuals(&track, &aligned(drive, &track, revisits)))
     };
     let slopes = (shifted(DRIFT_STEP_RAD)? - shifted(-DRIFT_STEP_RAD)?) / (2.0 * DRIFT_STEP_RAD);
     let here = aligned(drive, at, revisits);
     let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
-    let configured = at.change[Fact::EccentricityCos as usize];
+    let configured = at.change[Fact::Eccentricity as usize];
     Ok(found.map(|found| Estimate::new(found.value + configured, found.sigma)))
 }
 
-/// The revisits with their poses aligned under the facts of a track.
 fn aligned(drive: &Drive, track: &Track, revisits: &[Revisit]) -> Vec<Revisit> {
     let poses = revisits.iter().zip(slopes(drive, track, revisits));
     poses
@@ -267,16 +254,12 @@ fn facts(
         let k = fact as usize;
         let floor = match fact {
             Fact::RangeOffset => error_m,
-            Fact::EccentricityCos | Fact::EccentricitySin => error_m / USUAL_RANGE_M,
+            Fact::Eccentricity => error_m / USUAL_RANGE_M,
             Fact::Doppler => error_m / USUAL_SPEED_MPS,
-            Fact::RowTime => ROW_TIME_SHARE,
         };
-        let solved = match found.free.contains(&fact) {
-            true => found.solved[k],
-            false => found.checked[k],
-        };
+        let solved = found.solved[k];
         let by_overlap = Estimate::new(solved.value + change[k], solved.sigma.hypot(floor));
-        let by_drift = by_drift.filter(|_| fact == Fact::EccentricityCos);
+        let by_drift = by_drift.filter(|_| fact == Fact::Eccentricity);
         let change = by_drift.map_or(by_overlap, |by_drift| by_overlap.combined(&by_drift));
         FactEstimate {
             fact,

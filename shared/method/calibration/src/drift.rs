@@ -8,7 +8,6 @@ use crate::{Estimate, Track, revisits::Revisit};
 
 /// Standard deviation of the relative pose of two scans of one place: m, m, rad.
 const ALIGNMENT_SIGMA: [f64; 3] = [0.1, 0.1, 3e-3];
-/// Revisits that are used, evenly spread.
 pub(crate) const MAX_REVISITS: usize = 80;
 
 /// The residuals of all revisits: x, y (m) and yaw (rad) of the later scan as driven less as seen,
@@ -47,7 +46,6 @@ pub(crate) fn solve(
     (information > 0.0).then(|| Estimate::new(value, (excess.max(1.0) / information).sqrt()))
 }
 
-/// The covariance of the residuals: of the motions between and of the alignments.
 fn covariance(track: &Track, revisits: &[Revisit]) -> DMatrix<f64> {
     let count = revisits.len();
     let mut all = DMatrix::zeros(3 * count, 3 * count);
@@ -74,7 +72,6 @@ fn covariance(track: &Track, revisits: &[Revisit]) -> DMatrix<f64> {
     all
 }
 
-/// The effect of an error of one motion on the residual of a revisit.
 fn effect(track: &Track, revisit: &Revisit, motion: usize) -> Matrix3<f64> {
     let base = &track.poses[revisit.earlier];
     let along = |scan: usize| base.inv_mul(&track.poses[scan]);

@@ -1,7 +1,5 @@
 //! The drive: its scans as points, and its track by odometry under assumed facts.
 
-use std::f64::consts::TAU;
-
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::MaskerError;
 use gyre_odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
@@ -10,7 +8,6 @@ use gyre_radar::{
     scan::{ScanError, flag},
 };
 use gyre_scan_matching::{ConfigError, Refiner};
-use nalgebra::Vector2;
 
 use crate::{
     FactVector, OwnReflections,
@@ -20,8 +17,6 @@ use crate::{
 /// Doppler coefficient of recordings that have none, s: small enough to change nothing, and it
 /// keeps the sign of each chirp.
 const NO_DOPPLER_S: f32 = 1e-9;
-/// Directions for which the time of a row is kept.
-const DIRECTIONS: usize = 360;
 /// Motion from scan to scan above which the vehicle moves, m.
 const MOVING_M: f64 = 0.5;
 
@@ -34,7 +29,6 @@ pub struct Sweep {
     pub searched: Pose,
     /// The points as measured under the configured facts.
     pub points: Vec<SparsePoint>,
-    row_time_s: Vec<f32>,
 }
 
 pub struct Drive {
@@ -48,10 +42,8 @@ pub struct Drive {
     extractor: PointExtractor,
 }
 
-/// The track of the drive under assumed facts.
 #[derive(Clone, Debug)]
 pub struct Track {
-    /// The poses in the frame of the first scan.
     pub poses: Vec<Pose>,
     pub motions: Vec<UncertainMotion>,
     pub twists: Vec<Twist>,
@@ -110,7 +102,6 @@ impl Drive {
                 .searched
                 .map_or(Pose::identity(), |found| found.motion.pose()),
             points,
-            row_time_s: row_times_s(&scan, self.sense),
         });
         Ok(())
     }
@@ -142,7 +133,6 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns the stamps of the scans, ns, and whether the chain of motions starts with each.
     pub(crate) fn stamps(&self) -> (Vec<i64>, Vec<bool>) {
         let stamps = self.sweeps.iter().map(|sweep| sweep.stamp_ns);
         (stamps.collect(), self.starts())
@@ -157,13 +147,6 @@ impl Drive {
         points
             .map(|point| correct(point, change, self.sense, self.alternates))
             .collect()
-    }
-
-    /// Returns the time of the row that looks to a place in the frame of a scan, s.
-    pub(crate) fn row_time_s(&self, scan: usize, seen: Vector2<f64>) -> f64 {
-        let turns = seen.y.atan2(seen.x) / TAU;
-        let direction = (turns.rem_euclid(1.0) * DIRECTIONS as f64) as usize;
-        self.sweeps[scan].row_time_s[direction.min(DIRECTIONS - 1)].into()
     }
 
     pub fn mean_track(&self) -> Result<Track, ConfigError> {
@@ -259,22 +242,6 @@ impl Track {
         });
         Self::new(motions.collect(), drive, self.change)
     }
-}
-
-/// The times of the rows by direction, counter-clockwise from straight ahead, s.
-fn row_times_s(scan: &PolarScan<'_>, sense: Sign) -> Vec<f32> {
-    let nearest = |azimuth: f64| {
-        let apart = |row: &usize| {
-            let apart = (f64::from(scan.azimuth_rad[*row]) - azimuth).rem_euclid(TAU);
-            apart.min(TAU - apart)
-        };
-        (0..scan.geometry.azimuths).min_by(|a, b| apart(a).total_cmp(&apart(b)))
-    };
-    let azimuth =
-        |direction: usize| (sense * direction as f64 / DIRECTIONS as f64).rem_euclid(1.0) * TAU;
-    let rows = (0..DIRECTIONS).map(|direction| nearest(azimuth(direction)));
-    rows.map(|row| row.map_or(0.0, |row| scan.time_s(row) as f32))
-        .collect()
 }
 
 /// The velocity at a scan: the mean over the intervals before and after it.

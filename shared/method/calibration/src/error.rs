@@ -1,5 +1,3 @@
-//! The error of a calibration.
-
 use std::convert::Infallible;
 
 use gyre_scan_matching::ConfigError;

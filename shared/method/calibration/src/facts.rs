@@ -1,50 +1,36 @@
 //! The facts about a radar that a drive can determine, and their effects on its points.
 
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::SparsePoint;
 use nalgebra::{SMatrix, SVector, Vector2};
 
-/// Number of facts that are estimated together.
-pub const FACTS: usize = 5;
+pub const FACTS: usize = 3;
 
-/// One number for each [`Fact`].
 pub type FactVector = SVector<f64, FACTS>;
 
 pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 
-/// A fact that moves the points of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fact {
-    /// Offset of all ranges, m.
     RangeOffset,
-    /// Eccentricity of the encoder ahead: the true azimuth is the measured one plus this times its
+    /// Eccentricity of the encoder: the true azimuth is the measured one plus this times its
     /// cosine, rad.
-    EccentricityCos,
-    /// Eccentricity of the encoder to the side: as before, times the sine, rad.
-    EccentricitySin,
+    Eccentricity,
     /// Doppler coefficient, s.
     Doppler,
-    /// Relative shortening of the times of rows within a sweep: 0 if they are right.
-    RowTime,
 }
 
 impl Fact {
-    pub const ALL: [Self; FACTS] = [
-        Self::RangeOffset,
-        Self::EccentricityCos,
-        Self::EccentricitySin,
-        Self::Doppler,
-        Self::RowTime,
-    ];
+    pub const ALL: [Self; FACTS] = [Self::RangeOffset, Self::Eccentricity, Self::Doppler];
 
     /// Returns the standard deviation above which a drive adds nothing to the prior knowledge about
-    /// any radar. Of facts that only confirm it is 0.
+    /// any radar.
     pub fn useful_sigma(self) -> f64 {
-        [0.2, 0.6e-3, 0.0, 0.01, 0.0][self as usize]
+        [0.2, 0.6e-3, 0.01][self as usize]
     }
 
     /// Returns a small change of the fact, for derivatives.
     pub fn step(self) -> f64 {
-        [0.05, 1e-3, 1e-3, 0.01, 0.05][self as usize]
+        [0.05, 1e-3, 0.01][self as usize]
     }
 }
 
@@ -59,10 +45,10 @@ pub(crate) fn correct(
     sense: Sign,
     alternates: bool,
 ) -> SparsePoint {
-    let [offset_m, cosine, sine, doppler_s, row_time] = (*change).into();
+    let [offset_m, cosine, doppler_s]: [f64; FACTS] = (*change).into();
     let (x, y) = (f64::from(point.x_m), f64::from(point.y_m));
     let (range_m, angle) = (x.hypot(y), y.atan2(x));
-    let angle = angle + sense * cosine * angle.cos() + sine * angle.sin();
+    let angle = angle + sense * cosine * angle.cos();
     let range_m = range_m + offset_m;
     let chirp = if alternates {
         f64::from(point.doppler_s).signum()
@@ -72,33 +58,26 @@ pub(crate) fn correct(
     SparsePoint {
         x_m: (range_m * angle.cos()) as f32,
         y_m: (range_m * angle.sin()) as f32,
-        time_s: point.time_s * (1.0 + row_time) as f32,
-        weight: point.weight,
         doppler_s: point.doppler_s + (chirp * doppler_s) as f32,
+        ..*point
     }
 }
 
 /// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows,
-/// one column for each fact. `time_s` is the time of its row, `chirp` the sign of its Doppler
-/// shift.
+/// one column for each fact. `chirp` is the sign of its Doppler shift.
 pub(crate) fn displacements(
     seen: Vector2<f64>,
-    time_s: f64,
     chirp: f64,
-    twist: &Twist,
+    velocity_mps: &Vector2<f64>,
     sense: Sign,
 ) -> SMatrix<f64, 2, FACTS> {
     let range_m = seen.norm().max(1e-3);
     let along = seen / range_m;
     let across = Vector2::new(-along.y, along.x);
-    let velocity = twist.linear_mps();
-    let turning = Vector2::new(-seen.y, seen.x) * twist.yaw_rate_radps;
     SMatrix::from_columns(&[
         along,
         across * (range_m * sense * along.x),
-        across * (range_m * along.y),
-        along * (chirp * along.dot(&velocity)),
-        (velocity + turning) * time_s,
+        along * (chirp * along.dot(velocity_mps)),
     ])
 }
 
@@ -111,12 +90,8 @@ mod tests {
         let point = SparsePoint::from([20.0, -15.0, 0.06, 0.5, 0.04]);
         let seen = Vector2::new(20.0, -15.0);
         for sense in [-1.0, 1.0] {
-            let by_facts = displacements(seen, 0.06, 1.0, &Twist::default(), sense);
-            for fact in [
-                Fact::RangeOffset,
-                Fact::EccentricityCos,
-                Fact::EccentricitySin,
-            ] {
+            let by_facts = displacements(seen, 1.0, &Vector2::zeros(), sense);
+            for fact in [Fact::RangeOffset, Fact::Eccentricity] {
                 let mut change = FactVector::zeros();
                 change[fact as usize] = fact.step();
                 let moved = correct(&point, &change, sense, false);

@@ -6,12 +6,9 @@ mod tests;
 
 use std::{fmt, iter};
 
-use gyre_radar::{Sense, SweepGeometry};
+use gyre_radar::SweepGeometry;
 
-use crate::{
-    Calibration, CalibrationError, Drive, Fact, FactVector, Mounting, OwnReflections,
-    calibrate::SOLVED,
-};
+use crate::{Calibration, CalibrationError, Drive, FACTS, Fact, FactVector, OwnReflections};
 pub use constant::Constant;
 use constant::{Label, constant, resolution};
 
@@ -21,15 +18,14 @@ pub struct Configured {
     pub geometry: SweepGeometry,
     /// The eccentricity of the encoder that was used to read them, rad.
     pub eccentricity_rad: f64,
-    /// The shortest range of the points that are used, m.
     pub min_range_m: f64,
     /// Length of the path by another sensor, m.
     pub distance_m: Option<f64>,
 }
 
 /// The key in `[dataset]`, the name, the unit for printing and the factor to it of each constant in
-/// the order of [`SOLVED`].
-const LABELS: [Label; SOLVED.len()] = [
+/// the order of [`Fact::ALL`].
+const LABELS: [Label; FACTS] = [
     ("range_offset_m", "range offset", "m", 1.0),
     (
         "azimuth_eccentricity_rad",
@@ -52,8 +48,7 @@ pub struct Found {
     resolution: Result<Constant, String>,
     /// Range that leaves out the vehicle's own reflections, m, if it is more than configured.
     pub min_range_m: Option<f64>,
-    /// Further properties, a line each.
-    others: Vec<[String; 2]>,
+    reflections: Option<String>,
 }
 
 impl Found {
@@ -71,15 +66,13 @@ impl Found {
             (true, configured) => configured.abs(),
             (false, configured) => configured,
         };
-        let values: [f64; 3] = [
+        let values: [f64; FACTS] = [
             geometry.range_offset_m.into(),
             configured.eccentricity_rad,
             doppler_s,
         ];
-        let constants = (0..SOLVED.len()).map(|k| {
-            let fact = &calibration.facts[SOLVED[k] as usize];
-            constant(LABELS[k], values[k], fact, calibration)
-        });
+        let constants =
+            (0..FACTS).map(|k| constant(LABELS[k], values[k], &calibration.facts[k], calibration));
         Ok(Self {
             scans: drive.sweeps.len(),
             path_m,
@@ -88,7 +81,7 @@ impl Found {
             constants: constants.collect(),
             resolution: resolution(path_m, configured)?,
             min_range_m: drive.reflections.min_range_m(configured.min_range_m),
-            others: others(drive, calibration, configured),
+            reflections: Some(reflections(&drive.reflections, configured.min_range_m)),
         })
     }
 
@@ -108,13 +101,13 @@ impl Found {
             constants: constants.collect(),
             resolution: Err("as configured: --distance-m tells it from one drive alone".to_owned()),
             min_range_m: drives().filter_map(|it| it.min_range_m).reduce(f64::max),
-            others: Vec::new(),
+            reflections: None,
         }
     }
 
     pub(crate) fn change(&self) -> FactVector {
         let mut change = FactVector::zeros();
-        for (fact, constant) in SOLVED.into_iter().zip(&self.constants) {
+        for (fact, constant) in Fact::ALL.into_iter().zip(&self.constants) {
             if constant.is_proposed {
                 change[fact as usize] = constant.found.value - constant.configured;
             }
@@ -141,14 +134,12 @@ impl Found {
         solved.chain(self.resolution.as_ref().ok())
     }
 
-    /// Returns the constants that stay as configured.
     pub fn kept(&self) -> impl Iterator<Item = &Constant> {
         self.constants
             .iter()
             .filter(|constant| !constant.is_proposed)
     }
 
-    /// Returns the sentence on the overlap of the scans before and after.
     pub fn overlap(&self) -> String {
         let [before, after] = self.overlap;
         let with = match after < before {
@@ -160,94 +151,18 @@ impl Found {
     }
 }
 
-fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Vec<[String; 2]> {
-    let fact = |fact: Fact| &calibration.facts[fact as usize].change;
-    let (sine, row_time) = (fact(Fact::EccentricitySin), fact(Fact::RowTime));
-    vec![
-        [
-            "eccentricity aside".to_owned(),
-            format!(
-                "{:.2} \u{b1} {:.2} mrad times the azimuth's sine, overlap alone; it makes no drift and has no key",
-                sine.value * 1e3,
-                sine.sigma * 1e3
-            ),
-        ],
-        [
-            "row times".to_owned(),
-            format!(
-                "a sweep takes {:.3} \u{b1} {:.3} of what they say{}; an offset of all times cannot be told from a drive: \
-             it moves each pose along the path",
-                1.0 + row_time.value,
-                row_time.sigma,
-                match row_time.contradicts(0.0) {
-                    true => ", which contradicts them",
-                    false => "",
-                }
-            ),
-        ],
-        [
-            "sense of rotation".to_owned(),
-            sense(drive, calibration, configured),
-        ],
-        [
-            "mounting".to_owned(),
-            calibration.mounting.as_ref().map_or_else(
-                || "too little driving, no bend, or a radar that looks elsewhere than ahead: not told".to_owned(),
-                mounting,
-            ),
-        ],
-        ["own reflections".to_owned(), reflections(drive, configured)],
-    ]
-}
-
-/// A mirrored world is as consistent; only the driver knows.
-fn sense(drive: &Drive, calibration: &Calibration, configured: &Configured) -> String {
-    let name = match configured.geometry.sense {
-        Sense::Clockwise => "clockwise",
-        Sense::CounterClockwise => "counter-clockwise",
-    };
-    let poses = &calibration.after.poses;
-    const SCANS: usize = 20;
-    let turn = |k: usize| poses[k - SCANS].inv_mul(&poses[k]).rotation.angle();
-    let largest = (SCANS..poses.len()).max_by(|a, b| turn(*a).abs().total_cmp(&turn(*b).abs()));
-    let Some(at) = largest else {
-        return format!("{name}; a mirrored drive looks the same");
-    };
-    let side = if turn(at) > 0.0 { "left" } else { "right" };
-    format!(
-        "{name}; a mirrored drive looks the same: check that the vehicle turned {side} by {:.0} degrees before scan {}",
-        turn(at).to_degrees().abs(),
-        drive.sweeps[at].number
-    )
-}
-
-fn mounting(mounting: &Mounting) -> String {
-    let Mounting { yaw_rad, ahead_m } = mounting;
-    format!(
-        "yaw {:+.2} \u{b1} {:.2} degrees counter-clockwise of the vehicle's straight ahead, {:.1} \u{b1} {:.1} m ahead of the rear axle, \
-         from the direction of motion; poses are the radar's, so there is no key",
-        yaw_rad.value.to_degrees(),
-        yaw_rad.sigma.to_degrees(),
-        ahead_m.value,
-        ahead_m.sigma
-    )
-}
-
-fn reflections(drive: &Drive, configured: &Configured) -> String {
-    let own = &drive.reflections;
-    match (own.end_m(), own.min_range_m(configured.min_range_m)) {
+fn reflections(own: &OwnReflections, configured_m: f64) -> String {
+    match (own.end_m(), own.min_range_m(configured_m)) {
         (None, _) => "too few moving scans to tell them".to_owned(),
         (Some(end_m), _) if end_m >= OwnReflections::REACH_M => format!(
             "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
         ),
         (Some(end_m), Some(min_range_m)) => format!(
-            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: that and raster.min_range_m are to be {min_range_m:.1}",
-            configured.min_range_m
+            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {configured_m}: that and raster.min_range_m are to be {min_range_m:.1}"
         ),
-        (Some(end_m), None) => format!(
-            "to {end_m:.2} m, within points.min_range_m = {}",
-            configured.min_range_m
-        ),
+        (Some(end_m), None) => {
+            format!("to {end_m:.2} m, within points.min_range_m = {configured_m}")
+        }
     }
 }
 
@@ -266,8 +181,8 @@ impl fmt::Display for Found {
         if let Err(reason) = &self.resolution {
             write!(f, "\n{:<21} {reason}", "range resolution")?;
         }
-        for [name, sentence] in &self.others {
-            write!(f, "\n{name:<21} {sentence}")?;
+        if let Some(sentence) = &self.reflections {
+            write!(f, "\n{:<21} {sentence}", "own reflections")?;
         }
         Ok(())
     }

@@ -92,7 +92,6 @@ pub(crate) fn calibrate_turns(
         scale: scale.with_error(SCALE_SIGMA),
         bias_radps: bias_radps.with_error(BIAS_SIGMA_RADPS),
         delay_s,
-        halves_s: fit.halves_s,
         drift: fit.drift.with_error(least_s / span_s),
         correlation: peak.correlation.abs(),
         turns: fit.turns,

@@ -12,7 +12,6 @@ pub(crate) struct Image {
     cells: Vec<f32>,
 }
 
-/// The value of an image at a place, and its slope by x and y, 1/m.
 pub(crate) struct Reading {
     pub value: f64,
     pub slope: Vector2<f64>,

@@ -15,7 +15,6 @@ mod facts;
 mod findings;
 mod gyro;
 mod image;
-mod mounting;
 mod overlap;
 mod own_reflections;
 mod pair;
@@ -32,7 +31,6 @@ pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
 pub use findings::{Configured, Found};
 pub use gyro::{ClockError, GyroCalibration, calibrate_gyro};
-pub use mounting::Mounting;
 pub use own_reflections::OwnReflections;
 pub use picture::svg;
 pub use revisits::Revisit;
@@ -92,7 +90,6 @@ impl Estimate {
     }
 }
 
-/// Blocks of the drive for the jackknife.
 pub(crate) const BLOCKS: usize = 12;
 
 /// Estimates numbers, with their standard deviations by the jackknife: `solve` leaves out a block

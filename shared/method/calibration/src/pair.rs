@@ -1,6 +1,6 @@
 //! Two scans of one place: their relative pose, and the slope of their overlap by the facts.
 
-use gyre_geometry::{Pose, Twist};
+use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Rotation2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::{
@@ -16,8 +16,7 @@ type Displacement = SMatrix<f64, 2, FACTS>;
 
 /// A scan deskewed under assumed facts, with its images.
 pub(crate) struct View {
-    scan: usize,
-    twist: Twist,
+    velocity_mps: Vector2<f64>,
     points: Vec<Seen>,
     /// The image of all points; if chirps alternate, first of rising chirps, then of falling ones.
     images: Vec<Image>,
@@ -60,7 +59,7 @@ impl View {
                     at,
                     weight: f64::from(point.weight.min(1.0)),
                     chirp,
-                    displacement: displacements(at, point.time_s.into(), chirp, twist, drive.sense),
+                    displacement: displacements(at, chirp, &twist.linear_mps(), drive.sense),
                 }
             })
             .collect();
@@ -71,8 +70,7 @@ impl View {
         };
         let chirps = &[1.0, -1.0][..1 + usize::from(drive.alternates)];
         Self {
-            scan,
-            twist: *twist,
+            velocity_mps: twist.linear_mps(),
             images: chirps.iter().map(|chirp| draw(*chirp)).collect(),
             points,
         }
@@ -184,8 +182,7 @@ impl Sums {
         self.gradient += j * (point.weight * missing);
         self.information += j * j.transpose() * point.weight;
         if let Some(turn) = turn {
-            let time_s = drive.row_time_s(view.scan, at);
-            let displaced = displacements(at, time_s, chirp, &view.twist, drive.sense);
+            let displaced = displacements(at, chirp, &view.velocity_mps, drive.sense);
             let relative = *turn * point.displacement - displaced;
             self.slope += relative.transpose() * reading.slope * (point.weight * missing);
         }

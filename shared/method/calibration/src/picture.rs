@@ -71,7 +71,6 @@ fn scans(calibration: &Calibration) -> (usize, usize) {
     })
 }
 
-/// The points of the scans around one, as dots of a path, in the frame of `base`, ahead upwards.
 fn points(drive: &Drive, track: &Track, base: &Pose, scan: usize) -> String {
     let mut path = String::new();
     let last = track.poses.len() - 1;

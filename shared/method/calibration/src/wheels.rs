@@ -1,7 +1,4 @@
 //! The clock and the scale of the wheels, from the distances that the radar drives.
-//!
-//! As for a [gyro](crate::calibrate_gyro): the log fits where the radar's distances correlate with
-//! it best, over all offsets of its clock. Changes of the speed determine the offset.
 
 use std::path::Path;
 

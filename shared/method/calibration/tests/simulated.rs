@@ -40,13 +40,11 @@ fn calibrated(profile: Profile) -> Calibration {
     calibrate(&drive).unwrap()
 }
 
-/// Asserts that the constants are found within their uncertainty, and called wrong.
 fn assert_found(profile: Profile) {
     let found = calibrated(profile);
     let [before, after] = found.overlap;
     assert!(after > before, "{before}, {after}");
-    let facts = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
-    for (fact, wrong_by) in facts.into_iter().zip(WRONG_BY) {
+    for (fact, wrong_by) in Fact::ALL.into_iter().zip(WRONG_BY) {
         let change = found.facts[fact as usize].change;
         let sigmas = (change.value + wrong_by) / change.sigma;
         assert!(sigmas.abs() < 3.0, "{fact:?}: {change:?} for {}", -wrong_by);

@@ -16,7 +16,6 @@ use rand_chacha::ChaCha8Rng;
 use rustix::time::{ClockId, clock_gettime};
 
 const KEYFRAMES: usize = 20_000;
-/// Keyframes of one round of the route.
 const AROUND: usize = 2_000;
 const LOOPS: usize = 500;
 const NEW_LOOPS: usize = 21;

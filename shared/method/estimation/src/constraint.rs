@@ -1,5 +1,3 @@
-//! Measured relative poses of keyframes, and their chi-square test.
-
 use gyre_geometry::UncertainMotion;
 use nalgebra::{Matrix3, Vector3};
 
@@ -48,7 +46,6 @@ impl Constraint {
         }
     }
 
-    /// Creates a loop whose error is independent of the errors of other loops.
     pub fn closing(from: usize, to: usize, motion: UncertainMotion) -> Self {
         Self {
             from,
@@ -91,7 +88,6 @@ impl Constraint {
     }
 }
 
-/// The chi-square test of a loop against an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
     /// Squared normalised difference of the measured motion from the predicted one; 3 is expected

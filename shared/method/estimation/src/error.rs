@@ -1,5 +1,3 @@
-//! Errors of the estimators.
-
 use thiserror::Error;
 
 /// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter) and [`PoseGraph`](crate::PoseGraph). An

@@ -1,5 +1,3 @@
-//! The trajectory-oriented extended Kalman filter of Checchin et al.
-
 use std::collections::BTreeSet;
 
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance::lever};
@@ -27,7 +25,6 @@ pub struct TrajectoryFilter {
     /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
     /// beyond the poses are reserve.
     covariance: DMatrix<f64>,
-    /// Groups that a loop has been counted of.
     groups: BTreeSet<u64>,
 }
 
@@ -111,7 +108,6 @@ impl TrajectoryFilter {
         Ok(())
     }
 
-    /// Makes room for the covariance of `count` keyframes, and for more to come.
     fn reserve(&mut self, count: usize) -> Result<(), EstimationError> {
         let limit = self.max_keyframes;
         if count > limit {
@@ -128,7 +124,6 @@ impl TrajectoryFilter {
         Ok(())
     }
 
-    /// Tests a loop against the estimate, and corrects all poses if it agrees.
     fn close(&mut self, constraint: &Constraint, group: Option<u64>) -> Verdict {
         let ends = [constraint.from, constraint.to];
         let measured = &constraint.motion;

@@ -34,7 +34,6 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, and dynamic covariance scaling from a quarter of it.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
@@ -73,12 +72,10 @@ struct State {
 struct Closing {
     edge: Edge,
     group: Option<u64>,
-    /// Chi-square against the odometry alone.
     gate_chi_square: f64,
     weight: f64,
 }
 
-/// A loop of a [`PoseGraph`] that passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedLoop {
     pub from: usize,
@@ -240,7 +237,6 @@ impl PoseGraph {
         self.factorised = false;
     }
 
-    /// Returns the chi-square of a loop against the odometry between its keyframes.
     fn against_odometry(&self, edge: &Edge) -> f64 {
         let [from, to] = edge.ends;
         let chain = self.odometry[from.min(to)..from.max(to)]

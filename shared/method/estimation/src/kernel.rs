@@ -23,7 +23,6 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// Returns the cost of a loop, in units of chi-square.
     pub fn cost(&self, chi_square: f64) -> f64 {
         match *self {
             Self::None => chi_square,

@@ -6,11 +6,6 @@
 //! is the pose of the queried (later) keyframe in the frame of the found (earlier) one. Everything
 //! is planned once: nothing is allocated afterwards but when a keyframe is added.
 //!
-//! - The descriptor: cells of 0.8 m, logarithm of the magnitudes, 0.02 to 0.42 cycles a cell, 40
-//!   radii by 64 harmonics over half a turn, each radius without its mean and with the same energy.
-//!   A rotation shifts it along the angle. Two are compared by their correlation at the best shift.
-//! - The sieve: amplitudes of the first 16 harmonics, which no rotation changes. The 32 nearest are
-//!   ranked by the whole descriptor.
 //! - The verification: at both angles the translation within 25 m, the alignment of both keyframes'
 //!   own points, and the masked correlation there, which must be high and clearly above every
 //!   other. 0.65 lies between right loops (0.71 and more) and wrong ones (0.61 and less) of

@@ -1,8 +1,8 @@
-//! The trajectory filter on cases worked by hand, and against a dense batch solution.
+//! The trajectory filter on cases worked by hand, and on cases of groups and limits.
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::common::{Batch, Drive, LOOP, ODOMETRY, apart, dead_reckoning, exact};
+use crate::common::{Drive, ODOMETRY, exact};
 use gyre_estimation::{Constraint, EstimationError, Kind, Outcome, TrajectoryFilter};
 use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
 use nalgebra::{Matrix3, Vector3};
@@ -65,28 +65,6 @@ fn an_uncertain_turn_makes_a_later_pose_uncertain_sideways() {
         "{}",
         end.covariance
     );
-}
-
-#[test]
-fn a_loop_among_small_errors_is_the_batch_solution() {
-    // Errors a thousandth of the usual ones: the problem is linear.
-    let [small, noise] = [ODOMETRY, LOOP].map(|sigma| sigma.map(|sigma| 1e-3 * sigma));
-    let mut drive = Drive::new(40, 40, small, 2);
-    let mut filter = drive.filter();
-    let closing = Constraint::closing(38, 1, drive.measure(38, 1, noise));
-    let started = dead_reckoning(drive.truth[0], &drive.odometry);
-    let all: Vec<_> = drive.odometry.iter().copied().chain([closing]).collect();
-    let batch = Batch::solve(&started, &all, 3);
-
-    assert_eq!(filter.apply(&closing).unwrap().outcome, Outcome::Accepted);
-    let (position, yaw) = apart(filter.poses(), &batch.poses);
-    assert!(position < 1e-8 && yaw < 1e-10, "{position} m, {yaw} rad");
-    for k in 1..40 {
-        let at = 3 * (k - 1);
-        let expected = batch.covariance.fixed_view::<3, 3>(at, at);
-        let found = filter.pose(k).unwrap().covariance;
-        assert!((found - expected).norm() < 1e-5 * expected.norm(), "{k}");
-    }
 }
 
 #[test]

@@ -6,7 +6,6 @@ use gyre_estimation::{
 };
 use gyre_geometry::{Pose, pose, xy_yaw};
 
-/// Returns the graph of the odometry and of loops that all pass the gate.
 fn graph(drive: &Drive, loops: &[Constraint], options: GraphOptions) -> PoseGraph {
     let mut graph = PoseGraph::new(drive.truth[0], options);
     for constraint in drive.odometry.iter().chain(loops) {
@@ -24,7 +23,6 @@ fn least_squares() -> GraphOptions {
     }
 }
 
-/// A drive of three rounds, and loops between them in both directions.
 fn three_rounds(seed: u64) -> (Drive, Vec<Constraint>) {
     let mut drive = Drive::new(90, 30, ODOMETRY, seed);
     let pairs = [(35, 5), (20, 50), (61, 0), (70, 10), (59, 88)];

@@ -18,7 +18,6 @@ fn true_frame() -> Pose {
     pose(340.0, -120.0, 2.1)
 }
 
-/// Measures each `every`th keyframe.
 fn measure(drive: &Drive, every: usize, seed: u64) -> Vec<Position> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };

@@ -1,5 +1,3 @@
-//! The points of a scan.
-
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Point2;
 

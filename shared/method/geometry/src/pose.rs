@@ -1,5 +1,3 @@
-//! Poses in the plane.
-
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry2, Vector2};

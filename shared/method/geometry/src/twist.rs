@@ -1,5 +1,3 @@
-//! Constant velocities in the plane.
-
 use nalgebra::{Rotation2, Translation2, UnitComplex, Vector2};
 
 use crate::Pose;

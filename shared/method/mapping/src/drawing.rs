@@ -1,5 +1,3 @@
-//! A map of keyframes, and its picture.
-
 use std::path::Path;
 
 use gyre_geometry::Pose;
@@ -16,11 +14,8 @@ const APART_CELLS: f64 = 3.0;
 /// frame.
 pub struct Drawing {
     evidence: Evidence,
-    /// The first keyframe, in the frame of the given poses, and in the frame of odometry.
     first: Option<[Pose; 2]>,
-    /// The keyframes by odometry, in the map frame.
     odometry: Vec<Pose>,
-    /// True if odometry has them elsewhere.
     is_corrected: bool,
 }
 

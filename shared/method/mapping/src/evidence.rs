@@ -1,5 +1,3 @@
-//! The evidence of keyframes, tile by tile.
-
 use std::{collections::BTreeMap, path::Path};
 
 use gyre_geometry::Pose;
@@ -161,7 +159,6 @@ impl TileSource for Evidence {
         self.options.cell_m
     }
 
-    /// The tiles that some keyframe touches.
     fn tiles(&self) -> Vec<TileIndex> {
         self.store.tiles().collect()
     }
@@ -181,7 +178,6 @@ impl TileSource for Evidence {
     }
 }
 
-/// The tile of a cell of the map, and the number of the cell in it.
 fn locate(x: i64, y: i64) -> (TileIndex, u32) {
     let side = TILE_CELLS as i64;
     let tile = TileIndex {

@@ -1,5 +1,3 @@
-//! Maps in the forms of other programs.
-
 mod geotiff;
 mod grid;
 mod pgm;

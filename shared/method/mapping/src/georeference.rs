@@ -1,5 +1,3 @@
-//! The place of a map on the earth.
-
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -48,7 +46,6 @@ impl Origin {
 }
 
 impl Georeference {
-    /// The map's own frame without an origin, and the UTM zone of the origin otherwise.
     pub fn new(origin: Option<Origin>) -> Result<Self, OriginError> {
         let Some(origin) = origin else {
             return Ok(Self {

@@ -1,5 +1,3 @@
-//! A map as a folder.
-
 use std::{
     collections::BTreeSet,
     fs,
@@ -88,7 +86,6 @@ pub fn write_map(
     Ok(storage::write(&folder.join(MANIFEST), text)?)
 }
 
-/// Removes a map, its `map.toml` first. Pictures and exports in the folder stay.
 fn clear(folder: &Path) -> Result<(), MapError> {
     let tiles = tiles_in(folder)?;
     if tiles.is_empty() {

@@ -1,9 +1,6 @@
-//! Options of a map.
-
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The options that a map is drawn with. It is stored with the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapOptions {

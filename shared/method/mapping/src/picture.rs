@@ -29,7 +29,6 @@ const LEGIBLE_SIDE: f64 = 2048.0;
 /// cells.
 const MAX_CELL_M: f64 = 3.2;
 
-/// The overlay drawn over a map, all in the map frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
     /// The trajectory that was used to draw the map, or one through it, in pieces that are not

@@ -33,7 +33,6 @@ pub struct Tile {
 struct Entry {
     keyframes: u32,
     used: u64,
-    /// The tile, while it is in memory.
     tile: Option<Box<Tile>>,
     /// The place in the file, once it has been written.
     slot: Option<u64>,

@@ -5,7 +5,6 @@ use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSo
 /// Cells of one picture: 21 square kilometres of cells of 0.2 m, half a gigabyte in memory.
 const MAX_CELLS: usize = 1 << 29;
 
-/// Returns the extent of a map that becomes one picture of the form `form`.
 pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let [columns, rows] = extent.cells();

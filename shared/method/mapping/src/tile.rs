@@ -1,5 +1,3 @@
-//! Tiles: squares of the map.
-
 use std::{fmt, ops::RangeInclusive};
 
 use nalgebra::{Point2, Vector2};
@@ -24,7 +22,6 @@ impl fmt::Display for TileIndex {
 }
 
 impl TileIndex {
-    /// Returns the corner of lowest x and y, in cells of the map frame.
     pub fn corner(self) -> [i64; 2] {
         [self.x, self.y].map(|index| i64::from(index) * TILE_CELLS as i64)
     }
@@ -130,27 +127,5 @@ impl TileExtent {
     pub fn corner_m(&self, cell_m: f64) -> Vector2<f64> {
         let [x, y] = self.min.corner();
         Vector2::new(x as f64, y as f64) * cell_m
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_tiles_around_a_point_are_those_that_its_square_touches() {
-        let tiles: Vec<_> = TileIndex::around(&Point2::new(1.0, -60.0), 10.0, 0.2).collect();
-        let expected = [(-1, -2), (-1, -1), (0, -2), (0, -1)].map(|(x, y)| TileIndex { x, y });
-        assert_eq!(tiles, expected);
-    }
-
-    #[test]
-    fn an_extent_covers_all_tiles() {
-        let tiles = [(0, 3), (-2, 5), (1, 4)].map(|(x, y)| TileIndex { x, y });
-        let extent = TileExtent::of(&tiles);
-        assert_eq!(extent.map(|e| e.cells()), Some([4 * 256, 3 * 256]));
-        let corner = extent.map(|e| e.corner_m(0.5));
-        assert_eq!(corner, Some(Vector2::new(-256.0, 384.0)));
-        assert_eq!(TileExtent::of(&[]), None);
     }
 }

@@ -96,7 +96,6 @@ impl View {
     }
 }
 
-/// The places of points with their weights. NaN is nowhere.
 fn places(points: &Submap) -> impl Iterator<Item = (Vector2<f64>, f64)> {
     let places = points.points().map(|[x_m, y_m, weight]| {
         let place = Vector2::new(f64::from(x_m), f64::from(y_m));

@@ -1,5 +1,3 @@
-//! Motion-compensated rasters above the power threshold, before any network.
-
 use gyre_geometry::Twist;
 use gyre_radar::raster::{RasterConfig, RasterError, Rasteriser};
 use ndarray::ArrayViewMut2;

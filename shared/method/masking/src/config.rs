@@ -1,5 +1,3 @@
-//! The section `[masking]`.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;

@@ -1,5 +1,3 @@
-//! The errors of a masker.
-
 use gyre_radar::{ScanError, SettingError, raster::RasterError};
 use thiserror::Error;
 

@@ -6,7 +6,6 @@
 /// A tensor's value of `data_location` when it is in another file.
 const EXTERNAL: u32 = 1;
 
-/// The messages of ONNX that have tensors within.
 #[derive(Clone, Copy)]
 enum Message {
     Model,
@@ -59,7 +58,6 @@ pub(crate) fn external_file(model: &[u8]) -> Option<String> {
     None
 }
 
-/// Returns the name of the other file that a tensor is in.
 fn file_of(tensor: &[u8]) -> Option<String> {
     // An enum has 32 bits, whatever a varint has beyond them.
     let is_external =

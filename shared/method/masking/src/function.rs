@@ -8,42 +8,7 @@ use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{MaskError, Sweep, compensation::CompensatedRaster};
 
-/// A mask of your own.
-///
-/// ```
-/// use std::error::Error;
-///
-/// use gyre_masking::{Factors, MaskFunction, Masker, MaskingConfig};
-/// use gyre_radar::{PointsConfig, PolarScan, RasterConfig};
-/// use ndarray::{Array2, ArrayView2, s};
-///
-/// /// Masks everything nearer than the bumper.
-/// #[derive(Debug)]
-/// struct WithoutBumper;
-///
-/// impl MaskFunction for WithoutBumper {
-///     fn factors(
-///         &mut self,
-///         scan: &PolarScan<'_>,
-///         _raster: ArrayView2<'_, f32>,
-///     ) -> Result<Factors, Box<dyn Error + Send + Sync>> {
-///         let mut factors = Array2::ones(scan.power().dim());
-///         factors.slice_mut(s![.., ..20]).fill(0.0);
-///         Ok(Factors::OfPower(factors))
-///     }
-/// }
-///
-/// # fn main() -> Result<(), Box<dyn Error>> {
-/// let masker = Masker::with_function(
-///     &RasterConfig::default(),
-///     &PointsConfig::default(),
-///     &MaskingConfig::default(),
-///     Box::new(WithoutBumper),
-/// )?;
-/// # let _ = masker;
-/// # Ok(())
-/// # }
-/// ```
+/// A mask of your own: `gyre new` begins a stage with one (`services/tools/templates/rust`).
 pub trait MaskFunction: fmt::Debug + Send + Sync {
     /// Returns factors from 0 to 1 for a scan. `raster` shows it with motion compensation, above
     /// the threshold: n x n, row 0 far ahead, column 0 far left. The same scan must give the same
@@ -67,7 +32,6 @@ pub enum Factors {
 #[derive(Debug)]
 pub(crate) struct AppliedFunction {
     function: Box<dyn MaskFunction>,
-    /// Factors of the raster of the last scan, if it gave such.
     raster: Option<Array2<f32>>,
     /// The powers of the last scan that are left, row after row, if it gave factors of powers.
     powers: Vec<u8>,

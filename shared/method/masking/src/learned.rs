@@ -1,5 +1,3 @@
-//! Masks of a network that takes one scan, or a scan and the previous one.
-
 use gyre_geometry::Twist;
 use gyre_radar::raster::RasterConfig;
 use ndarray::{Array3, ArrayView2, ArrayViewMut2, Axis, Zip, s};
@@ -38,7 +36,6 @@ impl LearnedMask {
         self.pair.is_none() || self.previous == Some(number)
     }
 
-    /// Returns the factors of the last masked scan (0) or of its previous one (1).
     pub fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
         let masks = self.network.masks();
         (scan < masks.len_of(Axis(0))).then(|| masks.index_axis_move(Axis(0), scan))

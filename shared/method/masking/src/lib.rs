@@ -7,7 +7,6 @@ mod error;
 mod external;
 mod function;
 mod learned;
-mod library;
 pub mod model;
 pub mod network;
 pub mod networks;
@@ -26,7 +25,6 @@ pub use backend::{Backend, Provider};
 pub use config::{MaskKind, MaskingConfig, MaskingConfigError};
 pub use error::{MaskError, MaskerError};
 pub use function::{Factors, MaskFunction};
-pub use library::Library;
 pub use sweep::Sweep;
 
 use compensation::CompensatedRaster;

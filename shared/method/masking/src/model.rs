@@ -20,7 +20,6 @@ const MAX_BYTES: u64 = 1 << 30;
 pub struct Card {
     pub model: NetworkFacts,
     pub raster: RasterFacts,
-    /// The processing of these rasters; optional.
     #[serde(default)]
     pub masking: MaskingFacts,
 }
@@ -53,7 +52,6 @@ pub struct MaskingFacts {
     pub undo_doppler: Option<bool>,
 }
 
-/// A model with a verified checksum and a card that fits the run.
 #[derive(Debug)]
 pub struct Model {
     pub card: Card,
@@ -62,13 +60,11 @@ pub struct Model {
 }
 
 impl Card {
-    /// Reads the card that `masking.model` names.
     pub fn read(config: &MaskingConfig) -> Result<Self, String> {
         let (_, card) = Self::named(config)?;
         Ok(card)
     }
 
-    /// Returns the path and the content of the card that `masking.model` names.
     fn named(config: &MaskingConfig) -> Result<(&Path, Self), String> {
         let path = config.model.as_deref().ok_or(
             "masking.kind is `learned`, but masking.model does not name a model: set it to the card of one, as in models/NAME.toml",

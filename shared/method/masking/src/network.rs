@@ -10,7 +10,7 @@ use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::{Backend, Library, MaskingConfig, model::Model, networks::runtime::RuntimeError};
+use crate::{Backend, MaskingConfig, model::Model, networks::runtime::RuntimeError};
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
@@ -22,7 +22,6 @@ const OUTPUT: &str = "masks";
 pub enum NetworkError {
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// A model or an execution provider that cannot be used.
     #[error("{0}")]
     Model(String),
     #[error("the learned mask cannot be computed: {0}")]
@@ -35,7 +34,6 @@ impl NetworkError {
         Self::Model(format!("{by} cannot load {path}: {reason}"))
     }
 
-    /// A model with operators of a version newer than the newest that a backend supports.
     fn opset(by: Backend, model: &Model, opset: i64, known: &str) -> Self {
         let (by, path) = (by.name(), model.file.display());
         Self::Model(format!(
@@ -47,7 +45,6 @@ impl NetworkError {
 #[derive(Debug)]
 pub struct Network {
     engine: Engine,
-    /// The last masks, scans x n x n.
     masks: Array3<f32>,
 }
 
@@ -59,16 +56,15 @@ enum Engine {
 }
 
 impl Network {
-    /// Loads the configured model and checks that it fits these rasters.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster).map_err(NetworkError::Model)?;
-        let (mut engine, inputs, outputs) = match Library::find(config)? {
-            Library::OnnxRuntime(path) => {
+        let (mut engine, inputs, outputs) = match config.onnx_runtime()? {
+            Some(path) => {
                 let engine = OnnxRuntime::load(&path, &model, config)?;
                 let (inputs, outputs) = (engine.inputs(), engine.outputs());
                 (Engine::OnnxRuntime(engine), inputs, outputs)
             }
-            Library::Rten => built_in(&model)?,
+            None => built_in(&model)?,
         };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, &inputs, shape, &model)?;

@@ -1,6 +1,4 @@
-//! Networks, computed by ONNX Runtime or rten.
-
-mod planes;
+pub(crate) mod planes;
 pub mod runtime;
 
 pub use planes::{PlanesError, PlanesNetwork};

@@ -30,7 +30,6 @@ impl RasterFrame {
         }
     }
 
-    /// Returns the cell (row, column) of a point; `None` outside of the raster.
     pub fn cell_of(&self, point: &SparsePoint) -> Option<[usize; 2]> {
         self.cell_seen_from(self.sensor_at(point), point)
     }
@@ -58,7 +57,6 @@ impl RasterFrame {
         }
     }
 
-    /// Returns the cell (row, column) at a position in the raster's frame.
     fn cell(&self, place: Point2<f64>) -> Option<[usize; 2]> {
         let index = |metres: f64| {
             let index = (0.5 * (self.n as f64 - 1.0) - metres / f64::from(self.cell_m)).round();

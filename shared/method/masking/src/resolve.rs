@@ -1,8 +1,7 @@
-//! Resolves the inputs of a network.
+use std::path::PathBuf;
 
-use crate::networks::runtime::RuntimeError;
-
-use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};
+use crate::networks::runtime::{self, RuntimeError};
+use crate::{Backend, MaskKind, MaskingConfig, Provider, model::Card, network::NetworkError};
 
 impl MaskingConfig {
     /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from
@@ -22,12 +21,25 @@ impl MaskingConfig {
     }
 
     pub fn resolve_library(&mut self) -> Result<(), RuntimeError> {
-        let library = Library::find(self)?;
-        self.backend = library.backend();
-        self.runtime = match library {
-            Library::OnnxRuntime(path) => Some(path),
-            Library::Rten => None,
+        self.runtime = self.onnx_runtime()?;
+        self.backend = match self.runtime {
+            Some(_) => Backend::OnnxRuntime,
+            None => Backend::Rten,
         };
         Ok(())
+    }
+
+    /// Returns the library of ONNX Runtime that computes the networks; `None` for rten. ONNX Runtime
+    /// is required if it is named. If it is neither named nor installed, rten replaces it, but only
+    /// on the processor.
+    pub fn onnx_runtime(&self) -> Result<Option<PathBuf>, RuntimeError> {
+        if self.backend == Backend::Rten {
+            return Ok(None);
+        }
+        let is_required = self.backend == Backend::OnnxRuntime || self.provider != Provider::Cpu;
+        match runtime::find(self.runtime.as_deref()) {
+            Err(RuntimeError::Missing) if !is_required => Ok(None),
+            found => found.map(Some),
+        }
     }
 }

@@ -1,5 +1,3 @@
-//! The input of a mask.
-
 use gyre_geometry::Twist;
 use gyre_radar::PolarScan;
 

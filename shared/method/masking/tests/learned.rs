@@ -8,7 +8,6 @@ use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskError, Masker, MaskingConfig, Sweep, network::Network};
 use ndarray::{Array2, Axis};
 
-/// Masks the rasters of a sweep and of the one that it follows with a mask that takes both.
 fn masked_pair(masker: &mut Masker, sweep: &Sweep<'_>, follows: Option<u64>) -> [Array2<f32>; 2] {
     let (mut later, mut earlier) = (blank(), blank());
     masker

@@ -84,7 +84,6 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
     }
 }
 
-/// Two scans of a simulated drive.
 fn simulated_scans() -> [OwnedScan; 2] {
     let drive = SimulatedDrive::new(&SimulationConfig::default()).unwrap();
     let mut dataset = drive.open(&DatasetOptions::default()).unwrap();

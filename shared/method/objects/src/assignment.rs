@@ -1,5 +1,3 @@
-//! The assignment of measurements to tracks.
-
 use pathfinding::kuhn_munkres::kuhn_munkres_min;
 use pathfinding::matrix::Matrix;
 
@@ -42,7 +40,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The number of pairs and the sum of their costs.
     fn value(costs: &[Vec<Option<f64>>], columns: &[Option<usize>]) -> (usize, f64) {
         let pairs = columns.iter().enumerate().filter_map(|(row, column)| {
             column.map(|column| costs[row][column].unwrap_or(f64::INFINITY))

@@ -1,5 +1,3 @@
-//! The section `[objects]` of a configuration.
-
 use gyre_masking::networks::PlanesError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

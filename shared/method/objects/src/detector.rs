@@ -1,5 +1,3 @@
-//! The detection of vehicles that move, by the network.
-
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -16,7 +14,6 @@ const OUT: usize = SIDE / 2;
 const VALUES: usize = 11;
 /// Side of a cell of the output, m.
 const OUT_M: f64 = 2.0 * crate::raster::CELL_M;
-/// Unit of its velocities, m/s.
 const SPEED_MPS: f64 = 8.0;
 /// Length and width whose ratios it gives, m.
 const SIZE_M: [f64; 2] = [4.5, 1.9];
@@ -39,9 +36,7 @@ pub(crate) struct Detection {
     pub size_m: [f64; 2],
     /// The likelihood that a vehicle which moves is there, 0 to 1.
     pub likely: f64,
-    /// Standard deviation of each component of the centre, m.
     pub sigma_m: f64,
-    /// Standard deviation of each component of the velocity, m/s.
     pub sigma_mps: f64,
     /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
     /// shortened by the Doppler shift.
@@ -49,7 +44,6 @@ pub(crate) struct Detection {
 }
 
 impl Detector {
-    /// Loads the network, into the ONNX Runtime at a path or else into rten.
     pub fn new(runtime: Option<&Path>) -> Result<Self, ObjectsError> {
         // The network gives each plane in four, of every other row and column.
         let shapes = [[PLANES, SIDE, SIDE], [4 * VALUES, OUT / 2, OUT / 2]];
@@ -114,7 +108,6 @@ impl Output {
         found
     }
 
-    /// Reads the network's output for a cell, in the frame of the sensor.
     fn read(&self, cell: [usize; 2]) -> Detection {
         let value = |plane: usize| f64::from(self.value(plane, cell));
         let centre = cell.map(|at| (at as f64 + 0.5 - (OUT / 2) as f64) * OUT_M);
@@ -167,7 +160,6 @@ mod tests {
     use gyre_geometry::{Twist, pose};
     use std::f64::consts::FRAC_PI_2;
 
-    /// An output of values that are the same in each cell.
     fn output(values: [f32; VALUES]) -> Output {
         let cells = values.map(|value| vec![value; OUT * OUT]);
         Output(cells.concat())

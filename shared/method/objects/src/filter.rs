@@ -26,11 +26,9 @@ const LATERAL_ACCELERATION_MPS2: f64 = 1.0;
 /// An object that stood may be detected this far behind its place, m: less than its length.
 const BEHIND_M: f64 = 4.0;
 
-/// Position and velocity with their covariance, by models of different turn rates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Filter {
     models: [Model; TURNS.len()],
-    /// Mean and covariance of all models.
     mean: Estimate,
 }
 
@@ -51,14 +49,12 @@ struct Estimate {
 pub(crate) struct Sighting {
     /// The position, m, as if the object stood.
     pub at: Point2<f64>,
-    /// Covariance of it, m².
     pub noise: Matrix2<f64>,
     /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
     /// shortened by the Doppler shift.
     pub by_velocity: Matrix2<f64>,
 }
 
-/// The difference between a measurement and its prediction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
@@ -195,7 +191,6 @@ impl Filter {
         self.weigh(&costs);
     }
 
-    /// Returns the squared Mahalanobis distance of another state from this one.
     pub fn apart(&self, other: &Self) -> f64 {
         let difference = self.mean.state - other.mean.state;
         mahalanobis(difference, self.mean.covariance + other.mean.covariance)
@@ -293,7 +288,6 @@ impl Estimate {
     }
 }
 
-/// Returns mean and covariance of several estimates, each with its weight.
 fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Estimate {
     let sum: f64 = parts.clone().map(|(weight, _)| weight).sum();
     let sum = sum.max(f64::MIN_POSITIVE);

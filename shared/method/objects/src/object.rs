@@ -1,5 +1,3 @@
-//! The input and the output of the tracking.
-
 use gyre_geometry::{Pose, Twist};
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -29,7 +27,6 @@ pub struct Object {
     pub moving: bool,
     /// Scans since it was first seen, that one included.
     pub age: u32,
-    /// Covariance of the centre, m².
     pub position_covariance: Matrix2<f64>,
     pub velocity_covariance: Matrix2<f64>,
 }

@@ -12,13 +12,11 @@ const CELLS: usize = SIDE * SIDE;
 pub(crate) const CELL_M: f64 = 0.5;
 /// Planes: one for each of the last scans, the share of those before, and the range.
 pub(crate) const PLANES: usize = RECENT + 2;
-/// Scans with a plane of their own.
 const RECENT: usize = 6;
 /// Scans that are remembered: those without a plane of their own show what stands.
 const REMEMBERED: usize = 20;
 /// The time between planes, ns: one turn of the radars of the training.
 const TURN_NS: i64 = 250_000_000;
-/// A weight that the network takes for the least.
 const LEAST_WEIGHT: f32 = 1.0 / 255.0;
 
 /// A return of a scan, as if the sensor had stood.

@@ -1,5 +1,3 @@
-//! A track: an object from its birth to its death.
-
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::Object;
@@ -32,9 +30,7 @@ const MAX_SCORE: f64 = 4.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
 const END_SCORE: f64 = -2.0;
-/// Loss of the score by a scan that does not show the object.
 const MISSED_LOSS: f64 = 1.0;
-/// Scans that show a track before it is an object.
 const BIRTH_HITS: u32 = 2;
 /// Time that a track is continued without being seen, s: a car that passes hides another for about
 /// one.

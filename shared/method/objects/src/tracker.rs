@@ -127,7 +127,6 @@ impl ObjectTracker {
         }
     }
 
-    /// Makes a track an object: the lost one that would be there now, or a new one.
     fn confirm(&mut self, index: usize) {
         let mut found = self.tracks.remove(index);
         let lost = self.tracks.iter().enumerate();

@@ -13,15 +13,11 @@ use rand_chacha::ChaCha8Rng;
 
 const PERIOD_S: f64 = 0.25;
 const DOPPLER_S: f64 = 0.046;
-/// Half of the length and width of a car, m.
 const HALF_M: (f64, f64) = (2.2, 0.9);
-/// Returns of a car in a scan.
 const RETURNS: usize = 25;
 
-/// A car that turns with a constant rate.
 #[derive(Clone, Copy)]
 struct Car {
-    /// Centre and velocity at a time.
     at: Point2<f64>,
     velocity: Vector2<f64>,
     from_s: f64,
@@ -38,7 +34,6 @@ impl Car {
         }
     }
 
-    /// Returns its centre and velocity at a time.
     fn at(&self, time_s: f64) -> (Point2<f64>, Vector2<f64>) {
         let time_s = time_s - self.from_s;
         let turned = self.turn_radps * time_s;
@@ -91,7 +86,6 @@ impl Scene {
         self.step(cars)
     }
 
-    /// Measures the walls and these cars, and tracks.
     fn step(&mut self, cars: &[Car]) -> Vec<Object> {
         let mut points = Vec::new();
         for post in 0..800 {

@@ -12,7 +12,6 @@ use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
 use serde::Deserialize;
 
-/// The sections of a run's configuration that matter here.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct Config {

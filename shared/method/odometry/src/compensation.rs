@@ -1,5 +1,3 @@
-//! The velocities for motion compensation.
-
 use std::collections::VecDeque;
 
 use gyre_geometry::Twist;
@@ -38,33 +36,5 @@ impl LaggedTwists {
 
     pub fn clear(&mut self) {
         self.last.clear();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn twist(vx_mps: f64) -> Option<Twist> {
-        Some(Twist {
-            vx_mps,
-            ..Twist::default()
-        })
-    }
-
-    #[test]
-    fn a_scan_is_compensated_with_the_velocity_of_the_scan_lag_scans_earlier() {
-        let mut twists = LaggedTwists::new(2);
-        let found = [None, twist(1.0), twist(2.0), twist(3.0)];
-        let given = found.map(|found| {
-            let next = twists.next();
-            twists.push(found);
-            next
-        });
-        assert_eq!(given, [None, None, None, twist(1.0)]);
-        assert_eq!(twists.next(), twist(2.0));
-        let mut none = LaggedTwists::new(0);
-        none.push(twist(1.0));
-        assert_eq!(none.next(), None);
     }
 }

@@ -1,5 +1,3 @@
-//! The sections of a configuration that the method depends on.
-
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};

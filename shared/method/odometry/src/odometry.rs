@@ -1,5 +1,3 @@
-//! Odometry: from scans to motions and poses.
-
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::Masker;
 use gyre_radar::{

@@ -1,5 +1,3 @@
-//! The scan that is being registered and the one before it.
-
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
@@ -16,7 +14,6 @@ pub struct Pair {
     /// The raster of the earlier scan, masked for this pair, if the mask takes two scans.
     pub(crate) earlier_for_pair: Option<Array2<f32>>,
     pub(crate) seq: u64,
-    /// The turn and the distance from the earlier scan to the later one, by gyro and wheels.
     pub(crate) turn: Option<GyroTurn>,
     pub(crate) distance: Option<WheelDistance>,
 }
@@ -79,7 +76,6 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
-    /// Returns what is known about the motion beside the rasters and the points.
     pub(crate) fn aiding(&self) -> Aiding {
         let [earlier, later] = [&self.earlier, &self.later];
         Aiding {

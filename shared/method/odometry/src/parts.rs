@@ -1,5 +1,3 @@
-//! The parts of the method: mask, search and refinement.
-
 use gyre_masking::Masker;
 use gyre_scan_matching::{ExhaustiveSearch, RefinementKind, Refiner};
 
@@ -16,7 +14,6 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Makes the parts of a configuration, with all their buffers.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             masker: Masker::new(&config.raster, &config.points, &config.masking)?,

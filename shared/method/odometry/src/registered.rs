@@ -1,5 +1,3 @@
-//! The results and errors of a registration.
-
 use std::error::Error as StdError;
 
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
@@ -36,7 +34,6 @@ impl Registered {
 pub enum Outcome {
     /// No previous scan: the chain of motions starts here.
     Start,
-    /// The search: no refinement is configured.
     Searched,
     /// The refinement against the local map.
     Refined,

@@ -1,5 +1,3 @@
-//! Searches: the rotation and then the translation, or both together.
-
 use gyre_scan_matching::{
     ConfigError, ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation,
     TranslationConfig, TranslationSearch,
@@ -7,7 +5,6 @@ use gyre_scan_matching::{
 
 use crate::{OdometryError, Pair};
 
-/// Searches the motion between two scans.
 pub trait Search: Send + Sync {
     /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
     /// motions starts.
@@ -23,7 +20,6 @@ pub struct DecoupledSearch {
 }
 
 impl DecoupledSearch {
-    /// Plans both searches for rasters of `n` x `n` cells.
     pub fn new(
         n: usize,
         cell_m: f64,

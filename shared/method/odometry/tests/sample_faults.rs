@@ -148,7 +148,6 @@ fn values(sample: &Sample) -> usize {
     if sample.is(SampleKind::Gyro) { 3 } else { 1 }
 }
 
-/// The row of a sample in its log.
 fn line(sample: &Sample) -> String {
     let values = sample.values[..values(sample)].iter();
     let values: String = values.map(|value| format!(",{value}")).collect();
@@ -187,7 +186,6 @@ const KINDS: [&str; 7] = [
     "unit",
 ];
 
-/// Samples of a sweep.
 const SWEEP: [usize; 2] = [26, 13];
 
 /// Draws a number of samples of a gyro (0) or of wheels (1): those of a sweep or more, or less.

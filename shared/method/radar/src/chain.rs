@@ -1,5 +1,3 @@
-//! Breaks in the time of a recording.
-
 /// The longest time between consecutive scans of a chain of motions, ns. After that a moving
 /// vehicle has left the reach of every search, and a prediction from its last velocity is
 /// worthless.

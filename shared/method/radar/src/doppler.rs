@@ -4,9 +4,6 @@
 //! of all bearings determine its velocity: approach = vx cos(bearing) + vy sin(bearing), after Le
 //! Gentil et al., "DRO: Doppler-aware direct radar odometry" (2025). Moving objects do not fit this
 //! form and lose their weight.
-//!
-//! A rotation of the radar about itself shifts no range. If the radar is ahead of the centre of the
-//! rotation, the velocity is the radar's, which moves to the side there.
 
 mod fit;
 mod rows;
@@ -29,7 +26,6 @@ use shifts::Shifts;
 /// bin.
 const MIN_DOPPLER_S: f32 = 1e-3;
 
-/// The reason why a scan does not determine the velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NoDoppler {
     #[error(
@@ -49,17 +45,9 @@ pub enum NoDoppler {
     )]
     NoCoefficient,
     #[error("{bearings} bearings have echoes that both chirps see, but {needed} are needed")]
-    TooFewBearings {
-        bearings: usize,
-        /// The least number.
-        needed: usize,
-    },
+    TooFewBearings { bearings: usize, needed: usize },
     #[error("{agreeing} of {bearings} bearings agree on a velocity, which is too few")]
-    NoAgreement {
-        /// Bearings that agree on the best one.
-        agreeing: usize,
-        bearings: usize,
-    },
+    NoAgreement { agreeing: usize, bearings: usize },
     #[error(transparent)]
     Scan(#[from] ScanError),
 }

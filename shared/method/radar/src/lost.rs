@@ -35,7 +35,6 @@ pub const MAX_GAPS: usize = 8;
 /// The largest number of lost azimuths that are placed one by one. More are lost in bursts.
 const MAX_SINGLE: usize = 7;
 
-/// The least azimuths of a turn for finding places.
 const MIN_AZIMUTHS: usize = 64;
 
 /// By how much faster the vehicle may have become since the motion that predicts: it brakes or
@@ -63,7 +62,6 @@ impl LostAzimuths {
         lost
     }
 
-    /// Creates gaps of one azimuth each.
     pub fn between(rows: impl IntoIterator<Item = [u16; 2]>) -> Self {
         Self::of_gaps(rows.into_iter().map(|[first, last]| [first, last, 1]))
     }
@@ -123,7 +121,6 @@ impl LostAzimuths {
 
 #[derive(Clone, Debug, Default)]
 pub struct LostAzimuthFinder {
-    /// The echoes of the rows as they follow each other.
     rows: Echoes,
     previous: Option<Previous>,
     /// The echoes of that scan, each at its azimuth: only where the next scan has lost some.
@@ -208,7 +205,6 @@ impl LostAzimuthFinder {
     }
 }
 
-/// Memory for the azimuths of a scan whose rows are placed.
 #[derive(Debug, Default)]
 pub struct PlacedRows {
     azimuth_rad: Vec<f32>,
@@ -254,7 +250,6 @@ impl PlacedRows {
     }
 }
 
-/// Returns the number of stale rows at the end of a scan.
 pub fn stale_rows(scan: &PolarScan<'_>) -> usize {
     let rows = scan.flags.iter().rev();
     let stale = rows.take_while(|flags| **flags & flag::STALE != 0).count();

@@ -1,5 +1,3 @@
-//! The median.
-
 /// Returns the median: the upper of the two middle values if their number is even, `None` without
 /// values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {

@@ -71,7 +71,6 @@ impl PointsConfig {
     }
 }
 
-/// Extracts the points of scans. The first scan of a size allocates the memory.
 #[derive(Debug)]
 pub struct PointExtractor {
     config: PointsConfig,
@@ -128,7 +127,6 @@ impl PointExtractor {
     }
 }
 
-/// Returns the lowest power that at most `room` peaks reach.
 fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 {
     if peaks.len() <= room {
         return 1;

@@ -28,7 +28,6 @@ use std::fmt;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 
-/// The largest number of cells per side of a raster.
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
 /// The rule that computes the value of a cell from the range bins.
@@ -94,19 +93,12 @@ impl RasterConfig {
     }
 }
 
-/// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The array for the raster is not `n x n`, or not contiguous and row-major.
     #[error("the raster needs a contiguous array of {n} x {n} cells, but got {} x {}", actual[0], actual[1])]
-    Shape {
-        /// Cells per side.
-        n: usize,
-        /// Rows and columns of the array.
-        actual: [usize; 2],
-    },
+    Shape { n: usize, actual: [usize; 2] },
     #[error(transparent)]
     Scan(#[from] ScanError),
     /// The motion to compensate is not finite, or exceeds [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].

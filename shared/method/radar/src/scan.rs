@@ -22,7 +22,6 @@ pub enum Sense {
     CounterClockwise,
 }
 
-/// Bits of an azimuth's flag byte.
 pub mod flag {
     /// The azimuth was measured, not interpolated from its neighbours.
     pub const MEASURED: u8 = 1;

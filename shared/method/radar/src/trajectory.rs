@@ -1,5 +1,3 @@
-//! Trajectories in the plane.
-
 use gyre_geometry::{Pose, interpolate};
 
 /// Poses of the sensor (REP-103) in the world frame of the source.

@@ -1,8 +1,5 @@
-//! Bounds of the settings of sensors.
-
 use thiserror::Error;
 
-/// A setting out of its bounds.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{section}.{key} is {value}, but must be {expected}")]
 pub struct SettingError {

@@ -1,5 +1,3 @@
-//! Configuration of the gyro.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;

@@ -32,7 +32,6 @@ pub struct DopplerVelocity {
 pub struct DopplerDisplacement {
     /// The displacement ahead, with the variances of both parts.
     pub ahead: WheelDistance,
-    /// The displacement to the left, m.
     pub left_m: f64,
 }
 

@@ -7,7 +7,6 @@
 /// Semi-major axis of the ellipsoid WGS 84, m.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
-/// Square of the first eccentricity.
 const ECCENTRICITY_2: f64 = FLATTENING * (2.0 - FLATTENING);
 /// Newton steps from the plane to the earth: each takes the error down by the share that the place
 /// is of the earth's radius.

@@ -1,5 +1,3 @@
-//! Configuration of GNSS, and its fixes.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;

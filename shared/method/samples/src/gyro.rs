@@ -1,5 +1,3 @@
-//! From samples of a gyro to the turn between two scans.
-
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::Twist;
 

@@ -1,5 +1,3 @@
-//! The integral of one value of samples from one scan to the next.
-
 use crate::{Sample, SampleKind};
 
 /// Turn of the radar assumed for a scan whose azimuths all have the same time, ns.

@@ -1,5 +1,3 @@
-//! One measurement of another sensor.
-
 use bytemuck::{Pod, Zeroable};
 
 /// One measurement of a sensor beside the radar, as it travels with a scan.

@@ -1,5 +1,3 @@
-//! From samples of the wheels' speed to the distance between two scans.
-
 use bytemuck::{Pod, Zeroable};
 
 use crate::{SampleKind, WheelsConfig, integral::Integrator};
@@ -15,7 +13,6 @@ pub struct WheelDistance {
     pub distance_m: f64,
     /// Variance but for the scale, m².
     pub variance_m2: f64,
-    /// Variance of the place across the path, m².
     pub side_variance_m2: f64,
     pub interval_s: f64,
 }

@@ -1,5 +1,3 @@
-//! Configuration of the wheels.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;

@@ -54,10 +54,6 @@ pub struct JointMatch {
 /// again at that angle for the shift. Two angles share a complex transform, the spectrum of f is
 /// computed once per pair, and only the shifts within reach are transformed back.
 ///
-/// The covariance is the inverse of the score's curvature in (x, y, yaw), scaled: the curvature
-/// over the shifts at the best angle, the curvature over the angles of the best score at each, and
-/// the dependence of the best shift on the angle.
-///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct ExhaustiveSearch {
     n: usize,
@@ -88,7 +84,6 @@ struct Candidate {
 }
 
 struct JointPeak {
-    prior_rad: f64,
     best: usize,
     angle_rad: f64,
     over_angles: LinePeak,
@@ -100,7 +95,6 @@ struct JointPeak {
 
 impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    /// The reach must be at most half the raster.
     pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
@@ -126,25 +120,12 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// Finds the motion between two rasters.
-    ///
-    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
-    /// zero.
+    /// Finds the motion between two rasters, n x n, row 0 far ahead, column 0 far left. Values that
+    /// are not finite count as zero.
     pub fn search(
         &mut self,
         later: ArrayView2<'_, f32>,
         earlier: ArrayView2<'_, f32>,
-    ) -> Result<JointMatch, ShapeError> {
-        self.search_around(later, earlier, 0.0)
-    }
-
-    /// Finds the motion between two rasters whose angle is near `prior_rad`, the middle of the
-    /// grid.
-    pub fn search_around(
-        &mut self,
-        later: ArrayView2<'_, f32>,
-        earlier: ArrayView2<'_, f32>,
-        prior_rad: f64,
     ) -> Result<JointMatch, ShapeError> {
         let later = cells("later raster", &later, self.n)?;
         let earlier = cells("earlier raster", &earlier, self.n)?;
@@ -154,19 +135,19 @@ impl ExhaustiveSearch {
         self.turned[0].energy.measure(&self.earlier);
         let energy = (self.later_energy.total * self.turned[0].energy.total).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
-            return Ok(self.no_match(prior_rad));
+            return Ok(self.no_match());
         }
         self.correlation.keep(&self.later);
-        self.score_angles(prior_rad, energy);
+        self.score_angles(energy);
         Ok(self
-            .joint_peak(prior_rad, energy)
-            .map_or(self.no_match(prior_rad), |found| self.joint_match(&found)))
+            .joint_peak(energy)
+            .map_or_else(|| self.no_match(), |found| self.joint_match(&found)))
     }
 
-    fn score_angles(&mut self, prior_rad: f64, energy: f64) {
+    fn score_angles(&mut self, energy: f64) {
         for first in (0..self.angles.count).step_by(2) {
             let count = (self.angles.count - first).min(2);
-            let angles = [0, 1].map(|k| prior_rad + self.angles.angle((first + k) as f64));
+            let angles = [0, 1].map(|k| self.angles.angle((first + k) as f64));
             self.score(angles, count, OFFSET, energy);
             for (k, turned) in self.turned.iter().take(count).enumerate() {
                 self.candidates[first + k] = turned.best(self.config.peak, angles[k], self.cell_m);
@@ -174,7 +155,6 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Scores all shifts at the first `count` of two angles.
     fn score(&mut self, angles: [f64; 2], count: usize, offset: f64, energy: f64) {
         for (k, turned) in self.turned.iter_mut().enumerate() {
             if k < count {
@@ -209,17 +189,16 @@ impl ExhaustiveSearch {
         }
     }
 
-    fn joint_peak(&mut self, prior_rad: f64, energy: f64) -> Option<JointPeak> {
+    fn joint_peak(&mut self, energy: f64) -> Option<JointPeak> {
         let best = self.best()?;
         let over_angles = self.angle_peak(best);
-        let angle_rad = prior_rad + self.angles.angle(best as f64 + over_angles.offset);
+        let angle_rad = self.angles.angle(best as f64 + over_angles.offset);
         self.score([angle_rad; 2], 1, 0.0, energy);
         let scores = &self.turned[0].scores;
         let highest = scores.highest()?;
         let over_shifts = scores.peak(self.config.peak, highest);
         let shift = scores.place(self.config.peak, highest, &over_shifts);
         Some(JointPeak {
-            prior_rad,
             best,
             angle_rad,
             over_angles,
@@ -272,7 +251,7 @@ impl ExhaustiveSearch {
             variance_rad2: self.angle_variance(score, found.over_angles.curvature),
             score,
             runner_up: second.map(|k| RotationRunnerUp {
-                angle_rad: self.angle(found, k),
+                angle_rad: wrap_angle(self.angles.angle(k as f64)),
                 score: self.at(k),
             }),
         };
@@ -342,15 +321,11 @@ impl ExhaustiveSearch {
         [here, there].into_iter().flatten().reduce(higher)
     }
 
-    fn angle(&self, found: &JointPeak, k: usize) -> f64 {
-        wrap_angle(found.prior_rad + self.angles.angle(k as f64))
-    }
-
-    fn no_match(&self, prior_rad: f64) -> JointMatch {
-        let (angle_rad, variance_rad2) = (wrap_angle(prior_rad), self.angles.guess());
+    fn no_match(&self) -> JointMatch {
+        let variance_rad2 = self.angles.guess();
         JointMatch {
-            rotation: RotationMatch::none(angle_rad, variance_rad2),
-            motion: MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2),
+            rotation: RotationMatch::none(0.0, variance_rad2),
+            motion: MotionMatch::none(self.config.reach_m, 0.0, variance_rad2),
         }
     }
 }

@@ -81,7 +81,6 @@ impl Columns {
         }
     }
 
-    /// Reads the first `width` values of some rows into `block`, row after row.
     pub fn read_rows(
         &self,
         rows: impl Iterator<Item = usize> + Clone,
@@ -124,7 +123,6 @@ impl Transform {
             .process_immutable_with_scratch(line, out, &mut self.scratch);
     }
 
-    /// Transforms a line, or several contiguous ones, in place.
     pub fn lines(&mut self, lines: &mut [Complex32]) {
         self.fft.process_with_scratch(lines, &mut self.scratch);
     }

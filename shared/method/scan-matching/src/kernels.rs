@@ -101,7 +101,6 @@ pub(crate) fn bilinear_line(
     }
 }
 
-/// Bilinear values at the positions of a table, in an image with rows of `stride`.
 #[simd]
 pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
     assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
@@ -135,7 +134,6 @@ pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
     }
 }
 
-/// Adds the square of each value to `sums`; returns the sum of the squares.
 #[simd]
 pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
     let mut lanes = [0.0; LANES];
@@ -170,7 +168,6 @@ pub(crate) fn energy(values: &[Complex32]) -> f32 {
     lanes.iter().sum()
 }
 
-/// |z| of each value.
 #[simd]
 pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     for (m, z) in out.iter_mut().zip(spectrum) {
@@ -178,7 +175,6 @@ pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     }
 }
 
-/// cross += g conj(f)
 #[simd]
 pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
     for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {
@@ -187,7 +183,6 @@ pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32
     }
 }
 
-/// g + i h.
 #[simd]
 pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
     for ((z, &g), &h) in out.iter_mut().zip(g).zip(h) {
@@ -213,7 +208,6 @@ pub(crate) fn separate(both: &[Complex32], g: &mut [Complex32], h: &mut [Complex
     }
 }
 
-/// z *= w
 #[simd]
 pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
     for (z, w) in column.iter_mut().zip(by) {

@@ -55,7 +55,6 @@ pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 pub struct ShapeError(String);
 
 impl ShapeError {
-    /// Not row-major and contiguous.
     fn layout(what: &str) -> Self {
         Self(format!("{what} is not in row-major, contiguous layout"))
     }
@@ -74,18 +73,6 @@ fn expect_shape(what: &str, actual: [usize; 2], expected: [usize; 2]) -> Result<
     }
 }
 
-/// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
-pub fn square<'a>(
-    what: &str,
-    cells: &'a [f32],
-    n: usize,
-) -> Result<ArrayView2<'a, f32>, ShapeError> {
-    let count = cells.len();
-    ArrayView2::from_shape((n, n), cells)
-        .map_err(|_| ShapeError(format!("{what} is 1 x {count}: expected {n} x {n}")))
-}
-
-/// The cells of an `n` x `n` raster, row after row.
 fn cells<'a>(what: &str, raster: &ArrayView2<'a, f32>, n: usize) -> Result<&'a [f32], ShapeError> {
     expect_shape(what, [raster.nrows(), raster.ncols()], [n, n])?;
     raster.to_slice().ok_or_else(|| ShapeError::layout(what))

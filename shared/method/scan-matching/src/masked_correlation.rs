@@ -1,5 +1,3 @@
-//! The correlation coefficient of two rasters at a known motion.
-
 use gyre_geometry::Pose;
 use gyre_simd::simd;
 use nalgebra::{Point2, Vector2};
@@ -11,8 +9,6 @@ use crate::{ConfigError, ShapeError, cells};
 
 /// The masked normalised correlation of two rasters at one motion, over the cells that lie within a
 /// range of both sensors.
-///
-/// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 #[derive(Debug)]
 pub struct MaskedCorrelation {
     n: usize,
@@ -36,7 +32,6 @@ type Sums = [f32; 3];
 impl MaskedCorrelation {
     /// Plans correlations of rasters of `n` x `n` cells of `cell_m` metres within `range_m` of both
     /// sensors.
-    /// `n` must be from 16 to 8192.
     pub fn new(n: usize, cell_m: f64, range_m: f64) -> Result<Self, ConfigError> {
         check_raster(n, cell_m)?;
         Ok(Self {

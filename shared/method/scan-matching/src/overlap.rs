@@ -1,5 +1,3 @@
-//! The energy of a raster within its overlap with a shifted raster.
-
 use nalgebra::Vector2;
 
 /// The energy that is left of a raster in the overlap, for shifts of up to `reach` cells each way.
@@ -12,7 +10,6 @@ pub(crate) struct OverlapEnergy {
     reach: usize,
     rows: Vec<f32>,
     columns: Vec<f32>,
-    /// Sums over the first (last) k rows (columns).
     edges: [Vec<f64>; 4],
     /// Sums over b columns of the rows of one corner so far.
     corner: Vec<f64>,

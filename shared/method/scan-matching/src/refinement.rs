@@ -107,8 +107,6 @@ pub struct Aiding {
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
-///
-/// Nothing is allocated after construction.
 #[derive(Debug)]
 pub struct Refiner {
     config: RefinementConfig,
@@ -125,7 +123,6 @@ pub struct Refiner {
 }
 
 impl Refiner {
-    /// Plans the refinement of scans of at most `capacity` points.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         config.validate()?;
         Ok(Self {

@@ -1,5 +1,3 @@
-//! The angle between two scans, from their magnitude spectra alone.
-
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -61,8 +59,6 @@ impl RotationMatch {
 }
 
 /// Finds the angle between two scans (Weston et al., Algorithm 1, lines 5 to 15).
-///
-/// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct RotationSearch {
     n: usize,
     config: RotationConfig,
@@ -83,8 +79,6 @@ pub struct RotationSearch {
 }
 
 impl RotationSearch {
-    /// Plans a search over rasters of `n` x `n` cells.
-    /// `n` must be from 16 to 8192.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         check_side(n)?;

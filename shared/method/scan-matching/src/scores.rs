@@ -1,5 +1,3 @@
-//! A plane of correlation scores, one per shift, and its peaks.
-
 use std::sync::Arc;
 
 use nalgebra::Vector2;

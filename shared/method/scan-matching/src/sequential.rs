@@ -1,5 +1,3 @@
-//! Rotations along a stream of scans.
-
 use ndarray::ArrayView2;
 
 use crate::{

@@ -1,5 +1,3 @@
-//! The part of a scan that a rotation search keeps.
-
 use gyre_radar::fourier::Complex32;
 use ndarray::ArrayView2;
 
@@ -32,12 +30,10 @@ impl PolarSpectrum {
         expect_shape("polar spectrum (radii x angles)", actual, [radii, angles])
     }
 
-    /// Returns the number of radii; 1 for `line14`.
     pub fn radii(&self) -> usize {
         self.data.len() / self.harmonics()
     }
 
-    /// Returns the number of harmonics along the angle at each radius: `angles / 2 + 1`.
     pub fn harmonics(&self) -> usize {
         self.angles / 2 + 1
     }

@@ -1,5 +1,3 @@
-//! Tapers (window functions) over a raster before its transform.
-
 use std::f64::consts::PI;
 
 use crate::config::Taper;

@@ -1,5 +1,3 @@
-//! The shift between two scans whose angle is known, and the whole motion.
-
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
@@ -64,8 +62,6 @@ const VARIANCE_SCALE: f64 = 0.015;
 
 /// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to
 /// 21).
-///
-/// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct TranslationSearch {
     n: usize,
     cell_m: f64,
@@ -81,7 +77,6 @@ pub struct TranslationSearch {
 
 impl TranslationSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    /// The reach must be at most half the raster.
     pub fn new(n: usize, cell_m: f64, config: &TranslationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "translation", config.reach_m)?;
@@ -100,8 +95,6 @@ impl TranslationSearch {
         })
     }
 
-    /// Finds the motion between two rasters, given the angle between them.
-    ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
     pub fn search(

@@ -1,5 +1,3 @@
-//! Rotation and translation of a raster.
-
 /// A rotation of rasters of n x n cells about their middle, and a shift, with bilinear
 /// interpolation.
 #[derive(Debug, Clone)]

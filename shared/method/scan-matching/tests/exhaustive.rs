@@ -2,7 +2,7 @@
 
 use crate::common::{Motion, draw, pair, pair_of, scene_aside};
 use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use proptest::prelude::*;
 
 fn search(
@@ -18,7 +18,6 @@ fn search(
         .unwrap()
 }
 
-/// Errors (m, m, degrees).
 fn errors(found: &JointMatch, motion: Motion) -> [f64; 3] {
     let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI)
         .rem_euclid(std::f64::consts::TAU);
@@ -73,13 +72,12 @@ proptest! {
     fn the_best_of_all_angles_and_shifts_is_that_of_the_direct_sums(
         n in 20_usize..25,
         g in prop::collection::vec(0.0_f32..1.0, 24 * 24),
-        prior_deg in -170.0_f64..170.0,
         (k, down, right) in (-1..=1, -3_isize..=3, -3_isize..=3),
     ) {
         // Angles of 9 degrees, shifts of up to 3 cells of 1 m. f is g seen after one of these
         // motions.
         let g: Vec<f32> = g[..n * n].iter().map(|v| v.powi(4)).collect();
-        let angle = |k: i32| (prior_deg + 9.0 * f64::from(k)).to_radians();
+        let angle = |k: i32| (9.0 * f64::from(k)).to_radians();
         let moved = |at: usize| {
             let x = [(at / n) as isize + down, (at % n) as isize + right];
             let (row, col) = looked_up(n, x, (angle(k), 0.0));
@@ -93,9 +91,8 @@ proptest! {
             overlap: Overlap::None,
             peak: Peak::Parabola,
         };
-        let mut exhaustive = ExhaustiveSearch::new(n, 1.0, &config).unwrap();
-        let view = |raster| ArrayView2::from_shape((n, n), raster).unwrap();
-        let found = exhaustive.search_around(view(&f), view(&g), prior_deg.to_radians()).unwrap().motion;
+        let raster = |cells: &[f32]| Array2::from_shape_vec((n, n), cells.to_vec()).unwrap();
+        let found = search(n, 1.0, &config, &raster(&g), &raster(&f)).motion;
         // Angles are compared by rasters read between the cells, all blurred alike.
         let all = (-2..=2).flat_map(|k| (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (k, [i, j]))));
         let summed = all.map(|(k, s)| (k, s, direct_sum(&f, &g, n, (angle(k), 0.2113), s)));
@@ -135,20 +132,14 @@ fn small_angles_are_not_pushed_off_zero() {
 }
 
 #[test]
-fn a_reach_of_180_degrees_searches_the_whole_circle() {
-    let config = ExhaustiveConfig {
-        reach_deg: 180.0,
-        step_deg: 2.0,
-        ..Default::default()
-    };
-    for yaw in [179.5, -179.5, 90.0, -133.0] {
+fn motions_are_found_to_a_fraction_of_a_cell() {
+    for yaw in [0.0, 12.3, -9.0] {
         let motion = Motion::degrees(2.0, -1.0, yaw);
         let (earlier, later) = pair(97, 0.8, motion, 5);
-        let found = search(97, 0.8, &config, &earlier, &later);
+        let found = search(97, 0.8, &ExhaustiveConfig::default(), &earlier, &later);
         let [dx, dy, dyaw] = errors(&found, motion);
         let is_near = dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5;
-        let is_wrapped = found.motion.yaw_rad.abs() <= std::f64::consts::PI;
-        assert!(is_near && is_wrapped, "{yaw}: {found:?}");
+        assert!(is_near, "{yaw}: {found:?}");
     }
 }
 

@@ -74,20 +74,3 @@ fn impossible_configurations_name_the_key() {
     assert!(TranslationSearch::new(N, f64::NAN, &TranslationConfig::default()).is_err());
     assert!(RotationSearch::new(3, &RotationConfig::default()).is_err());
 }
-
-#[test]
-fn results_repeat_to_the_last_bit() {
-    let (earlier, later) = pair(127, 0.8, Motion::degrees(2.0, -1.0, 5.0), 2);
-    let mut rotation = RotationSearch::new(127, &RotationConfig::default()).unwrap();
-    let mut translation = TranslationSearch::new(127, 0.8, &TranslationConfig::default()).unwrap();
-    let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
-    let mut once = |between: &Array2<f32>| {
-        rotation.spectrum(between.view(), &mut f).unwrap(); // an earlier spectrum leaves no trace
-        rotation.spectrum(later.view(), &mut f).unwrap();
-        rotation.spectrum(earlier.view(), &mut g).unwrap();
-        let angle = rotation.search(&f, &g, None).unwrap();
-        let motion = translation.search(later.view(), earlier.view(), &angle);
-        (angle, motion.unwrap())
-    };
-    assert_eq!(once(&Array2::from_elem((127, 127), 5.0)), once(&earlier));
-}

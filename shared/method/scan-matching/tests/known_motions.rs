@@ -12,7 +12,6 @@ fn recovered(n: usize, cell_m: f64, configs: &Configs, motion: Motion, seed: u64
     search(n, cell_m, configs, &earlier, &later).1
 }
 
-/// Errors (m, m, degrees).
 fn errors(found: &MotionMatch, motion: Motion) -> [f64; 3] {
     [
         found.x_m - motion.x,

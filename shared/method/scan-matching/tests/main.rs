@@ -5,7 +5,6 @@
 
 mod common;
 
-mod allocations;
 mod conventions;
 mod exhaustive;
 mod hostile_input;

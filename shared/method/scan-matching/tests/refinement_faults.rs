@@ -196,20 +196,6 @@ fn stamps_that_do_not_advance_are_bridged() {
     }
 }
 
-#[test]
-fn identical_input_gives_identical_bits() {
-    let (drive, scans) = bend();
-    let once = refine(&drive, &scans);
-    assert_eq!(bits(&once.refined), bits(&refine(&drive, &scans).refined));
-    // A reset leaves no trace of the scans before.
-    let mut again = refiner();
-    refine_on(&mut again, &drive, &scans, 10..40);
-    again.reset();
-    let again = refine_on(&mut again, &drive, &scans, 0..59);
-    assert_eq!(bits(&once.refined), bits(&again));
-}
-
-/// A refiner with a different state, restored to the state of `from`.
 fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
     into.restore(*from.state(), |to| {

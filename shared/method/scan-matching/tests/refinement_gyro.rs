@@ -8,10 +8,8 @@ use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{Aiding, Outcome, Refined, Verdict};
 
 const SCANS: usize = 60;
-/// Scans with a wrong gyro.
 const WRONG: Range<usize> = 30..33;
 
-/// A bend, and its scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive::steady(6.0, 3.0, SCANS);
     let town = town([[-110.0, 220.0], [-110.0, 160.0]], 1);
@@ -40,7 +38,6 @@ fn refine_with(
     refine_aided(&mut refiner, scans, aiding, search)
 }
 
-/// The scans of this verdict.
 fn judged(refined: &[Refined], verdict: Verdict) -> Vec<usize> {
     let of = |(k, it): (usize, &Refined)| (it.gyro?.verdict == verdict).then_some(k);
     (1..).zip(refined).filter_map(of).collect()

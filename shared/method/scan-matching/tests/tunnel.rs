@@ -10,7 +10,6 @@ const INSIDE: usize = 40;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-/// A vehicle that slows down in the tunnel.
 fn slower() -> Drive {
     Drive {
         acceleration_mps2: -0.2,

@@ -19,7 +19,6 @@ use rand_distr::{Distribution, Normal};
 use rustix::time::{ClockId, clock_gettime};
 
 const KEYFRAMES: usize = 20_000;
-/// Keyframes of one round of the route.
 const AROUND: usize = 2_000;
 const LOOPS: usize = 500;
 /// The last loops, whose times are reported.
@@ -43,7 +42,6 @@ fn main() {
     new_loops(out.path(), &queries);
 }
 
-/// The time and the memory of what `work` returns.
 fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
     let (before, began) = (resident_mb(), thread_time());
     let result = work();
@@ -52,7 +50,6 @@ fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Reads what loop-closure reads when it starts.
 fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     let keyframes = RecordReader::<Keyframe>::open(out).unwrap();
     let mut closer = LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), POINTS).unwrap();
@@ -69,7 +66,6 @@ fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     (closer, keyframes)
 }
 
-/// Does what trajectory does when it starts.
 fn trajectory(out: &Path) -> TrajectoryEstimator {
     let mut estimator = pushed(out);
     let mut queries = RecordReader::<Query>::open(out).unwrap();
@@ -91,7 +87,6 @@ fn pushed(out: &Path) -> TrajectoryEstimator {
     estimator
 }
 
-/// The loops come one by one after all keyframes.
 fn new_loops(out: &Path, queries: &[Query]) {
     let mut estimator = pushed(out);
     let with_loops = queries.iter().filter(|query| !query.candidates.is_empty());
@@ -125,7 +120,6 @@ fn new_loops(out: &Path, queries: &[Query]) {
     );
 }
 
-/// Writes the logs of a drive, and returns the queries.
 fn write_logs(out: &Path) -> Vec<Query> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let step = pose(2.0, 0.0, TAU / AROUND as f64);

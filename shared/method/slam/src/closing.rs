@@ -33,7 +33,6 @@ const GAP_M: f64 = 100.0;
 const CANDIDATES: usize = 3;
 const APART_M: f64 = 15.0;
 
-/// Errors of [`LoopCloser`].
 #[derive(Debug, Error)]
 pub enum ClosingError<E> {
     #[error(transparent)]
@@ -56,10 +55,8 @@ pub struct LoopCloser {
     odometry: PoseGraph,
     path_m: Vec<f64>,
     has_ended: bool,
-    /// Number of the keyframe that is queried next.
     next_query: usize,
     cache: Cache,
-    /// The submap of a query and the submap of a candidate.
     submaps: [Submap; 2],
 }
 
@@ -87,7 +84,6 @@ impl LoopCloser {
         })
     }
 
-    /// Takes the next keyframe and keeps its path and motion.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         self.extend(keyframe.path_m, &keyframe.motion)
     }
@@ -194,7 +190,6 @@ impl LoopCloser {
         neighbours(&self.path_m, middle, self.submap_reach_m)
     }
 
-    /// The places that look most similar to a keyframe's place.
     fn candidates(&mut self, keyframe: usize) -> Vec<Candidate> {
         let eligible = self.index.places_until(self.path_m[keyframe] - GAP_M);
         let Some(descriptor) = self.index.descriptor(keyframe).filter(|_| eligible > 0) else {
@@ -223,7 +218,6 @@ impl LoopCloser {
         Ok(())
     }
 
-    /// Registers the two submaps, and tests the motion against the odometry.
     fn verify(
         &mut self,
         keyframe: usize,

@@ -1,5 +1,3 @@
-//! Configuration of SLAM.
-
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};

@@ -8,12 +8,10 @@ use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
 use nalgebra::Matrix3;
 
-/// A loop is consistent with a set if it agrees with this share of it.
 const MOST: f64 = 0.9;
 /// Loops that speak for all, at most.
 const SPEAKERS: usize = 256;
 
-/// The odometry between any two keyframes.
 #[derive(Default)]
 pub struct DeadReckoning {
     poses: Vec<Pose>,
@@ -38,7 +36,6 @@ impl DeadReckoning {
         self.covariances.push(covariance);
     }
 
-    /// Returns the motion from keyframe `from` to keyframe `to`, which may be the earlier one.
     pub fn motion(&self, from: usize, to: usize) -> UncertainMotion {
         let (first, last) = (from.min(to), from.max(to));
         let to_pose = lever(self.poses[to].translation.x, self.poses[to].translation.y);
@@ -51,7 +48,6 @@ impl DeadReckoning {
         }
     }
 
-    /// Returns whether two loops and the odometry between their ends make a cycle.
     fn agree(&self, a: &Constraint, b: &Constraint) -> bool {
         let predicted = self
             .motion(b.from, a.from)

@@ -1,5 +1,3 @@
-//! The correction of poses between keyframes.
-
 use gyre_geometry::{Pose, interpolate};
 
 /// Corrects the poses of all scans like the keyframes around them: a scan continues by odometry
@@ -16,8 +14,6 @@ struct Anchor {
 }
 
 impl Correction {
-    /// Takes the sequence numbers of keyframes with their poses by odometry, and the corrected
-    /// poses.
     pub(crate) fn new(keyframes: impl Iterator<Item = (u64, Pose)>, poses: &[Pose]) -> Self {
         let anchor = |((seq, odometry), pose): ((u64, Pose), &Pose)| Anchor {
             seq,

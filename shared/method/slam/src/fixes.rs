@@ -22,7 +22,6 @@ const LEAST_WEIGHT: f64 = 0.25;
 /// The share of the fixes that must agree with each other and with the rest.
 const LEAST_SHARE: f64 = 0.5;
 
-/// Why no fix of a drive is used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FixRefusal {
     /// None was measured between two keyframes.
@@ -58,7 +57,6 @@ pub struct FixCounts {
     pub taken: usize,
 }
 
-/// The fixes of a drive, and those that its keyframes have.
 #[derive(Clone, Debug, Default)]
 pub struct Fixes {
     fixes: Vec<GnssFix>,
@@ -72,7 +70,6 @@ pub struct Fixes {
     refusal: Option<FixRefusal>,
 }
 
-/// A keyframe of the odometry.
 #[derive(Clone, Copy)]
 pub(crate) struct Stamped {
     pub stamp_ns: i64,
@@ -115,7 +112,6 @@ impl Fixes {
         &self.taken
     }
 
-    /// Returns the number of fixes that the keyframes have.
     pub fn taken(&self) -> usize {
         self.taken.len()
     }
@@ -219,7 +215,6 @@ impl Fixes {
         };
     }
 
-    /// The delay of the fixes.
     fn offset(&self, keyframes: &[Stamped]) -> Option<ClockOffset> {
         let place = |fix: &GnssFix| Pose::translation(fix.east_m, fix.north_m);
         let fixes = Trajectory {

@@ -1,5 +1,3 @@
-//! A keyframe, and its form in a file.
-
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
 use gyre_storage::{LogError, LogMagic};
@@ -33,7 +31,6 @@ pub struct Keyframe {
     pub points: Vec<SparsePoint>,
 }
 
-/// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {

@@ -1,5 +1,3 @@
-//! The making of keyframes from the poses of odometry.
-
 use std::mem;
 
 use gyre_estimation::places::KeyframeSelector;

@@ -1,5 +1,3 @@
-//! The candidates of a keyframe with their verdicts, and their form in a file.
-
 use bytemuck::{Pod, Zeroable};
 use gyre_estimation::Constraint;
 pub use gyre_estimation::places::VerificationOutcome as LoopOutcome;
@@ -8,7 +6,6 @@ use gyre_storage::LogMagic;
 
 use crate::{Record, exact::ExactMotion};
 
-/// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
     pub place: usize,
@@ -19,9 +16,7 @@ pub struct LoopCandidate {
     /// The correlation of the submaps at the motion, and of the search before the alignment: the
     /// best one and the runner-up.
     pub correlation: f64,
-    /// See [`Self::correlation`].
     pub searched: f64,
-    /// See [`Self::correlation`].
     pub runner_up: f64,
     /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
     /// rejected before.

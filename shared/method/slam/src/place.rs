@@ -1,5 +1,3 @@
-//! The place of a keyframe, and its form in a file.
-
 use bytemuck::{Pod, Zeroable};
 use gyre_estimation::places::Descriptor;
 use gyre_geometry::UncertainMotion;

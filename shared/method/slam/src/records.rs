@@ -9,7 +9,6 @@ use std::{
 
 use gyre_storage::{Log, LogError, LogMagic, LogReader};
 
-/// An entry of a file of records.
 pub trait Record: Sized {
     const FILE: &'static str;
     /// The start of the file, with the version of the records.
@@ -40,7 +39,6 @@ impl<R: Record> RecordLog<R> {
         Self::open_file(&records_path::<R>(out))
     }
 
-    /// As [`open`](Self::open), of a file that is not in the results of a run.
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let log = Log::open(path, R::MAGIC)?;
         let mut buffer = Vec::new();
@@ -76,7 +74,6 @@ impl<R: Record> RecordLog<R> {
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
 
-    /// Appends a record. A reader sees it when this returns.
     pub fn append(&mut self, record: &R) -> Result<(), LogError> {
         self.buffer.clear();
         record.encode(&mut self.buffer);
@@ -127,7 +124,6 @@ impl<R: Record> RecordReader<R> {
         Self::open_file(&records_path::<R>(out))
     }
 
-    /// As [`open`](Self::open), of a file that is not in the results of a run.
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
             log: LogReader::open(path, R::MAGIC)?,
@@ -188,7 +184,7 @@ impl<R: Record> RecordReader<R> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::{Place, Query};
+    use crate::Query;
 
     fn query(keyframe: usize) -> Query {
         Query {
@@ -228,18 +224,6 @@ mod tests {
         assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (2, false));
         assert_eq!(reader.unchanged(), 1);
         assert_eq!(log.read(1).unwrap(), query(7));
-    }
-
-    #[test]
-    fn places_are_no_queries() {
-        let out = tempfile::tempdir().unwrap();
-        let mut log = RecordLog::open(out.path()).unwrap();
-        log.append(&query(0)).unwrap();
-        drop(log);
-        let path = |file| out.path().join("journal").join(file);
-        std::fs::rename(path(Query::FILE), path(Place::FILE)).unwrap();
-        let refused = RecordReader::<Place>::open(out.path()).map(drop);
-        assert!(matches!(refused, Err(LogError::Foreign { .. })));
     }
 
     #[test]

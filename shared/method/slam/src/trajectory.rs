@@ -1,5 +1,3 @@
-//! The poses of keyframes, estimated from odometry and loops.
-
 use gyre_estimation::{
     Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter, Verdict,
     WeightedPosition,
@@ -259,7 +257,6 @@ impl TrajectoryEstimator {
         Ok(self.scale)
     }
 
-    /// Returns all loops, by the later keyframe, then by the earlier one.
     pub fn loops(&self) -> &[JudgedLoop] {
         &self.loops
     }
@@ -273,8 +270,6 @@ impl TrajectoryEstimator {
         &self.fixes
     }
 
-    /// Returns the fixes that the keyframes have, with their weights as of the last solution; none
-    /// if they were refused, and in the filter.
     pub fn positions(&self) -> Vec<WeightedPosition> {
         let graph = self.estimator.graph();
         graph.map_or(Vec::new(), |graph| graph.positions().collect())
@@ -329,7 +324,6 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Judges all loops: by the odometry, then by each other.
     fn judge_all(&mut self) {
         self.loops
             .iter_mut()

@@ -9,7 +9,6 @@ use crate::consistency::DeadReckoning;
 
 /// Lengths of the stretches whose odometry is compared with the corrected poses, in keyframes.
 const LENGTHS: [usize; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 500];
-/// Stretches of one length, at most.
 const STRETCHES: usize = 150;
 /// The weight of the prior 1 in residuals: a few loops change the scale little.
 const PRIOR: f64 = 15.0;

@@ -1,5 +1,3 @@
-//! The verdicts of the estimate of the trajectory on loops.
-
 use std::fmt;
 
 use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
@@ -28,7 +26,6 @@ impl fmt::Display for LoopVerdict {
 /// A loop that was accepted by the [`LoopCloser`](crate::LoopCloser), and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JudgedLoop {
-    /// The loop, from the earlier to the later keyframe, in its group.
     pub constraint: Constraint,
     /// Chi-square against the odometry between its keyframes. The filter does not use it: it tests
     /// against the estimate.

@@ -10,7 +10,6 @@ fn closer() -> LoopCloser {
     LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), 400).unwrap()
 }
 
-/// The logs of a closer: its places and its queries, encoded.
 #[derive(Clone, Default, PartialEq)]
 struct Logs {
     places: Vec<Vec<u8>>,
@@ -32,7 +31,6 @@ impl Logs {
         }
     }
 
-    /// Continues with the remaining keyframes of the drive.
     fn complete(mut self, drive: &Drive) -> Self {
         let mut closer = closer();
         for place in &self.places {

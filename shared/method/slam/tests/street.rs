@@ -31,7 +31,6 @@ fn street() -> Vec<(Point2<f64>, f32)> {
     (0..3000).map(|_| post()).collect()
 }
 
-/// Returns the points of the street that a sensor at `at` sees.
 fn seen(street: &[(Point2<f64>, f32)], at: &Pose) -> Vec<SparsePoint> {
     let local = street
         .iter()

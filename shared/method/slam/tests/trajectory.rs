@@ -59,7 +59,6 @@ fn odometry(drive: &Drive, kind: EstimatorKind) -> TrajectoryEstimator {
     estimator
 }
 
-/// Takes the loops one by one.
 fn update(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
     let mut estimator = odometry(drive, kind);
     for it in loops {

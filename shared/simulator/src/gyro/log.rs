@@ -41,7 +41,6 @@ pub(crate) fn samples(
     Some((0..count).filter_map(sample).collect())
 }
 
-/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

@@ -1,5 +1,3 @@
-//! Laps round a block of houses.
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use gyre_geometry::Pose;

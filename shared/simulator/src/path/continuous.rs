@@ -1,5 +1,3 @@
-//! The trait of all paths.
-
 use gyre_geometry::{Pose, Twist};
 use nalgebra::Vector2;
 

@@ -1,5 +1,3 @@
-//! Paths along recorded trajectories.
-
 use std::path::Path;
 
 use gyre_datasets::{TrajectoryError, parse_trajectory, read_trajectory};

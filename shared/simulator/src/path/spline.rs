@@ -10,7 +10,6 @@ const BAND: usize = SUPPORT;
 /// samples.
 const TINY: f64 = 1e-9;
 
-/// A sample of a curve in `D` coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const D: usize> {
     /// The parameter of the curve: time or path length.
@@ -116,7 +115,6 @@ fn basis(f: f64) -> [f64; SUPPORT] {
     [g.powi(5), outer(g), inner(g), inner(f), outer(f), f.powi(5)].map(|b| b / 120.0)
 }
 
-/// The derivatives of [`basis`].
 fn basis_slope(f: f64) -> [f64; SUPPORT] {
     let g = 1.0 - f;
     let inner = |f: f64| 50.0 + f * (40.0 + f * (-60.0 + f * (-80.0 + f * 50.0)));

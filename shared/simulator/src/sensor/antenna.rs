@@ -1,5 +1,3 @@
-//! The two-way antenna pattern in azimuth.
-
 use crate::interpolate::interpolate;
 
 /// Two-way side lobes: dB below the main lobe by the angle in half-power widths.

@@ -1,5 +1,3 @@
-//! The echoes of each azimuth.
-
 use std::ops::Range;
 
 use super::antenna::Antenna;
@@ -8,7 +6,6 @@ use super::sweep_poses::{MARGIN, SweepPoses};
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct BeamIndex {
-    /// The azimuths whose beams each echo lies in.
     spans: Vec<Range<usize>>,
     /// The echoes of azimuth `a` are `numbers[starts[a]..starts[a + 1]]`.
     starts: Vec<usize>,
@@ -53,7 +50,6 @@ impl BeamIndex {
         }
     }
 
-    /// The numbers of an azimuth's echoes, in the order of the echoes.
     pub fn echoes(&self, azimuth: usize) -> &[u32] {
         &self.numbers[self.starts[azimuth]..self.starts[azimuth + 1]]
     }

@@ -1,5 +1,3 @@
-//! The radar: the section `[simulation.sensor]`.
-
 use serde::{Deserialize, Serialize};
 
 use crate::profile::{Profile, Receiver, Sampling};

@@ -9,13 +9,11 @@ use crate::body::{Moving, Scatterer};
 use crate::profile::Receiver;
 use crate::world::World;
 
-/// Echoes with less power are neglected.
 pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
 const NEAREST_M: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Position at the middle of the sweep, world frame.
     position: Point2<f64>,
     /// Velocity, metres a second, world frame.
     pub velocity: Vector2<f64>,
@@ -26,7 +24,6 @@ pub(super) struct Echo {
 }
 
 impl Echo {
-    /// The position at the time of an azimuth.
     pub fn place(&self, azimuth_pose: &AzimuthPose) -> Point2<f64> {
         self.position + self.velocity * azimuth_pose.time_s
     }

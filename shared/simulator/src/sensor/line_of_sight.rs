@@ -94,7 +94,6 @@ impl LineOfSight {
             .product()
     }
 
-    /// The walls along the ray nearest to an azimuth, nearest first.
     fn ray(&self, azimuth: f64) -> &[WallHit] {
         // The cast turns negative numbers into zero.
         let ray = ((azimuth + MARGIN as f64) * RAYS as f64 + 0.5) as usize;

@@ -17,7 +17,6 @@ pub(super) struct AzimuthPose {
     pub velocity: Vector2<f64>,
     /// Direction of azimuth zero, radians: the heading less the encoder's error.
     pub heading_rad: f64,
-    /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
     pub time_s: f64,
 }

@@ -1,5 +1,3 @@
-//! The time of a sweep.
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SweepTime {
     pub start_us: i64,

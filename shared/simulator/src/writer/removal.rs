@@ -1,5 +1,3 @@
-//! Removes a dataset that was written here, and nothing else.
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -46,7 +44,6 @@ fn files_of(drive: &SimulatedDrive) -> BTreeSet<PathBuf> {
         .collect()
 }
 
-/// Lists the files in a folder and in those below it, relative to it.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, SimulatorError> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(next) = folders.pop() {

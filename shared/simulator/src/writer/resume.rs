@@ -67,7 +67,6 @@ pub(super) fn missing(
     Ok(missing)
 }
 
-/// Lists the complete images and removes incomplete ones.
 fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     let listing = StorageError::at("list", folder);
     let mut names = BTreeSet::new();

@@ -1,5 +1,3 @@
-//! A constant beside the configured one.
-
 use std::{fmt, iter};
 
 use super::Configured;
@@ -14,13 +12,11 @@ const PATH_ERROR: f64 = 1e-3;
 /// Key, name, unit for printing, and factor to that unit.
 pub(crate) type Label = (&'static str, &'static str, &'static str, f64);
 
-/// A constant that the configuration has a key for.
 #[derive(Clone)]
 pub struct Constant {
     /// Key in the section `[dataset]`, name, unit for printing, and factor to that unit.
     pub(crate) label: Label,
     pub configured: f64,
-    /// The value by the drive.
     pub found: Estimate,
     /// The standard deviation above which a drive adds nothing to the prior knowledge about any
     /// radar.
@@ -29,7 +25,6 @@ pub struct Constant {
     pub(super) has_settled: bool,
     /// It is written into the section for the configuration.
     pub is_proposed: bool,
-    /// The data that it rests on.
     pub basis: String,
 }
 
@@ -62,7 +57,6 @@ impl Constant {
     }
 }
 
-/// Puts the estimate of a fact beside its configured value.
 pub(super) fn constant(
     label: Label,
     configured: f64,

@@ -22,7 +22,7 @@ fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
         constants: vec![offset],
         resolution: Err("as configured".to_owned()),
         min_range_m: None,
-        others: Vec::new(),
+        reflections: None,
     }
 }
 

@@ -1,5 +1,3 @@
-//! The angles that a gyro turns by about its axes.
-
 use gyre_radar::median;
 use gyre_samples::Sample;
 use nalgebra::Vector3;
@@ -13,7 +11,6 @@ pub(crate) struct Angles {
     gaps: Vec<usize>,
 }
 
-/// The measurement of a gyro over a time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turned {
     /// Angles about x, y and z, rad.
@@ -54,7 +51,6 @@ impl Angles {
         median(steps).unwrap_or_default()
     }
 
-    /// Returns when the log begins, s; `None` without samples.
     pub(crate) fn begins_s(&self) -> Option<f64> {
         self.stamps_s.first().copied()
     }

@@ -22,12 +22,9 @@ type Parameters = Vector4<f64>;
 /// Which of them are solved for.
 type Free = [bool; 4];
 
-/// The parameters by all turns together.
 pub(crate) struct Fit {
     /// Scale, bias (rad/s) and offset (s) without a drift.
     pub(crate) parameters: [Estimate; 3],
-    /// The offset of each half of the drive, s.
-    pub(crate) halves_s: [Option<f64>; 2],
     pub(crate) drift: Estimate,
     pub(crate) turns: usize,
 }
@@ -67,10 +64,8 @@ impl Fit {
         };
         let estimates = |free: Free| jackknife(|left_out| without(left_out, free));
         let [scale, bias, late, _] = estimates(without_drift)?;
-        let halves = [&turns[..count / 2], &turns[count / 2..]];
         Some(Self {
             parameters: [scale, bias, late],
-            halves_s: halves.map(|half| Some(problem.solve(half, without_drift)?[2])),
             drift: estimates(with_drift).map_or(Estimate::UNKNOWN, |all| all[3]),
             turns: count,
         })

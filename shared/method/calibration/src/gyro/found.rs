@@ -17,8 +17,6 @@ const DRIFT_SIGMAS: f64 = 3.0;
 pub struct GyroCalibration {
     pub up: UpAxis,
     pub delay_s: Estimate,
-    /// The delay in each half of the drive, if the half determines it, s.
-    pub halves_s: [Option<f64>; 2],
     /// Change of that time, s/s.
     pub drift: Estimate,
     /// True yaw rate over the measured one.
@@ -48,17 +46,14 @@ impl GyroCalibration {
             mean.bias_radps = mean.bias_radps.combined(&other.bias_radps);
             mean.correlation = mean.correlation.min(other.correlation);
             mean.turns += other.turns;
-            mean.halves_s = [None; 2];
         }
         Ok(mean)
     }
 
-    /// Returns whether the clock of the gyro drifts against the radar's.
     pub fn drifts(&self) -> bool {
         self.drift.value.abs() > DRIFT_SIGMAS * self.drift.sigma
     }
 
-    /// Returns whether the drive adds to the prior knowledge about the scale of any gyro.
     fn tells_scale(&self) -> bool {
         self.scale.sigma < USEFUL_SCALE_SIGMA
     }
@@ -105,14 +100,6 @@ impl GyroCalibration {
             false => String::new(),
         };
         let (late, scale, drift) = (&self.delay_s, &self.scale, &self.drift);
-        let halves = match self.halves_s {
-            [Some(first), Some(second)] => {
-                format!(
-                    "{first:.4} s in the first half of the drive, {second:.4} s in the second; "
-                )
-            }
-            _ => String::new(),
-        };
         let drifts = match self.drifts() {
             true => ": one delay_s does not do for a long drive",
             false => "",
@@ -124,14 +111,26 @@ impl GyroCalibration {
         [
             format!(
                 "{:<21} {}{axis}\n{:<21} {} turns of a second, correlation {:.4}",
-                "gyro, axis up", self.up.name(), "", self.turns, self.correlation
+                "gyro, axis up",
+                self.up.name(),
+                "",
+                self.turns,
+                self.correlation
             ),
             format!(
-                "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} {halves}drift {:.0} \u{b1} {:.0} ppm{drifts}",
-                "gyro, late by", late.value, late.sigma, late.verdict(used(configured.delay_s)), "",
-                drift.value * 1e6, drift.sigma * 1e6
+                "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} drift {:.0} \u{b1} {:.0} ppm{drifts}",
+                "gyro, late by",
+                late.value,
+                late.sigma,
+                late.verdict(used(configured.delay_s)),
+                "",
+                drift.value * 1e6,
+                drift.sigma * 1e6
             ),
-            format!("{:<21} {:.4} \u{b1} {:.4}{tells}", "gyro, scale", scale.value, scale.sigma),
+            format!(
+                "{:<21} {:.4} \u{b1} {:.4}{tells}",
+                "gyro, scale", scale.value, scale.sigma
+            ),
             format!(
                 "{:<21} {:.4} \u{b1} {:.4} deg/s in this drive",
                 "gyro, bias",

@@ -51,7 +51,6 @@ impl Peak {
         peak.axis != self.axis || (peak.delay_s - self.delay_s).abs() > PEAK_S
     }
 
-    /// The highest correlation within a step.
     fn refined(&self, turns: &[Turn], angles: &Angles) -> Self {
         let near = (-FINE..=FINE).map(|k| self.delay_s + STEP_S * f64::from(k) / f64::from(FINE));
         let near = near.map(|delay_s| correlations(turns, angles, delay_s)[self.axis]);
@@ -69,13 +68,16 @@ impl Peak {
     }
 }
 
-/// Why no offset is found.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum NoPeak {
-    /// The log covers so few turns at any offset.
-    Apart { turns: usize },
+    Apart {
+        turns: usize,
+    },
     /// Two offsets or axes fit about as well.
-    Ambiguous { best: Peak, rival: Peak },
+    Ambiguous {
+        best: Peak,
+        rival: Peak,
+    },
 }
 
 /// Finds the offset and the axis of the highest correlation.
@@ -145,7 +147,6 @@ fn independent(turns: &[Turn]) -> f64 {
     turning * (interval_s / (INDEPENDENT * BASELINE_S)).min(1.0)
 }
 
-/// The correlations with the angles about each axis at one offset.
 fn correlations(turns: &[Turn], angles: &Angles, delay_s: f64) -> [Peak; 3] {
     let common = turns.iter().filter_map(|turn| {
         let turned = angles.between(turn.from_s + delay_s, turn.to_s + delay_s)?;

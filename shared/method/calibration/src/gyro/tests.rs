@@ -163,9 +163,6 @@ proptest! {
         assert_within(found.scale, scale, 0.01, "scale");
         assert_within(found.bias_radps, bias_radps, 1e-3, "bias");
         prop_assert!(!found.drifts(), "{:?}", found.drift);
-        for half in found.halves_s {
-            prop_assert!((half.unwrap() - delay_s).abs() < 0.05, "{:?}", found.halves_s);
-        }
     }
 }
 
@@ -175,8 +172,6 @@ fn a_clock_that_drifts_is_told() {
     let found = drive.calibrated().unwrap();
     assert_within(found.drift, 5e-4, 1e-4, "drift");
     assert!(found.drifts());
-    let [first, second] = found.halves_s.map(Option::unwrap);
-    assert!((second - first - 0.075).abs() < 0.02, "{first} {second}");
     let table = found.table(&GyroConfig::default());
     assert!(
         table.contains("one delay_s does not do for a long drive"),

@@ -1,9 +1,6 @@
-//! The turns of the radar, or the distances that it has driven.
-
 /// Time over which a turn is taken, s: longer than a scan, to average the noise of motions.
 pub(crate) const BASELINE_S: f64 = 1.0;
 
-/// A turn of the radar, or a distance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     /// Start and end, s since the first scan.

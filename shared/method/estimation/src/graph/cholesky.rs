@@ -16,7 +16,6 @@ pub(super) struct Cholesky {
     columns: Lists<usize>,
     /// Of each column of the factor: the rows of its blocks below the diagonal, ascending.
     rows: Lists<usize>,
-    /// The blocks below the diagonal, by columns as in `rows`.
     below: Vec<Matrix3<f64>>,
     diagonal: Vec<Matrix3<f64>>,
     /// A row of the matrix, transposed; zero between the steps.
@@ -26,7 +25,6 @@ pub(super) struct Cholesky {
 /// A block of the matrix, left of the diagonal in the order of elimination.
 struct Entry {
     column: usize,
-    /// Number of the block within the matrix.
     number: usize,
     /// The block is stored with its row as the column.
     is_transposed: bool,
@@ -137,14 +135,12 @@ impl Cholesky {
         }
     }
 
-    /// Returns the rows and the blocks of a column of the factor, below the diagonal.
     fn column(&self, column: usize) -> impl Iterator<Item = (usize, &Matrix3<f64>)> {
         let blocks = &self.below[self.rows.starts[column]..self.rows.starts[column + 1]];
         self.rows.of(column).iter().copied().zip(blocks)
     }
 }
 
-/// Returns where each of `count` lists starts that take these items, and where the last one ends.
 fn starts(count: usize, lists: impl Iterator<Item = usize>) -> Vec<usize> {
     let mut starts = vec![0; count + 1];
     lists.for_each(|list| starts[list + 1] += 1);
@@ -169,7 +165,6 @@ fn elimination_order(blocks: usize, pairs: &[[usize; 2]]) -> [Vec<usize>; 2] {
     }
 }
 
-/// Returns, of each step, the blocks of the matrix left of the diagonal.
 fn left_of_diagonal(pairs: &[[usize; 2]], place: &[usize]) -> Lists<Entry> {
     let mut entries: Vec<_> = pairs
         .iter()

@@ -1,5 +1,3 @@
-//! The cost of a constraint, and its linearisation.
-
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,7 +13,6 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Returns `None` if the covariance is not positive definite.
     pub fn new(ends: Ends, motion: UncertainMotion) -> Option<Self> {
         Some(Self {
             ends,

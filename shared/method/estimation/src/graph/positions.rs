@@ -5,7 +5,7 @@ use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix2x3, Matrix3, Vector2};
 
 use super::edge::{Ends, Linear};
-use super::solve::Weights;
+use super::solve::{COARSE, Weights};
 use super::{PoseGraph, State};
 use crate::EstimationError;
 use crate::constraint::{CHI_SQUARE_99_9_PLANE, keyframe_exists};
@@ -16,8 +16,6 @@ use crate::kernel::Kernel;
 const MAX_YAW_SIGMA: f64 = 0.2;
 /// Scales of the kernel, each half of the one before, at most: from 10^18 times the gate.
 const MAX_SCALES: usize = 60;
-/// The tolerance of the descents between them.
-const COARSE: f64 = 0.1;
 
 /// A measured position of a point that a keyframe carries, as of an antenna.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +25,6 @@ pub struct Position {
     pub lever_m: Vector2<f64>,
     /// The measured position in the frame of the positions, m.
     pub position_m: Vector2<f64>,
-    /// Variance along each axis, m².
     pub variance_m2: f64,
     /// The factor of its information, above 0 up to 1: less than 1 if its error depends on other
     /// errors.

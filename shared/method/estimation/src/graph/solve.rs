@@ -14,15 +14,14 @@ use crate::relative::corrected;
 /// Above this share of the predicted decrease of the cost the trust radius grows.
 const GOOD_GAIN: f64 = 0.75;
 
-/// Below this share of the predicted decrease the trust radius shrinks.
 const POOR_GAIN: f64 = 0.25;
 
 /// A shorter step, in m and rad over all poses, goes nowhere: the poses are at a minimum but for
 /// rounding.
 const SHORTEST_STEP: f64 = 1e-12;
 
-/// The tolerance of the first descent, which only has to bring the poses near their place.
-const COARSE: f64 = 0.1;
+/// The tolerance of descents that only have to bring the poses near their place.
+pub(super) const COARSE: f64 = 0.1;
 
 /// True if loops keep their weights while the poses are moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +108,6 @@ impl PoseGraph {
         }
     }
 
-    /// Returns the factorised equations at the present poses.
     pub(super) fn factorised(&mut self) -> Result<&System, EstimationError> {
         if !self.factorised {
             self.linearise(Weights::Kept)?;

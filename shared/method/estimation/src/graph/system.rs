@@ -1,5 +1,3 @@
-//! The normal equations of a pose graph.
-
 use std::collections::TryReserveError;
 
 use nalgebra::{DVector, Matrix3};
@@ -13,7 +11,6 @@ pub(super) struct System {
     /// Of each edge in the order given: the number of the block below the diagonal. `None` for an
     /// edge of pose 0.
     numbers: Vec<Option<usize>>,
-    /// Column and row of each block below the diagonal.
     pairs: Vec<[usize; 2]>,
     below: Vec<Matrix3<f64>>,
     diagonal: Vec<Matrix3<f64>>,

@@ -1,5 +1,3 @@
-//! The descriptor of a place.
-
 use gyre_radar::fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
 use ndarray::Array2;
@@ -48,7 +46,6 @@ impl Default for Descriptor {
 
 impl Descriptor {
     pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
-    /// Size of a descriptor in a file, bytes.
     pub const BYTES: usize = Self::SIEVE_BYTES + SPECTRUM_BYTES;
 
     /// Appends the form in a file: the sieve, then the spectrum.

@@ -58,7 +58,6 @@ impl PlaceIndex {
         })
     }
 
-    /// Decodes the bytes of a file, or returns what is wrong with them.
     fn decode(bytes: &[u8]) -> Result<Self, String> {
         let damaged = |reason: String| {
             format!("is damaged: {reason}; build the places again from their keyframes")

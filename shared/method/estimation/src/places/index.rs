@@ -1,5 +1,3 @@
-//! The descriptors of all places, and the search for similar ones.
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -28,7 +26,6 @@ pub struct Candidate {
     pub yaw_rad: f64,
 }
 
-/// A place whose path does not continue from the place before.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
@@ -56,7 +53,6 @@ pub struct PlaceIndex {
 }
 
 struct Query {
-    /// Distance in the sieve, and place.
     distances: Vec<(u32, u32)>,
     inverse: Arc<dyn ComplexToReal<f32>>,
     cross: Vec<Complex32>,
@@ -72,14 +68,6 @@ impl Default for PlaceIndex {
 }
 
 impl PlaceIndex {
-    /// Memory of a place, bytes: its descriptor with its norm, its id and path, and its distance in
-    /// a query.
-    pub const BYTES_PER_PLACE: usize = Descriptor::SIEVE_BYTES
-        + SPECTRUM_BYTES
-        + size_of::<f32>()
-        + size_of::<PathPoint>()
-        + size_of::<(u32, u32)>();
-
     /// Creates an empty index with memory for a number of places. More places make it grow.
     pub fn with_capacity(places: usize) -> Self {
         Self {

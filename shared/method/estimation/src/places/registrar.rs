@@ -44,7 +44,6 @@ impl Registrar {
         })
     }
 
-    /// The rasters that it registers, `RASTER_CELLS` a side.
     pub const CELLS: usize = RASTER_CELLS;
 
     pub fn set_later(&mut self, submap: &Submap) {
@@ -69,7 +68,6 @@ impl Registrar {
             .expect(PLANNED)
     }
 
-    /// The masked correlation at a motion.
     pub fn correlation(&mut self, motion: &Pose, seen: Option<ArrayView2<'_, f32>>) -> f64 {
         let (later, earlier) = (self.later.view(), self.earlier.view());
         self.correlation

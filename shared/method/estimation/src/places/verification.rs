@@ -1,5 +1,3 @@
-//! Verification of loops by registration.
-
 use std::f64::consts::PI;
 
 use gyre_geometry::{UncertainMotion, pose, wrap_angle};
@@ -7,7 +5,6 @@ use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 
 use super::{Candidate, Registrar};
 
-/// Smallest correlation of a loop that is accepted.
 const MIN_CORRELATION: f64 = 0.65;
 /// Smallest difference of the correlations of an accepted loop and of any other motion between the
 /// two places.
@@ -16,7 +13,6 @@ const MIN_MARGIN: f64 = 0.1;
 /// most.
 const COARSE_LOSS: f64 = 0.15;
 
-/// The verdict on a candidate, and the reason of a rejection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VerificationOutcome {
     /// The two submaps show the same place.
@@ -25,7 +21,6 @@ pub enum VerificationOutcome {
     LowCorrelation,
     /// Another motion correlates nearly as well: less than 0.1 below.
     Ambiguous,
-    /// The points of the two keyframes do not determine the motion.
     Undetermined,
     /// The motion contradicts the odometry between the two keyframes, which the verifier does not
     /// know.
@@ -46,17 +41,14 @@ pub struct Verification {
     /// runner-up: another translation, or the best at the other angle. Their difference is the
     /// margin.
     pub searched: f64,
-    /// See [`Self::searched`].
     pub runner_up: f64,
     /// The yaw differs from the candidate's by half a turn.
     pub half_turn: bool,
 }
 
-/// Registers the submap of a query with the submaps of candidates.
 pub struct LoopVerifier(Registrar);
 
 impl LoopVerifier {
-    /// As [`Registrar::new`].
     pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         Ok(Self(Registrar::new(refinement, capacity)?))
     }

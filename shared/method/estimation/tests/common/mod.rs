@@ -22,7 +22,6 @@ pub fn covariance([x, y, yaw]: Sigma) -> Matrix3<f64> {
     Matrix3::new(x * x, xy, 0.0, xy, y * y, 0.0, 0.0, 0.0, yaw * yaw)
 }
 
-/// Returns the motion with a covariance, without error.
 pub fn exact(motion: Pose, sigma: Sigma) -> UncertainMotion {
     UncertainMotion {
         motion,
@@ -30,7 +29,6 @@ pub fn exact(motion: Pose, sigma: Sigma) -> UncertainMotion {
     }
 }
 
-/// A drive whose true poses are known.
 pub struct Drive {
     pub truth: Vec<Pose>,
     pub odometry: Vec<Constraint>,
@@ -57,7 +55,6 @@ impl Drive {
         drive
     }
 
-    /// Measures the pose of `to` in the frame of `from`, with an error of its covariance.
     pub fn measure(&mut self, from: usize, to: usize, sigma: Sigma) -> UncertainMotion {
         let covariance = covariance(sigma);
         let normal: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut self.random));
@@ -69,12 +66,10 @@ impl Drive {
         }
     }
 
-    /// Measures a loop.
     pub fn close(&mut self, from: usize, to: usize) -> Constraint {
         Constraint::closing(from, to, self.measure(from, to, LOOP))
     }
 
-    /// Returns the filter after all odometry.
     pub fn filter(&self) -> TrajectoryFilter {
         let mut filter = TrajectoryFilter::new(self.truth[0], TrajectoryFilter::MAX_KEYFRAMES);
         for motion in &self.odometry {
@@ -84,7 +79,6 @@ impl Drive {
     }
 }
 
-/// Returns the poses that the odometry leads to.
 pub fn dead_reckoning(start: Pose, odometry: &[Constraint]) -> Vec<Pose> {
     let mut poses = vec![start];
     for constraint in odometry {
@@ -101,7 +95,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Solves for the poses with `steps` steps of Gauss-Newton from `poses`.
     pub fn solve(poses: &[Pose], constraints: &[Constraint], steps: usize) -> Self {
         let mut poses = poses.to_vec();
         let mut covariance = DMatrix::zeros(0, 0);
@@ -117,7 +110,6 @@ impl Batch {
     }
 }
 
-/// Returns a pose with x, y and yaw changed.
 pub fn moved(from: &Pose, by: &Vector3<f64>) -> Pose {
     let [x, y, yaw] = xy_yaw(from);
     pose(x + by.x, y + by.y, yaw + by.z)

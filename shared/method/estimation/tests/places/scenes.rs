@@ -26,7 +26,6 @@ pub fn place(seed: u64) -> Vec<[f64; 2]> {
     points
 }
 
-/// The place as seen from `sensor`.
 pub fn seen(place: &[[f64; 2]], sensor: &Pose) -> Submap {
     let points: Vec<SparsePoint> = place
         .iter()

@@ -1,5 +1,3 @@
-//! GeoTIFF.
-
 use std::{io::Cursor, path::Path};
 
 use tiff::{
@@ -20,7 +18,6 @@ const PROJECTED_CRS: u16 = 3072;
 const LINEAR_UNITS: u16 = 3076;
 const METRE: u16 = 9001;
 const LOCAL: &str = "Gyre map frame|";
-/// The tag that GDAL uses for the names of bands, and these names.
 const GDAL_METADATA: Tag = Tag::Unknown(42_112);
 const BANDS: &str = "<GDALMetadata>\
     <Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">evidence</Item>\

@@ -30,7 +30,6 @@ impl Pen {
 }
 
 const GLYPHS: RasterHeight = RasterHeight::Size32;
-/// Least width of a picture, in units of length.
 const MIN_WIDTH: f32 = 900.0;
 const FOOTER: f32 = 44.0;
 const MARGIN: f32 = 20.0;
@@ -184,7 +183,6 @@ impl Canvas {
         self.text(right + 8.0 * self.unit, &label, colour)
     }
 
-    /// Draws an entry of the legend in the footer; returns where the next one begins.
     pub fn entry(&mut self, left: f32, colour: Colour, label: &str, text: Colour) -> f32 {
         let end = left + 22.0 * self.unit;
         let sample = [(left, self.footer), (end, self.footer)];
@@ -192,7 +190,6 @@ impl Canvas {
         self.text(end + 8.0 * self.unit, label, text)
     }
 
-    /// Writes in the footer; returns where the next entry begins.
     fn text(&mut self, left: f32, text: &str, colour: Colour) -> f32 {
         let scale = TEXT * self.unit / GLYPHS.val() as f32;
         let advance = get_raster_width(FontWeight::Regular, GLYPHS) as f32 * scale;

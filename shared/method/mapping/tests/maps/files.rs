@@ -16,7 +16,6 @@ const ORIGIN: Origin = Origin {
     heading_deg: 90.0,
 };
 
-/// The map of a wall in a folder.
 fn written(folder: &Path) -> Map {
     write_map(
         folder,

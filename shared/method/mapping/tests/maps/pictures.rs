@@ -8,7 +8,6 @@ use nalgebra::Point2;
 
 use crate::scenes::*;
 
-/// A picture that was decoded.
 struct Picture {
     width: u32,
     height: u32,
@@ -28,7 +27,6 @@ impl Picture {
         }
     }
 
-    /// The number of pixels of a colour.
     fn count(&self, is_it: impl Fn([u8; 3]) -> bool) -> usize {
         self.pixels.iter().filter(|pixel| is_it(**pixel)).count()
     }
@@ -87,7 +85,6 @@ fn the_cells_of_a_legible_picture_grow_with_the_drive() {
     assert_eq!(legible(MapOptions::default(), &lost).cell_m, 0.2);
 }
 
-/// The map of two keyframes so far from each other.
 fn far(length_m: f64) -> Evidence {
     let ends = [pose(0.0, 0.0, 0.0), pose(length_m, -length_m, 0.0)];
     let options = legible(MapOptions::default(), &ends);

@@ -38,7 +38,6 @@ pub fn evidence() -> Evidence {
     Evidence::new(&MapOptions::default(), &std::env::temp_dir()).unwrap()
 }
 
-/// A drive of so many keyframes along the x axis that see `places`.
 pub fn drive(count: u64, places: &[Point2<f64>]) -> Vec<(Pose, Keyframe)> {
     (0..count)
         .map(|seq| {
@@ -56,7 +55,6 @@ pub fn drawn(drive: &[(Pose, Keyframe)]) -> Evidence {
     evidence
 }
 
-/// All tiles with their cells.
 pub fn images(evidence: &mut Evidence) -> Vec<(TileIndex, TileImage)> {
     let tiles = evidence.tiles();
     let image = |tile| {
@@ -67,7 +65,6 @@ pub fn images(evidence: &mut Evidence) -> Vec<(TileIndex, TileImage)> {
     tiles.into_iter().map(image).collect()
 }
 
-/// The cell at a place of the map frame.
 pub fn cell(evidence: &mut Evidence, x_m: f64, y_m: f64) -> Cell {
     let side = TILE_CELLS as f64;
     let [x, y] = [x_m, y_m].map(|at_m| (at_m / evidence.options().cell_m).floor());

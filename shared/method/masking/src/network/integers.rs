@@ -26,7 +26,6 @@ pub(super) struct Integers {
     output: Output,
 }
 
-/// A step from images to an image, by their numbers.
 #[derive(Debug)]
 enum Step {
     /// The raster in steps of `step`.
@@ -62,13 +61,10 @@ enum Step {
     },
 }
 
-/// The factors of a mask.
 #[derive(Debug)]
 struct Output {
     from: usize,
-    /// Where each factor's value is.
     places: Vec<u32>,
-    /// The factor of each value.
     factors: Box<[f32; 256]>,
 }
 
@@ -146,7 +142,6 @@ fn gather(from: &Image, places: &[u32], to: &mut Image) {
     }
 }
 
-/// Borrows an image to read and a different one to write.
 fn two(images: &mut [Image], from: usize, to: usize) -> (&Image, &mut Image) {
     // Each step writes an image that did not exist before it.
     let (before, rest) = images.split_at_mut(to);

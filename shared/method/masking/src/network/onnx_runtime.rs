@@ -1,5 +1,3 @@
-//! A network in ONNX Runtime.
-
 use std::path::Path;
 
 use ndarray::{ArrayView3, ArrayViewMut3, Axis};
@@ -20,7 +18,6 @@ pub(super) struct OnnxRuntime {
 }
 
 impl OnnxRuntime {
-    /// Opens the library at `path` and loads a model.
     pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
         let environment = runtime::open(path)?;
         let session = builder(&environment, config)?

@@ -1,14 +1,12 @@
-//! A network in rten.
-
 use std::{
     fmt::Display,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::Arc,
 };
 
-use crate::networks::one_line;
+use crate::networks::{one_line, planes::by_rten};
 use ndarray::{Array3, ArrayView3, ArrayViewMut3};
-use rten::{ModelOptions, RunOptions, ThreadPool, Value};
+use rten::{ModelOptions, ThreadPool};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, GraphProto, ModelProto, ValueInfoProto,
 };
@@ -51,7 +49,6 @@ fn rejected(model: &Model, reason: &str) -> NetworkError {
 }
 
 impl Rten {
-    /// Loads a model from its file as it was [parsed](parse).
     pub fn load(model: &Model, mut file: ModelProto) -> Result<Self, NetworkError> {
         if let Some(graph) = &mut file.graph {
             state_kernel_sizes(graph);
@@ -82,17 +79,10 @@ impl Rten {
         let (scans, rows, columns) = rasters.dim();
         let shape = [1, scans, rows, columns];
         let cells: Vec<f32> = rasters.iter().copied().collect();
-        let input = Value::from_shape(shape, cells).map_err(failed)?;
-        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
-        let computed = guarded(|| self.network.run_one(input.into(), Some(options)));
-        let computed = computed.map_err(NetworkError::Run)?;
-        let (_, factors) = computed.into_shape_vec::<f32, 4>().map_err(failed)?;
+        let computed = guarded(|| by_rten(&self.network, &self.thread, shape, &cells));
+        let (_, factors) = computed.map_err(NetworkError::Run)?;
         fill(masks, &factors)
     }
-}
-
-fn failed(error: impl Display) -> NetworkError {
-    NetworkError::Run(one_line(&error.to_string()))
 }
 
 /// Calls rten, or what reads a model. A model may have what that does not expect, and then it
@@ -137,7 +127,6 @@ fn state_kernel_sizes(graph: &mut GraphProto) {
     }
 }
 
-/// Returns the name, type and shape of each input. Old files list weights among them.
 pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
     let Some(graph) = &file.graph else {
         return Vec::new();

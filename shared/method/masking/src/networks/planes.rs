@@ -80,7 +80,6 @@ impl PlanesNetwork {
         })
     }
 
-    /// Computes it, for planes row after row.
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];
@@ -120,7 +119,8 @@ fn by_onnx_runtime(
     compute().map_err(|error| one_line(error.message()))
 }
 
-fn by_rten(
+/// Computes a network in rten. Returns the shape and the values of its output.
+pub(crate) fn by_rten(
     model: &Model,
     thread: &Arc<ThreadPool>,
     shape: [usize; 4],

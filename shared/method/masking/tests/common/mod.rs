@@ -64,7 +64,6 @@ pub fn learned(card: &Path) -> MaskingConfig {
     }
 }
 
-/// The same, computed by this backend.
 pub fn learned_by(backend: Backend, card: &Path) -> MaskingConfig {
     MaskingConfig {
         backend,
@@ -82,12 +81,10 @@ pub fn unlearned() -> MaskingConfig {
     }
 }
 
-/// A masker of small rasters.
 pub fn masker(config: &MaskingConfig) -> Masker {
     Masker::new(&raster(), &PointsConfig::default(), config).unwrap()
 }
 
-/// A scan with different neighbouring powers, for a seed.
 pub fn scan(seed: usize) -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * BINS,
@@ -132,7 +129,6 @@ pub fn blank() -> Array2<f32> {
     Array2::from_elem((N, N), f32::NAN)
 }
 
-/// The raster of a sweep without the network.
 pub fn unmasked(sweep: &Sweep<'_>) -> Array2<f32> {
     let mut raster = blank();
     masker(&unlearned())
@@ -169,7 +165,6 @@ pub fn reference_masks(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
     (0..channels).map(mask).collect()
 }
 
-/// Asserts that the values are the raster times the mask.
 pub fn assert_masked(actual: &Array2<f32>, raster: &Array2<f32>, mask: &Array2<f32>) {
     assert!(
         raster.iter().filter(|power| **power > 0.0).count() > N * N / 2,

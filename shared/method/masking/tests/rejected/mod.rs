@@ -15,7 +15,6 @@ use gyre_radar::{RasterConfig, Sampling};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-/// Asserts that the network is rejected with one sentence that has all of these words.
 fn rejected(config: &MaskingConfig, raster: &RasterConfig, words: &[&str]) {
     let sentence = Network::load(config, raster).unwrap_err().to_string();
     assert!(
@@ -42,7 +41,6 @@ fn changed(name: &str, from: &str, to: &str) -> (TempDir, PathBuf) {
     (folder, copy)
 }
 
-/// Copies a model with other bytes and a card with their checksum.
 fn with_valid_checksum(bytes: &[u8]) -> (TempDir, PathBuf) {
     let sha256 = |bytes: &[u8]| -> String {
         Sha256::digest(bytes)

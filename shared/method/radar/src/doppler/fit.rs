@@ -20,7 +20,6 @@ const CUTOFF: f64 = 4.685;
 const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// The least standard deviation of a shift, cells: smaller steps are rounding.
 const MIN_SIGMA_CELLS: f64 = 0.02;
-/// The least number of bearings that determine a velocity.
 const MIN_BEARINGS: usize = 20;
 /// The highest peak of so many of them must be at the velocity. One in twenty is by chance.
 const MIN_AGREEING: f64 = 0.25;
@@ -106,7 +105,6 @@ impl Fit {
         CUTOFF * (SIGMA_OF_MEDIAN * *median).max(least)
     }
 
-    /// The change of the velocity that the weighted least squares ask for.
     fn step(&self, cutoff_mps: f64) -> Option<Vector2<f64>> {
         let (mut information, mut sum) = (Matrix2::zeros(), Vector2::zeros());
         for seen in &self.seen {
@@ -166,13 +164,11 @@ fn vote(rows: &[RowShifts]) -> Vector2<f64> {
     best.0
 }
 
-/// The weight of a residual that is this share of the cutoff.
 fn biweight(share: f64) -> f64 {
     let rest = (1.0 - share * share).max(0.0);
     rest * rest
 }
 
-/// The derivative of a residual times its weight.
 fn biweight_slope(share: f64) -> f64 {
     let square = share * share;
     match square < 1.0 {

@@ -7,9 +7,7 @@ use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
 pub(super) const REACH: usize = 31;
 /// Shifts of both ways and none, rounded up to whole vectors.
 pub(super) const WIDTH: usize = 64;
-/// The fastest vehicle, m/s.
 const MAX_SPEED_MPS: f32 = 40.0;
-/// Farther echoes are left out, m.
 const MAX_RANGE_M: f32 = 100.0;
 /// Least power of an echo above the median of all powers, in steps of half a decibel: noise, whose
 /// power is distributed exponentially, exceeds its median by 10 dB once in a thousand bins.

@@ -79,7 +79,6 @@ impl Shifts {
 }
 
 impl RowShifts {
-    /// Returns the shift by a velocity of the radar, cells.
     pub fn lag_of(&self, velocity: &Vector2<f64>) -> f64 {
         self.direction.dot(velocity) / self.mps_per_lag
     }
@@ -110,7 +109,6 @@ impl RowShifts {
         if !is_peak || here < MIN_HEIGHT || here < MIN_SHARE * self.top {
             return None;
         }
-        // The vertex of the parabola through the three.
         let [left, here, right] = [left, here, right].map(f64::from);
         let beside = 0.5 * (left - right) / (left - 2.0 * here + right);
         Some(Peak {

@@ -65,7 +65,6 @@ fn ras6(sense: Sense) -> Sensor {
     }
 }
 
-/// The scan of a sensor with this velocity: each row is shifted by its own chirp.
 fn measured(sensor: &Sensor, scatterers: &[Scatterer], velocity: Vector2<f64>) -> OwnedScan {
     let mut scan = sensor.scan();
     let geometry = scan.geometry;

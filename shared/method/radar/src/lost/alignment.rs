@@ -11,13 +11,11 @@ use passes::{pass_backward, pass_forward};
 
 /// Largest turn of the whole scan against a prediction, in azimuths to either side.
 const TURN: usize = 3;
-/// Steps of that turn for each azimuth.
 const STEPS: usize = 2;
 /// The weights of four neighbours for a value amid them: the cubic of Catmull and Rom.
 const AMID: [f32; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
 /// Azimuths beyond the turn on each side that the interpolation takes.
 const BESIDE: usize = 1;
-/// The least share of noise in the energy of a scan.
 const LEAST_NOISE: f32 = 1e-3;
 /// Likelihood of a row that is not as predicted, whatever number it has: of something that moves.
 const OUTLIER: f32 = 1e-3;
@@ -51,7 +49,6 @@ pub(super) struct Alignment {
     noise: f32,
 }
 
-/// The places of lost azimuths, as the number of rows before each.
 #[derive(Clone, Debug, Default)]
 struct Places {
     /// Logarithm of the likelihood of all that is averaged here.
@@ -223,9 +220,7 @@ fn multiply<const WIDTH: usize>(
 #[derive(Clone, Copy, Debug)]
 struct Weights {
     gain: f32,
-    /// The gain over the noise.
     scale: f32,
-    /// Steps for comparing a row.
     steps: usize,
 }
 
@@ -269,7 +264,6 @@ fn weigh<const WIDTH: usize, const MOST_STEPS: usize, const HALF: usize>(
     highest
 }
 
-/// Returns the highest score, without a chain of comparisons.
 #[inline(always)]
 fn highest_of<const STEPS: usize>(steps: &[f32; STEPS]) -> f32 {
     let higher = |a: f32, b: f32| if b > a { b } else { a };
@@ -327,12 +321,10 @@ fn exponential(x: f32) -> f32 {
     sum * f32::from_bits(power)
 }
 
-/// Azimuths for comparing a row.
 const fn azimuths(count: usize) -> usize {
     count + 2 + 2 * (TURN + BESIDE)
 }
 
-/// The `k`-th azimuth for comparing a row.
 #[inline(always)]
 const fn azimuth(row: usize, k: usize) -> isize {
     (row + k) as isize - (TURN + BESIDE) as isize

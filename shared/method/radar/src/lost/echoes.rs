@@ -11,7 +11,6 @@ use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
 const CELL_M: f32 = 0.7;
 /// Least range of a cell, m: nearer is the vehicle.
 const NEAR_M: f32 = 4.0;
-/// Mean power of a cell without a return.
 const FLOOR: f32 = 60.0;
 /// The most bins of a cell: their sum must fit 16 bits.
 const MAX_BINS_PER_CELL: usize = 128;
@@ -21,11 +20,9 @@ const BLOCK: usize = 16;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     pub azimuths: usize,
-    /// Cells per azimuth.
     pub cells: usize,
     bins_per_cell: usize,
     first_bin: usize,
-    /// Range of the first cell's centre, m.
     pub first_m: f32,
     pub cell_m: f32,
 }
@@ -55,9 +52,7 @@ pub(super) struct EchoRow<'a> {
     pub at: f32,
     /// Sine and cosine of that azimuth, if it is one.
     pub direction: [f32; 2],
-    /// The cells with a return, in order.
     pub cells: &'a [u16],
-    /// Their powers above the floor.
     pub powers: &'a [f32],
 }
 
@@ -68,7 +63,6 @@ pub(super) struct Echoes {
     rows: Vec<Row>,
     cells: Vec<u16>,
     powers: Vec<f32>,
-    /// The bins and the cells of a row that is read.
     bins: Vec<u8>,
     sums: Vec<u16>,
 }
@@ -82,7 +76,6 @@ struct Row {
 }
 
 impl Echoes {
-    /// Reads the measured rows of a scan.
     pub fn read(&mut self, scan: &PolarScan<'_>) {
         self.begin(Layout::of(scan));
         let Layout {
@@ -160,7 +153,6 @@ impl Echoes {
         self.end_row(at, [sin, cos], self.powers.len());
     }
 
-    /// Ends a row with so many echoes up to its end, if it has any.
     fn end_row(&mut self, at: f32, direction: [f32; 2], end: usize) {
         self.cells.truncate(end);
         self.powers.truncate(end);

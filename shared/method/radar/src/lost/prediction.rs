@@ -156,7 +156,6 @@ struct Frame {
     cell_m: f32,
     per_rad: f32,
     azimuths: f32,
-    /// The last cell with one behind it.
     last_cell: f32,
     width: u32,
 }

@@ -1,5 +1,3 @@
-//! A scan as if none of its azimuths had been lost.
-
 use super::{LostAzimuths, stale_rows};
 use crate::scan::PolarScan;
 

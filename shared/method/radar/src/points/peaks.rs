@@ -4,7 +4,6 @@ use super::range_cells::RangeCells;
 use crate::scan::PolarScan;
 use std::f32::consts::{PI, TAU};
 
-/// Cells per test for emptiness.
 const BLOCK: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,11 +14,9 @@ pub(super) struct Peak {
     pub power: i16,
 }
 
-/// Finds the local maxima within the width of the beam.
 #[derive(Debug)]
 pub(super) struct Beam {
     half_width_rad: f32,
-    /// Powers of one azimuth, 0 where a neighbour is stronger.
     row: Vec<i16>,
     found: Vec<Peak>,
 }

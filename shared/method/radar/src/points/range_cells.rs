@@ -7,7 +7,6 @@ use crate::scan::{PolarScan, flag};
 /// Maximum number of bins per cell: the sum must fit an i16, which every vector unit can compare.
 const MAX_BINS_PER_CELL: usize = 128;
 
-/// Maximum power of a cell.
 pub(super) const MAX_POWER: usize = MAX_BINS_PER_CELL * 255;
 
 /// Powers of the cells between minimum and maximum range: sums over the bins of a cell.
@@ -16,7 +15,6 @@ pub(super) struct RangeCells {
     pub layout: Layout,
     /// Row-major, one row per azimuth.
     powers: Vec<i16>,
-    /// The bins and the cells of an azimuth.
     bins: Vec<u8>,
     sums: Vec<u16>,
     /// True if each azimuth was measured and has a power above the floor.
@@ -26,9 +24,7 @@ pub(super) struct RangeCells {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     pub bins_per_cell: usize,
-    /// Cells below the minimum range.
     skipped: usize,
-    /// Cells per azimuth between minimum and maximum range.
     pub cells: usize,
     cell_m: f32,
     range_offset_m: f32,
@@ -90,7 +86,6 @@ impl RangeCells {
         self.active[azimuth].then(|| &self.powers[azimuth * cells..][..cells])
     }
 
-    /// Range of the centre of a cell, m.
     pub fn centre_m(&self, cell: u32) -> f32 {
         let cell = self.layout.skipped as f32 + cell as f32;
         (cell + 0.5) * self.layout.cell_m + self.layout.range_offset_m

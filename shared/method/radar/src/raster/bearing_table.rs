@@ -1,5 +1,3 @@
-//! Lookup table from a bearing to the azimuth measured there, and to its time.
-
 use crate::scan::{MAX_AZIMUTHS, PolarScan};
 use std::f64::consts::TAU;
 

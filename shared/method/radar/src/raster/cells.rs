@@ -1,10 +1,7 @@
-//! Positions of the cells of a raster.
-
 use crate::scan::Sense;
 use std::f32::consts::SQRT_2;
 use std::f64::consts::TAU;
 
-/// Cells per iteration of the vectorised loops.
 pub(super) const BLOCK: usize = 32;
 
 pub(super) type Block<T> = [T; BLOCK];
@@ -18,7 +15,6 @@ pub(super) struct Cells {
     n: usize,
     cell_m: f32,
     sense: Sense,
-    /// `z` of each column, m.
     z_m: Vec<Block<f32>>,
     /// Bearing from straight ahead towards `z`, turns in `[0, 1]`, row by row.
     bearing: Vec<Block<f32>>,
@@ -28,7 +24,6 @@ pub(super) struct Cells {
 
 pub(super) struct CellRow<'a> {
     pub x_m: f32,
-    /// See [`Cells`]; all three have the same number of blocks.
     pub z_m: &'a [Block<f32>],
     pub bearing: &'a [Block<f32>],
     pub range_m: &'a [Block<f32>],

@@ -1,5 +1,3 @@
-//! The motion of the sensor within a sweep, in the form that the kernels use.
-
 use super::RasterError;
 use crate::scan::{PolarScan, Sense};
 use gyre_geometry::Twist;
@@ -84,20 +82,4 @@ fn sinc_cos(x: f32) -> (f32, f32) {
     let sinc = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s / 362_880.0)));
     let cos = 1.0 + s * (-0.5 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40_320.0))));
     (sinc, cos)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn sinc_and_cosine_hold_over_the_permitted_turn(x in -1.0..1.0f32) {
-            let (sinc, cos) = sinc_cos(x);
-            let x = f64::from(x);
-            prop_assert!((f64::from(sinc) * x - x.sin()).abs() < 1e-6);
-            prop_assert!((f64::from(cos) - x.cos()).abs() < 1e-6);
-        }
-    }
 }

@@ -1,5 +1,3 @@
-//! Consistency of a scan with its geometry.
-
 use super::{MAX_AZIMUTHS, PolarScan};
 use crate::chain::MAX_INTERVAL_NS;
 use std::ops::RangeInclusive;

@@ -1,7 +1,3 @@
-//! Configuration of the exhaustive search.
-
-use std::f64::consts::{PI, TAU};
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +7,7 @@ use crate::config::{ConfigError, Overlap, Peak, Section, positive};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ExhaustiveConfig {
-    /// Largest angle searched to either side, degrees; 180 is the whole circle.
+    /// Largest angle searched to either side, degrees.
     #[serde(skip)]
     pub reach_deg: f64,
     /// Step between angles, degrees. The cost grows with its inverse.
@@ -43,8 +39,8 @@ impl Default for ExhaustiveConfig {
 impl ExhaustiveConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("exhaustive");
-        let fits = self.reach_deg > 0.0 && self.reach_deg <= 180.0;
-        section.require(fits, "reach_deg", &self.reach_deg, "above 0, at most 180")?;
+        let fits = self.reach_deg > 0.0 && self.reach_deg < 180.0;
+        section.require(fits, "reach_deg", &self.reach_deg, "above 0, below 180")?;
         let steps = 0.01..=self.reach_deg;
         section.within("step_deg", self.step_deg, steps, "0.01 to reach_deg")?;
         let fits = positive(self.reach_m);
@@ -59,21 +55,11 @@ impl ExhaustiveConfig {
 
     pub(super) fn angles(&self) -> AngleGrid {
         let (reach, step) = (self.reach_deg.to_radians(), self.step_deg.to_radians());
-        if self.reach_deg >= 180.0 {
-            let count = (TAU / step).ceil() as usize;
-            return AngleGrid {
-                first: -PI,
-                step: TAU / count as f64,
-                count,
-                circle: true,
-            };
-        }
         let side = (reach / step + 1e-9).floor();
         AngleGrid {
             first: -side * step,
             step,
             count: 2 * side as usize + 1,
-            circle: false,
         }
     }
 }
@@ -84,8 +70,6 @@ pub(super) struct AngleGrid {
     first: f64,
     pub step: f64,
     pub count: usize,
-    /// The last angle is the first one's neighbour.
-    circle: bool,
 }
 
 impl AngleGrid {
@@ -94,18 +78,13 @@ impl AngleGrid {
         self.first + k * self.step
     }
 
-    /// The angle `by` steps from the k-th; at the ends of an open grid the last one again.
+    /// The angle `by` steps from the k-th; at the ends of the grid the last one again.
     pub fn beside(&self, k: usize, by: isize) -> usize {
-        let (place, count) = (k as isize + by, self.count as isize);
-        (if self.circle {
-            place.rem_euclid(count)
-        } else {
-            place.clamp(0, count - 1)
-        }) as usize
+        (k as isize + by).clamp(0, self.count as isize - 1) as usize
     }
 
     pub fn is_inner(&self, k: usize) -> bool {
-        self.circle || (k > 0 && k + 1 < self.count)
+        k > 0 && k + 1 < self.count
     }
 
     pub fn are_close(&self, a: usize, b: usize) -> bool {
@@ -135,26 +114,13 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_circle_closes() {
-        let grid = ExhaustiveConfig {
-            reach_deg: 180.0,
-            step_deg: 7.0,
-            ..Default::default()
-        }
-        .angles();
-        assert_eq!(grid.count, 52);
-        assert!((grid.angle(52.0) - grid.angle(0.0) - TAU).abs() < 1e-12);
-        assert!(grid.is_inner(0) && grid.are_close(0, 51));
-    }
-
-    #[test]
     fn impossible_values_name_their_key() {
         let refused = |change: fn(&mut ExhaustiveConfig)| {
             let mut config = ExhaustiveConfig::default();
             change(&mut config);
             config.validate().unwrap_err().to_string()
         };
-        assert!(refused(|c| c.reach_deg = 181.0).starts_with("exhaustive.reach_deg = 181"));
+        assert!(refused(|c| c.reach_deg = 180.0).starts_with("exhaustive.reach_deg = 180"));
         assert!(refused(|c| c.step_deg = f64::NAN).contains("step_deg"));
         assert!(refused(|c| c.step_deg = 16.0).contains("step_deg"));
         assert!(refused(|c| c.reach_m = 0.0).contains("reach_m"));

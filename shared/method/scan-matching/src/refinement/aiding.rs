@@ -259,7 +259,6 @@ impl Refiner {
         true
     }
 
-    /// Weighs the heading of a registered pose against the gyro's, if there is a gyro.
     pub(super) fn with_gyro_heading(
         &mut self,
         scan: &Scan<'_>,

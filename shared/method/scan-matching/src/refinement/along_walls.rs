@@ -5,11 +5,6 @@
 //! prediction's covariance; across them, and for the heading, the radar determines the pose as
 //! elsewhere. Until the search, which compares two scans and no map, contradicts the prediction,
 //! the place comes from the match, or at constant velocity from the mean of prediction and search.
-//!
-//! At constant velocity the displacement is a guess, and keyframes that are placed by guesses share
-//! no structure behind the walls either. So the displacement by the search is recorded, too. If
-//! keyframes placed by the search overlap enough to constrain the position, the walls have ended,
-//! and a new map starts.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{UnitVector2, Vector2};

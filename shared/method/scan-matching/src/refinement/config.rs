@@ -1,5 +1,3 @@
-//! Configuration of the refinement.
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -67,7 +67,6 @@ pub struct GyroBias {
     pub rate_radps: f64,
     pub sigma_radps: f64,
     pub scale: f64,
-    /// The verdict of the registered heading on the turn, or the last one.
     pub verdict: Verdict,
 }
 

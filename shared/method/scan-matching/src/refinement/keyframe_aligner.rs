@@ -1,5 +1,3 @@
-//! Alignment of two keyframes of the same place, however far apart in time.
-
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Vector2;
 
@@ -15,11 +13,8 @@ const ITERATIONS: usize = 20;
 
 /// Aligns the middle keyframes of two submaps.
 ///
-/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one image.
 /// [`align`](Self::align) takes the points of these two scans alone: laid together by odometry, the
 /// neighbours in the submaps would carry its errors into the result.
-///
-/// Nothing is allocated after construction.
 #[derive(Debug)]
 pub struct KeyframeAligner {
     config: RefinementConfig,

@@ -22,9 +22,7 @@ pub struct Keyframe {
     pub id: u64,
     /// Pose in the first scan's frame.
     pub pose: Pose,
-    /// [`super::TrackerState::ahead_m`] of its scan.
     pub ahead_m: Vector2<f64>,
-    /// A fine and a coarse one.
     images: [Image; 2],
 }
 
@@ -45,7 +43,6 @@ impl Keyframe {
 
 #[derive(Debug)]
 pub(super) struct LocalMap {
-    /// A fine and a coarse one.
     levels: [MapLevel; 2],
     used: VecDeque<Keyframe>,
     spare: Vec<Keyframe>,

@@ -281,7 +281,6 @@ mod tests {
         }
     }
 
-    /// The brightest place of the map, m, and its share.
     fn brightest(level: &MapLevel) -> ([f64; 2], f32) {
         let view = level.view();
         let most = view.sum.iter().copied().max().unwrap_or(0);

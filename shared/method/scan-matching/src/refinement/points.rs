@@ -50,7 +50,6 @@ impl DeskewedPoints {
         self.columns().into_iter().for_each(Vec::clear);
     }
 
-    /// Adds points of another frame that is at `pose` in this one.
     pub fn extend(&mut self, points: &Self, pose: &Pose) {
         let places = points.x_m.iter().zip(&points.y_m);
         for (&x_m, &y_m) in places {

@@ -33,7 +33,6 @@ const PRIOR_SCANS: f64 = 8.0;
 /// Bounds how far jitter can widen the limit.
 const MAX_JITTER: f64 = 4.0;
 
-/// The place where the vehicle stands or was last, and the jitter of its estimates while it stood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
     /// The last reported pose, in the first scan's frame.
@@ -54,12 +53,10 @@ pub struct Standstill {
 pub(super) struct Estimate {
     /// The pose in the first scan's frame, with the covariance of the motion from the scan before.
     pub pose: UncertainMotion,
-    /// The estimate of the scan before.
     pub previous: Pose,
     pub outcome: Outcome,
     /// Wheels, Doppler or the gyro measure a motion since the scan before.
     pub moves: bool,
-    /// Time since the scan before, s.
     pub interval_s: f64,
 }
 

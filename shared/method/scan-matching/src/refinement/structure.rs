@@ -23,7 +23,6 @@ const MIN_RATIO: f64 = 0.2;
 /// The same, below which another sensor that contradicts is right, and below which a direction
 /// stays undetermined.
 const SAFE_RATIO: f64 = 0.4;
-/// This many points of a scan suffice for the decision.
 const POINTS: usize = 400;
 
 /// The direction with the least information by structure about the place of a scan.

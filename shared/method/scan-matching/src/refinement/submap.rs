@@ -1,5 +1,3 @@
-//! Submaps: the points around a keyframe.
-
 use gyre_geometry::{Pose, SparsePoint, Twist};
 use ndarray::ArrayViewMut2;
 
@@ -13,11 +11,8 @@ use crate::{ShapeError, expect_shape};
 /// points as it is planned for.
 #[derive(Debug, Default)]
 pub struct Submap {
-    /// The points of the keyframe in the middle.
     pub(super) keyframe: DeskewedPoints,
-    /// The points of all keyframes.
     pub(super) all: DeskewedPoints,
-    /// The points of the keyframe that is being added, in its own frame.
     added: DeskewedPoints,
 }
 
@@ -38,7 +33,6 @@ impl Submap {
         self.all.extend(&self.keyframe, &Pose::identity());
     }
 
-    /// Adds another keyframe at `pose` in the frame of the middle one.
     pub fn add(&mut self, points: &[SparsePoint], twist: &Twist, pose: &Pose) {
         self.added.deskew(points, twist);
         self.all.extend(&self.added, pose);

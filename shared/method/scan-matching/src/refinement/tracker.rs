@@ -18,7 +18,6 @@ const FIT_GAIN: f64 = 0.2;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrackerState {
-    /// Pose of the last scan in the first one's frame.
     pub pose: Pose,
     /// The last two refined scans, newest first. The second one is used if the first turns out to
     /// be wrong.

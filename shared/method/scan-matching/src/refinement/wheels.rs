@@ -2,12 +2,6 @@
 //! place along the path against the map, and the scale of the wheels. The displacement by Doppler
 //! has a filter of its own, since it is a distance with a scale too: the scale of the Doppler
 //! coefficient.
-//!
-//! Where the radar determines the distance, it determines the scale, too: the motions of a drive
-//! share the scale, and the next registration cancels the noise of one registration. If a
-//! registered distance differs too much from the wheels' distance, or if the scale differs too much
-//! from 1, the wheels slip and are not used. If the radar sees nothing, or little that disagrees,
-//! the motion is an arc: its length by the wheels, its turn by the gyro.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
@@ -24,7 +18,6 @@ pub struct WheelState {
     pub scale: f64,
     /// Error of the last pose along the path, against the map, m.
     pub offset_m: f64,
-    /// Covariance of the errors of that offset and of the scale.
     pub covariance: Matrix2<f64>,
     /// The last registered distance differed from the wheels' distance, or the implied scale is
     /// implausible.

@@ -9,7 +9,6 @@ use gyre_scan_matching::{
 };
 use ndarray::Array2;
 
-/// Pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     pub x: f64,
@@ -112,7 +111,6 @@ pub fn pair_of(
     (earlier, draw(seen, n, cell_m, blur))
 }
 
-/// Both searches over one pair.
 pub fn search(
     n: usize,
     cell_m: f64,

@@ -96,14 +96,12 @@ impl Drive {
         (self.speed_mps + 0.5 * self.acceleration_mps2 * time_s) * time_s
     }
 
-    /// Pose of scan `k` in the first one's frame.
     pub fn pose(&self, k: usize) -> Pose {
         let time_s = k as f64 * SWEEP_S;
         arc(self.length_m(time_s), self.yaw_rate_radps * time_s)
     }
 }
 
-/// The motion along an arc of this length that turns by this angle.
 fn arc(length: f64, turn: f64) -> Pose {
     let (sin, cos) = turn.sin_cos();
     let [ahead, aside] = if turn.abs() < 1e-9 {
@@ -114,10 +112,8 @@ fn arc(length: f64, turn: f64) -> Pose {
     Pose::new(Vector2::new(ahead, aside) * length, turn)
 }
 
-/// The errors of the sensor's ranges.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sensor {
-    /// Standard deviation of the ranges, m.
     pub noise_m: f64,
     /// Ranges are too short by this for each m/s of approach, s.
     pub doppler_s: f64,
@@ -170,7 +166,6 @@ impl Sensor {
     }
 }
 
-/// The point `[x_m, y_m, time_s, weight, doppler_s]`.
 pub fn point(values: [f64; 5]) -> SparsePoint {
     let [x_m, y_m, time_s, weight, doppler_s] = values.map(|v| v as f32);
     SparsePoint {
@@ -182,7 +177,6 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
-/// Points unrelated to any scene, as strong as points of a scene.
 pub fn noise(seed: u64) -> Vec<SparsePoint> {
     let mut numbers = Numbers(seed);
     let mut place = || {
@@ -217,17 +211,14 @@ fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     None
 }
 
-/// A drive and its refined motions.
 pub struct Run {
     pub drive: Drive,
     /// Motion from scan k to k + 1.
     pub refined: Vec<Refined>,
 }
 
-/// The error at the end of a run, and the error of its worst motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
-    /// Yaw error at the end, degrees counter-clockwise.
     pub yaw_deg: f64,
     /// Distance from the true position at the end, m.
     pub shift_m: f64,
@@ -240,7 +231,6 @@ impl Run {
         self.errors_from(0)
     }
 
-    /// The errors of the motions from scan `first` on.
     pub fn errors_from(&self, first: usize) -> Errors {
         let (mut pose, mut worst_m, mut worst_deg) = (self.drive.pose(first), 0.0_f64, 0.0_f64);
         for k in first..self.refined.len() {
@@ -288,7 +278,6 @@ pub fn off(drive: &Drive, refined: &[Refined], over: std::ops::Range<usize>) -> 
     )
 }
 
-/// The scans of a drive.
 pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<SparsePoint>> {
     (0..drive.scans)
         .map(|k| sensor.scan(scene, drive, k))
@@ -303,7 +292,6 @@ pub fn refiner() -> Refiner {
     Refiner::new(&config, CAPACITY).unwrap()
 }
 
-/// Refines the motions between these scans of a drive.
 pub fn refine(drive: &Drive, scans: &[Vec<SparsePoint>]) -> Run {
     let mut refiner = refiner();
     Run {
@@ -346,7 +334,6 @@ pub fn refine_aided(
     (1..scans.len()).map(&mut refine).collect()
 }
 
-/// The true distance to scan `k` times a factor, as wheels measure it.
 pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> WheelDistance {
     let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
     WheelDistance {
@@ -378,7 +365,6 @@ pub fn into_a_tunnel(drive: &Drive, more: Vec<Reflector>) -> Vec<Vec<SparsePoint
     scans(&scene, drive, &LITTLE_NOISE)
 }
 
-/// Simulates and refines a drive.
 pub fn run(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Run {
     refine(drive, &scans(scene, drive, sensor))
 }

@@ -1,5 +1,3 @@
-//! The keyframes that were read last: consecutive submaps share most keyframes.
-
 use super::KeyframeSource;
 use crate::Keyframe;
 
@@ -18,7 +16,6 @@ impl Cache {
         }
     }
 
-    /// Returns a keyframe, and reads it if its slot has a different one.
     pub fn get<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -1,5 +1,3 @@
-//! The localiser.
-
 use std::f64::consts::PI;
 
 use gyre_estimation::places::{Candidate, Describer, Descriptor};
@@ -55,9 +53,7 @@ pub enum Status {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
-    /// The pose in the map, with its covariance along the map's axes.
     pub pose: UncertainMotion,
-    /// Masked correlation of the scan with the submap.
     pub correlation: f64,
     /// Difference of the correlation from the next best pose that was tried; for a first fix only.
     pub margin: f64,
@@ -169,7 +165,6 @@ impl Localiser {
             && self.map.nearest(place).1 <= REACH_M
     }
 
-    /// Chooses the places and headings that look most similar, each once.
     fn choose_candidates(&mut self) {
         let similar = self.map.similar(&self.descriptor, ANGLES).to_vec();
         self.candidates.clear();
@@ -261,7 +256,6 @@ impl Localiser {
         })
     }
 
-    /// Tracks the next scan from the last known place.
     fn follow(&mut self, track: &Track, observation: &Observation<'_>) -> Localisation {
         let predicted = track.pose.then(&observation.motion);
         self.scan.start(observation.points, &observation.twist);

@@ -1,5 +1,3 @@
-//! The keyframes of a map.
-
 use std::path::Path;
 
 use crate::{Keyframe, Record, RecordLog, RecordReader};
@@ -14,7 +12,6 @@ use nalgebra::Point2;
 use thiserror::Error;
 
 const KEYFRAMES: &str = Keyframe::FILE;
-/// The file of descriptors of submaps, in its folder.
 const PLACES: &str = "places.index";
 
 #[derive(Debug, Error)]
@@ -31,7 +28,6 @@ pub enum MapError {
     Unlike(String),
 }
 
-/// Keyframes with their poses in the map's frame, and what their submaps look like.
 pub struct Map {
     keyframes: Vec<Keyframe>,
     path_m: Vec<f64>,
@@ -67,7 +63,6 @@ impl Map {
         Ok(log.end()?)
     }
 
-    /// Reads the map in a folder. All of it is kept in memory.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let mut reader = RecordReader::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();

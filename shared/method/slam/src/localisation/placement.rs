@@ -3,7 +3,7 @@
 //! The keyframes of the drive are found in the map one by one. A pose graph of these places and of
 //! the drive's own motions and loops gives all poses of the drive; the map stays where it is.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 
 use crate::Keyframe;
 use gyre_estimation::{
@@ -21,10 +21,7 @@ const DEPENDENT_M: f64 = 5.0;
 const OF_MAP: u64 = u32::MAX as u64;
 /// The uncertainty of the first pose before any fix: standard deviations in m and rad.
 const ANYWHERE: [f64; 3] = [1e5, 1e5, 3.0];
-/// Fixes that are compared as the start, at most.
 const STARTS: usize = 100;
-/// Stretches to either side of a fix within which odometry hardly leaves it: 20 m.
-const NEAR_STRETCHES: u64 = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub struct FoundKeyframe {
@@ -40,23 +37,8 @@ pub struct DriveSearch {
 
 #[derive(Clone, Debug)]
 pub struct PlacedDrive {
-    /// The poses of all keyframes in the map frame.
     pub poses: Vec<Pose>,
-    /// The keyframes whose fixes agree with the others.
     pub agreeing: Vec<FoundKeyframe>,
-    stretches: Vec<u64>,
-    fixed: BTreeSet<u64>,
-}
-
-impl PlacedDrive {
-    /// Returns whether the place of a keyframe relative to the map is known: it lies within 20 m of
-    /// the path from one whose fix agrees with the others.
-    pub fn is_near_fix(&self, keyframe: usize) -> bool {
-        self.stretches.get(keyframe).is_some_and(|at| {
-            let near = at.saturating_sub(NEAR_STRETCHES)..=at + NEAR_STRETCHES;
-            self.fixed.range(near).next().is_some()
-        })
-    }
 }
 
 impl DriveSearch {
@@ -102,13 +84,9 @@ impl DriveSearch {
             .found
             .iter()
             .filter(|it| agreeing.contains(&it.keyframe));
-        let agreeing: Vec<FoundKeyframe> = agreeing.copied().collect();
-        let fixed = agreeing.iter().map(|it| self.stretches[it.keyframe]);
         Ok(Some(PlacedDrive {
             poses: graph.poses()[1..].to_vec(),
-            fixed: fixed.collect(),
-            stretches: self.stretches.clone(),
-            agreeing,
+            agreeing: agreeing.copied().collect(),
         }))
     }
 
@@ -135,7 +113,6 @@ impl DriveSearch {
             .map(|(_, start)| start)
     }
 
-    /// The graph of the map's frame and the keyframes of the drive, which begin at `poses`.
     fn graph(&self, drive: &G2o, poses: &[Pose]) -> Result<PoseGraph, EstimationError> {
         let anywhere = UncertainMotion {
             motion: poses[1],
@@ -226,17 +203,5 @@ mod tests {
         // Beyond, odometry continues from the last place.
         let ahead = poses[59].inv_mul(&poses[60]);
         assert!((ahead.translation.vector - motion.motion.translation.vector).norm() < 0.05);
-        // Keyframes are 2 m apart, in stretches of 5 m.
-        let known = [0, 60, 69, 70, 99, 100].map(|keyframe| placed.is_near_fix(keyframe));
-        assert_eq!(known, [true, true, true, false, false, false]);
-    }
-
-    #[test]
-    fn a_drive_of_which_nothing_was_found_has_no_place() {
-        let drive = G2o {
-            poses: vec![Pose::identity()],
-            constraints: Vec::new(),
-        };
-        assert!(DriveSearch::default().place(&drive).unwrap().is_none());
     }
 }

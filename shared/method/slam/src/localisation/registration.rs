@@ -1,5 +1,3 @@
-//! The registration of a scan with a submap of the map.
-
 use gyre_estimation::places::Registrar;
 use gyre_geometry::{Pose, UncertainMotion};
 use gyre_scan_matching::{ConfigError, MotionMatch, RefinementConfig, Submap};

@@ -1,5 +1,3 @@
-//! The directions that a sensor could see.
-
 use std::f64::consts::TAU;
 
 use gyre_scan_matching::Submap;
@@ -71,7 +69,6 @@ mod tests {
 
     use super::*;
 
-    /// A point in each direction from `first` to `last`, degrees.
     fn scan(first: u16, last: u16) -> Submap {
         let point = |degrees: u16| {
             let (sin, cos) = f32::from(degrees).to_radians().sin_cos();

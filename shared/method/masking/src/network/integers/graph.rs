@@ -19,7 +19,6 @@ use layout::Layout;
 /// Integers in 32-bit floating-point numbers are exact below this.
 const EXACT: f32 = (1 << 24) as f32;
 
-/// The meaning of a floating-point tensor.
 #[derive(Clone)]
 enum Float {
     Raster {
@@ -114,7 +113,6 @@ impl<'a> Reader<'a> {
         Some(())
     }
 
-    /// Returns the output of an operator that is not `QuantizeLinear`.
     fn float(&mut self, node: &NodeProto) -> Option<Float> {
         let attributes = Attributes(&node.attribute);
         Some(match node.op_type.as_deref()? {
@@ -186,7 +184,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds the step that computes the integers of a tensor.
     fn quantised(&mut self, node: &NodeProto) -> Option<Integer> {
         let to = self.quantisation(node)?;
         let layout = match self.input(node, 0)? {

@@ -1,5 +1,3 @@
-//! The values of a layer.
-
 /// Columns that are computed at once.
 pub const LANES: usize = 16;
 

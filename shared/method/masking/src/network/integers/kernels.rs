@@ -83,7 +83,6 @@ fn values<I: Isa>(isa: I, kernel: &Kernel, output: usize, sums: I::F32) -> [f32;
     values
 }
 
-/// Returns the sums of a block of outputs at a block of columns.
 #[inline(always)]
 fn sums<I: Isa>(
     isa: I,

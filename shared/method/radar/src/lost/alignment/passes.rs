@@ -117,7 +117,6 @@ fn of_number<const MOST_STEPS: usize>(steps: &[f32; MOST_STEPS], number: usize) 
     chunk.expect("there are steps for the turns of the largest number")
 }
 
-/// Adds the logarithms of products, and resets the products.
 fn add_logarithms(sums: &mut Turns<f64>, products: &mut Turns<f64>) {
     for (sum, product) in sums.iter_mut().zip(products) {
         *sum += product.ln();
@@ -125,7 +124,6 @@ fn add_logarithms(sums: &mut Turns<f64>, products: &mut Turns<f64>) {
     }
 }
 
-/// Divides the values of each turn by their sum, and returns the sums.
 #[inline(always)]
 fn normalise(numbers: &mut [Turns<f32>]) -> Turns<f32> {
     let mut sums = [f32::MIN_POSITIVE; _];

@@ -16,7 +16,6 @@ const FIXED_POINT_STEPS: usize = 2;
 #[derive(Clone, Copy, Debug)]
 pub struct Lookup<'a> {
     pub bearings: &'a BearingTable,
-    /// The last row of the polar image with a successor.
     pub last_azimuth: i32,
     pub stride: i32,
     pub columns_per_metre: f32,
@@ -43,7 +42,6 @@ impl Taps {
     };
 }
 
-/// Computes the taps of a row of cells for a sensor at rest.
 #[simd]
 pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     let places = cells.bearing.iter().zip(cells.range_m);

@@ -29,7 +29,6 @@ pub struct Window {
 }
 
 impl Window {
-    /// Returns a window of `bins` bins, at least one.
     pub fn new(bins: f32) -> Self {
         let bins = f64::from(bins.max(1.0));
         let mut bins_per_piece = 1;

@@ -16,7 +16,6 @@ fn mean(row: &[u8], place: f64, depth: f64) -> f64 {
         / depth
 }
 
-/// Linear interpolation between the two nearest bins.
 fn between(row: &[u8], place: f64) -> f64 {
     let weight = |bin: usize| (1.0 - (place - 0.5 - bin as f64).abs()).max(0.0);
     let near = (place - 2.0).max(0.0) as usize..((place + 2.0).max(0.0) as usize).min(row.len());
@@ -77,7 +76,6 @@ fn noise(range_resolution_m: f32, bins: usize) -> OwnedScan {
     scan
 }
 
-/// RMS and maximum of the difference.
 fn difference(got: &[f32], expected: &[f64]) -> (f64, f64) {
     let errors = got
         .iter()

@@ -11,7 +11,6 @@ use std::f64::consts::TAU;
 const METADATA: usize = 11;
 pub const STAMP_NS: i64 = 1_547_131_046_353_776_000;
 
-/// A sensor and its motion during the sweep.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     pub azimuth_rad: Vec<f32>,
@@ -21,7 +20,6 @@ pub struct Sensor {
     pub range_resolution_m: f32,
     pub range_offset_m: f32,
     pub doppler_s: f32,
-    /// True if chirps alternate, and the scan reports them.
     pub chirps_alternate: bool,
     pub sense: Sense,
     pub twist: Twist,
@@ -48,7 +46,6 @@ impl Sensor {
         }
     }
 
-    /// An empty scan.
     pub fn scan(&self) -> OwnedScan {
         let azimuths = self.azimuth_rad.len();
         let stride = METADATA + self.bins;
@@ -122,7 +119,6 @@ impl Sensor {
     }
 }
 
-/// The raster of a scan without floor.
 pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
     let mut raster = Array2::from_elem((config.n, config.n), f32::NAN);
     let mut rasteriser = Rasteriser::new(config).unwrap();
@@ -132,7 +128,6 @@ pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> 
     raster.into_raw_vec_and_offset().0
 }
 
-/// The centre of a cell, x and y in m.
 pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64> {
     let middle = 0.5 * (config.n as f64 - 1.0);
     let cell_m = f64::from(config.cell_m);

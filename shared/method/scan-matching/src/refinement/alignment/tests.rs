@@ -46,7 +46,6 @@ fn pose(shift_m: f64, turn: f64) -> impl Strategy<Value = Pose> {
         .prop_map(|(at, yaw)| Pose::new(at.into(), yaw))
 }
 
-/// The pose, moved along one of its three unknowns.
 fn moved(pose: &Pose, unknown: usize, by: f64) -> Pose {
     let step = Vector3::ith(unknown, by);
     Pose::new(

@@ -88,7 +88,6 @@ fn the_place_moves_along_with_the_heading() {
     assert!(fused.covariance[(0, 0)] < 0.8e-4);
 }
 
-/// An event between two scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Event {
     /// The gyro has measured the turn, and the scan is registered.

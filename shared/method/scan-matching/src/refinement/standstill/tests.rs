@@ -9,7 +9,6 @@ const INTERVAL_S: f64 = 0.25;
 /// Standard deviations of an estimate: x, y (m), yaw (rad).
 const SIGMA: [f64; 3] = [0.055, 0.055, 0.0035];
 
-/// A drive along x, with its estimated and reported positions.
 struct Drive {
     standstill: Standstill,
     random: u64,
@@ -64,7 +63,6 @@ impl Drive {
             .collect()
     }
 
-    /// The next scan, whose estimate is off by `off_m`.
     fn step(&mut self, outcome: Outcome, off_m: f64) -> Step {
         let [x_m, y_m, yaw_rad] = SIGMA.map(|sigma| sigma * self.noise());
         let previous = self.estimate;

@@ -1,5 +1,3 @@
-//! Integers of an image in another order and shape.
-
 use std::rc::Rc;
 
 use rten_onnx::onnx::NodeProto;
@@ -10,7 +8,6 @@ use crate::network::{
     tensors::{Attributes, Constants},
 };
 
-/// The most values of a tensor.
 const MOST_VALUES: usize = 1 << 26;
 
 /// Values of an image, as a tensor.
