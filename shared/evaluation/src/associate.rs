@@ -57,8 +57,8 @@ pub enum Coverage {
 }
 
 /// Interpolates the ground truth at the stamps of the estimate: positions linearly, yaw the shorter
-/// way round. If one of them has no stamps, pose `k` belongs to pose `k`, and the longer list is cut
-/// to the shorter.
+/// way round. If one of them has no stamps, pose `k` belongs to pose `k`, and the longer list is
+/// cut to the shorter.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

@@ -7,12 +7,12 @@ use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
     NodeError, Settings,
-    following::{ObjectTopics, POLL_INTERVAL, PoseTopics, Topics, follow_runs},
+    following::{ObjectTopics, PoseTopics, Topics, follow_runs},
     health::report,
     live_map::MapTopic,
     node::{Keep, Node},
     outlet::Outlet,
-    run_state::Shared,
+    run_state::{POLL_INTERVAL, Shared},
 };
 
 const NODE: &str = "gyre";

@@ -5,8 +5,8 @@ use std::ops::Range;
 /// 2001-01-01, and the last second that ROS 2 can write, ns since 1970.
 const YEARS_NS: Range<i64> = 978_307_200_000_000_000..(i32::MAX as i64) * 1_000_000_000;
 
-/// Returns the offset from the stamps of a run to times of ROS, which count from 1970. The stamps of
-/// a radar or a recording that has the time are left unchanged. All other stamps get the same
+/// Returns the offset from the stamps of a run to times of ROS, which count from 1970. The stamps
+/// of a radar or a recording that has the time are left unchanged. All other stamps get the same
 /// offset, so that the first stamp is the present time: intervals stay as the sensor measured them.
 pub fn offset_ns(first_ns: i64, now_ns: i64) -> i64 {
     match YEARS_NS.contains(&first_ns) {

@@ -19,10 +19,8 @@ use gyre_stage::{
 use crate::{
     live_map::MapTopic,
     outlet::Outlet,
-    run_state::{RunPhase, RunState, Shared},
+    run_state::{POLL_INTERVAL, RunPhase, RunState, Shared},
 };
-
-pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct Topics {
     pub poses: PoseTopics,

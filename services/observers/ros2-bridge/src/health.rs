@@ -12,9 +12,8 @@ use gyre_stage::{
 };
 
 use crate::{
-    following::POLL_INTERVAL,
     outlet::Outlet,
-    run_state::{RunPhase, RunState, Shared},
+    run_state::{POLL_INTERVAL, RunPhase, RunState, Shared},
 };
 
 const PERIOD: Duration = Duration::from_secs(1);

@@ -13,7 +13,9 @@ use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_stage::{clock, observer::ObservedRun};
 
 use crate::{
-    MapSettings, MapSettingsOf, following::POLL_INTERVAL, outlet::Outlet, run_state::Shared,
+    MapSettings, MapSettingsOf,
+    outlet::Outlet,
+    run_state::{POLL_INTERVAL, Shared},
 };
 
 const INTERVAL: Duration = Duration::from_secs(5);

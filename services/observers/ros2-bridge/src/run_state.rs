@@ -6,6 +6,7 @@ use std::{
         Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
 use gyre_geometry::Pose;
@@ -13,6 +14,9 @@ use gyre_ros2_messages::frames::Frames;
 use gyre_stage::clock;
 
 use crate::{Mounting, clock::offset_ns};
+
+/// The longest wait between two looks at the run.
+pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct Shared {
     pub out: PathBuf,

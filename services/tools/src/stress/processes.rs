@@ -85,8 +85,8 @@ impl Sampler {
         groups.find(|group| leaders.get(group).is_some_and(|name| name == stage))
     }
 
-    /// Returns the names of the process groups of the run, as the supervisor reports them; none while
-    /// it ends.
+    /// Returns the names of the process groups of the run, as the supervisor reports them; none
+    /// while it ends.
     fn leaders(&self) -> BTreeMap<u32, String> {
         let status = Control::of(&self.out).and_then(|run| run.status());
         let processes = status.into_iter().flat_map(|status| status.processes);

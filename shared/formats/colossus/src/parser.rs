@@ -41,8 +41,9 @@ pub enum Damage {
 /// Read into [`Parser::space`], pass the number of bytes to [`Parser::filled`], and take all events
 /// with [`Parser::next`].
 ///
-/// After a fault all whole messages behind the next signature are found. A message that is cut short
-/// may be returned with bytes of the next one, and delays what follows until as many have arrived.
+/// After a fault all whole messages behind the next signature are found. A message that is cut
+/// short may be returned with bytes of the next one, and delays what follows until as many have
+/// arrived.
 #[derive(Debug, Default)]
 pub struct Parser {
     buffer: Vec<u8>,

@@ -29,9 +29,9 @@ impl MaskingConfig {
         Ok(())
     }
 
-    /// Returns the library of ONNX Runtime that computes the networks; `None` for rten. ONNX Runtime
-    /// is required if it is named. If it is neither named nor installed, rten replaces it, but only
-    /// on the processor.
+    /// Returns the library of ONNX Runtime that computes the networks; `None` for rten. ONNX
+    /// Runtime is required if it is named. If it is neither named nor installed, rten replaces it,
+    /// but only on the processor.
     pub fn onnx_runtime(&self) -> Result<Option<PathBuf>, RuntimeError> {
         if self.backend == Backend::Rten {
             return Ok(None);

@@ -28,7 +28,7 @@ pub use follower::{
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
-pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender};
+pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic, WireType};
 pub use motion::{
     Motion, MotionEstimate, MotionHeader, Refined, Rotation, RotationEstimate, RotationHeader,
 };
@@ -36,4 +36,4 @@ pub use pose::{Pose, PoseHeader, compose};
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, GivenAnew, NumberedBy, Topic, WireType, topic, topics};
+pub use topics::{Footprint, GivenAnew, NumberedBy, topic, topics};

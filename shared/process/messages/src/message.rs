@@ -10,7 +10,6 @@ use crate::{
     check::Violation,
     item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
-    topics::Topic,
 };
 
 /// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
@@ -175,3 +174,59 @@ macro_rules! block {
 
 block!(ByteBlock, 64, "gyre_byte_block_v1");
 block!(FloatBlock, 16, "gyre_float_block_v1");
+
+/// A type of headers or of elements, as the transport compares it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WireType {
+    pub name: &'static str,
+    pub bytes: usize,
+    pub alignment: usize,
+}
+
+impl WireType {
+    const fn of<T>(name: &'static str) -> Self {
+        Self {
+            name,
+            bytes: size_of::<T>(),
+            alignment: align_of::<T>(),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Topic {
+    pub name: &'static str,
+    pub sender: Sender,
+    pub sizes: fn(&Window) -> TopicSizes,
+    pub max_elements: fn(&Limits) -> usize,
+    pub header: WireType,
+    pub element: WireType,
+    /// [`Message::check`] of the bytes of a header and of a payload.
+    pub check: fn(&[u8], &[u8], &Limits) -> Result<(), Violation>,
+    /// [`Message::content_bytes`] of the bytes of a header.
+    pub content_bytes: fn(&[u8]) -> Option<usize>,
+}
+
+fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+    let payload = bytemuck::cast_slice(payload);
+    M::check(bytemuck::from_bytes(header), payload, limits)
+}
+
+fn content_bytes<M: Message>(header: &[u8]) -> Option<usize> {
+    M::content_bytes(bytemuck::from_bytes(header))
+}
+
+impl Topic {
+    pub const fn of<M: Message>() -> Self {
+        Self {
+            name: M::TOPIC,
+            sender: M::SENDER,
+            sizes: M::sizes,
+            max_elements: M::max_elements,
+            header: WireType::of::<M::Header>(M::Header::TYPE_NAME),
+            element: WireType::of::<M::Element>(M::Element::TYPE_NAME),
+            check: check::<M>,
+            content_bytes: content_bytes::<M>,
+        }
+    }
+}

@@ -26,6 +26,7 @@ pub mod inputs;
 pub mod launch;
 mod log_id;
 mod manifest;
+pub mod message;
 mod numbers;
 pub mod observer;
 pub mod python_function;

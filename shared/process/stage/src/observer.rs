@@ -17,13 +17,13 @@ use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
 use crate::{
     Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
+    message::{AnyMessage, RecordedMessage},
     numbers::{self, Numbers},
-    reader::{self, AnyMessage, Port, Received},
+    reader::{self, Port, Received},
     run,
     sessions::not_running,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
-    writer::RecordedMessage,
 };
 pub use sequence::Sequence;
 

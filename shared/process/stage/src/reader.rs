@@ -6,13 +6,11 @@ use bytemuck::Pod;
 use gyre_messages::{Item, Limits, Message, Topic, flag};
 
 use crate::{
-    Launch, Manifest, StageError, clock, services,
+    Launch, Manifest, StageError, clock,
+    message::RecordedMessage,
+    services,
     transport::{Listener, Node, Notifier, Sample, Service, Subscriber},
-    writer::RecordedMessage,
 };
-
-/// Stands for the message type of a topic that is known by its name alone.
-pub enum AnyMessage {}
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
 pub struct Received<M> {

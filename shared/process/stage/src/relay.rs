@@ -7,12 +7,13 @@ use gyre_messages::{Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan,
 
 use crate::{
     Launch, StageCounters, StageError, clock, counters,
+    message::{AnyMessage, RecordedMessage},
     numbers::Numbers,
-    reader::{AnyMessage, Port, Reader},
+    reader::{Port, Reader},
     remote_progress, sink,
     source::{Feed, hop},
     wake,
-    writer::{RecordedMessage, TopicWriter, Writer, item_of},
+    writer::{TopicWriter, Writer, item_of},
 };
 
 /// Publishes messages of the first stages, which are on another machine, in the place of the

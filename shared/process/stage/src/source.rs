@@ -25,7 +25,7 @@ pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
 
-pub use crate::writer::RecordedMessage;
+pub use crate::message::RecordedMessage;
 pub use player::run_player;
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};

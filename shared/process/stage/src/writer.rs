@@ -7,7 +7,7 @@ use rustix::fs::{FallocateFlags, fallocate};
 
 use crate::{
     Launch, Manifest, StageError, clock,
-    reader::AnyMessage,
+    message::{AnyMessage, RecordedMessage},
     run::{self, SHARED_MEMORY},
     services,
     transport::{Listener, Loan, Node, Notifier, Publisher, Service},
@@ -162,22 +162,6 @@ impl<M: Message> Draft<M> {
             bytemuck::from_bytes_mut(header),
             bytemuck::cast_slice_mut(payload),
         )
-    }
-}
-
-/// A wire message outside of shared memory.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct RecordedMessage {
-    pub header: Vec<u8>,
-    /// The bytes of its payload that the header describes.
-    pub payload: Vec<u8>,
-}
-
-impl RecordedMessage {
-    /// Returns the scan that it is about; `None` if its header is too short.
-    pub fn item(&self) -> Option<Item> {
-        let item = self.header.get(..size_of::<Item>())?;
-        Some(bytemuck::pod_read_unaligned(item))
     }
 }
 

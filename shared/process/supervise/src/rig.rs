@@ -12,7 +12,8 @@ use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, time::Duration};
 use gyre_messages::{StageId, Topic};
 use gyre_stage::{
     Launch, Manifest, StageError,
-    reader::{AnyMessage, Port},
+    message::AnyMessage,
+    reader::Port,
     run::{self, RunRoot},
     services::Services,
     transport::{self, Listener, Node, Service, Transport},

@@ -9,9 +9,9 @@ use gyre_messages::{Item, Scan, StageId, flag};
 use super::{Feed, Pace, hop};
 use crate::{
     Launch, StageCounters, StageError, clock, counters,
-    reader::AnyMessage,
+    message::{AnyMessage, RecordedMessage},
     wake,
-    writer::{RecordedMessage, TopicWriter, Writer, item_of},
+    writer::{TopicWriter, Writer, item_of},
 };
 
 /// Plays recorded messages until SIGTERM: of each of these topics, in the order of the stream, the
