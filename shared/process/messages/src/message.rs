@@ -193,6 +193,9 @@ impl WireType {
     }
 }
 
+/// Checks the bytes of a header and of a payload.
+type Check = fn(&[u8], &[u8], &Limits) -> Result<(), Violation>;
+
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     pub name: &'static str,
@@ -202,7 +205,7 @@ pub struct Topic {
     pub header: WireType,
     pub element: WireType,
     /// [`Message::check`] of the bytes of a header and of a payload.
-    pub check: fn(&[u8], &[u8], &Limits) -> Result<(), Violation>,
+    pub check: Check,
     /// [`Message::content_bytes`] of the bytes of a header.
     pub content_bytes: fn(&[u8]) -> Option<usize>,
 }
