@@ -176,6 +176,53 @@ fn all_fixes_are_counted_once() {
     assert_eq!(estimator.fixes().positions().len(), counts.taken);
 }
 
+/// The time of a reflection.
+fn is_reflected(stamp_ns: i64) -> bool {
+    (40 * SECOND_NS..55 * SECOND_NS).contains(&stamp_ns)
+}
+
+#[test]
+fn holes_a_reflection_and_single_wrong_fixes_displace_no_keyframe() {
+    /// Changes a fix, and returns whether the receiver reports it.
+    type Spoil = fn(usize, &mut GnssFix) -> bool;
+    fn hole<const FROM_S: i64>(_: usize, fix: &mut GnssFix) -> bool {
+        !(FROM_S * SECOND_NS..(FROM_S + 20) * SECOND_NS).contains(&fix.stamp_ns)
+    }
+    let solved = |seed: u64, spoil: Spoil, judged_s: &[i64]| {
+        let drive = Drive::new(900, seed);
+        let fixes = drive.fixes(seed + 1).into_iter().enumerate();
+        let fixes = fixes.filter_map(|(k, mut fix)| spoil(k, &mut fix).then_some(fix));
+        let mut estimator = drive.solved(fixes.collect());
+        for at_s in judged_s {
+            let keyframe = drive.stamps.partition_point(|it| *it < at_s * SECOND_NS);
+            let error_m = drive.error_m(&mut estimator, keyframe);
+            assert!(error_m < 0.8, "seed {seed}, {at_s} s: {error_m}");
+        }
+        estimator
+    };
+    solved(3, hole::<20>, &[30]);
+    solved(3, hole::<60>, &[70]);
+    solved(3, hole::<100>, &[110]);
+    let single: Spoil = |k, fix| {
+        fix.east_m -= if k.is_multiple_of(9) { 25.0 } else { 0.0 };
+        true
+    };
+    solved(7, single, &[25, 80, 130]);
+    let reflection: Spoil = |_, fix| {
+        let by_m = if is_reflected(fix.stamp_ns) { 4.0 } else { 0.0 };
+        (fix.east_m, fix.north_m) = (fix.east_m + 4.0 * by_m, fix.north_m - 3.0 * by_m);
+        true
+    };
+    let estimator = solved(5, reflection, &[47]);
+    let refused = estimator.fixes().taken() - used(&estimator);
+    let positions = estimator.fixes().positions().iter();
+    let inside = positions.filter(|it| is_reflected(it.0)).count();
+    assert!(
+        refused.abs_diff(inside) <= inside / 10,
+        "{refused} of {inside}"
+    );
+}
+
 #[test]
 fn a_clock_that_is_wrong_is_told_and_its_fixes_are_not_used() {
     let drive = Drive::new(900, 9);
