@@ -80,6 +80,18 @@ fn something_seen_by_one_of_many_views_fades() {
 }
 
 #[test]
+fn a_street_driven_often_is_no_brighter() {
+    let once = drive(40, &wall());
+    let again = once.iter().cloned().map(|(at, mut keyframe)| {
+        keyframe.seq += 40;
+        (at, keyframe)
+    });
+    let twice: Vec<_> = once.iter().cloned().chain(again).collect();
+    let [once, twice] = [once, twice].map(|drive| cell(&mut drawn(&drive), 0.1, 20.1).evidence);
+    assert!(once.abs_diff(twice) <= 4, "{once} and {twice}");
+}
+
+#[test]
 fn a_cell_beyond_the_farthest_return_was_not_looked_at() {
     let mut evidence = drawn(&drive(1, &wall()));
     assert!(cell(&mut evidence, -0.5, 15.0).looked > 0);
@@ -136,4 +148,42 @@ fn a_point_that_is_nowhere_is_left_out() {
             .push(SparsePoint::from([x_m, 0.0, 0.0, weight, 0.0]));
     }
     assert_eq!(images(&mut drawn(&[(at, strange)])), whole);
+}
+
+#[test]
+fn options_out_of_bounds_are_refused_by_name() {
+    type Change = fn(&mut MapOptions);
+    let reach = "must be beyond near_m, and 1 to 2000 cells";
+    let wrong: [(Change, &str); 8] = [
+        (|it| it.cell_m = 0.0, "cell_m is 0, but must be 0.05 to 5"),
+        (
+            |it| it.cell_m = f64::NAN,
+            "cell_m is NaN, but must be 0.05 to 5",
+        ),
+        (|it| it.near_m = -1.0, "near_m is -1, but must be 0 to 1000"),
+        (|it| it.reach_m = 5.0, &format!("reach_m is 5, but {reach}")),
+        (
+            |it| it.reach_m = 401.0,
+            &format!("reach_m is 401, but {reach}"),
+        ),
+        (
+            |it| it.half_weight_m = 0.0,
+            "half_weight_m is 0, but must be 0.1 to 10000",
+        ),
+        (
+            |it| it.bearing_deg = 5.1,
+            "bearing_deg is 5.1, but must be 0 to 5",
+        ),
+        (
+            |it| it.bearing_deg = -0.1,
+            "bearing_deg is -0.1, but must be 0 to 5",
+        ),
+    ];
+    for (change, words) in wrong {
+        let mut options = MapOptions::default();
+        change(&mut options);
+        let refused = options.validate().unwrap_err().to_string();
+        assert_eq!(refused, format!("the map's {words}"));
+    }
+    assert!(MapOptions::default().validate().is_ok());
 }
