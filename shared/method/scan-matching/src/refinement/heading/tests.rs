@@ -45,6 +45,16 @@ fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64
 }
 
 #[test]
+fn a_standing_vehicle_shows_the_bias() {
+    let (heading, off_rad) = drive(120, 0.0, None);
+    let off_radps = heading.bias_radps - BIAS_RADPS;
+    assert!(off_radps.abs() < 2e-5, "{off_radps} rad/s");
+    assert!(off_rad.abs() < 5e-4, "{off_rad} rad");
+    let sigma_radps = heading.covariance[(1, 1)].sqrt();
+    assert!(off_radps.abs() < 3.0 * sigma_radps, "{sigma_radps} rad/s");
+}
+
+#[test]
 fn on_the_road_the_bias_is_never_better_known_than_the_radar_leans() {
     let [stood, driven] = [None, Some(10)].map(|keyframes| {
         let (heading, off_rad) = drive(400, 0.1, keyframes);

@@ -155,6 +155,21 @@ fn wheels_that_slip_are_not_used_until_they_agree_again() {
     assert!(drive.wheels.predict(&measured, &drive.config).is_some());
 }
 
+/// Wheels that turn 30 % too fast while the vehicle pulls away: each motion alone is within the
+/// noise of a match.
+#[test]
+fn wheels_that_slip_from_the_first_metre_are_noticed_and_their_scale_is_learnt_again() {
+    for seed in 0..100 {
+        let mut drive = Drive::new(seed);
+        let steps = (1..=30).map(|scan| 0.03 * f64::from(scan));
+        let refused = steps.filter(|step_m| !drive.slipping_step(*step_m, 0.3 * step_m));
+        assert!(refused.count() > 0, "{seed}");
+        drive.steps(20);
+        let off = (drive.wheels.scale - drive.true_scale).abs();
+        assert!(off < 0.01, "{seed}: {off}");
+    }
+}
+
 /// A tachometer that shows 11 % too much, contrary to the settings, is not learnt in silence.
 #[test]
 fn wheels_of_another_scale_than_the_settings_allow_slip_again_and_again() {
