@@ -185,11 +185,18 @@ fn a_provider_that_is_not_built_in_is_reported_with_its_feature() {
     if !runtime_is_installed() {
         return;
     }
-    let config = MaskingConfig {
-        provider: Provider::Tensorrt,
-        ..learned(&card("single-31"))
-    };
-    rejected(&config, &raster(), &["--features tensorrt", "`cpu`"]);
+    for (provider, name) in [
+        (Provider::Cuda, "cuda"),
+        (Provider::Tensorrt, "tensorrt"),
+        (Provider::Openvino, "openvino"),
+    ] {
+        let config = MaskingConfig {
+            provider,
+            ..learned(&card("single-31"))
+        };
+        let (key, feature) = (format!("is `{name}`"), format!("--features {name},"));
+        rejected(&config, &raster(), &[&key, &feature, "`cpu`"]);
+    }
 }
 
 // Mismatches that are reported but not rejected.
@@ -208,11 +215,14 @@ fn settings_that_differ_from_training_are_listed() {
     };
     let none: [&str; 0] = [];
     assert_eq!(mismatches("[training]", "[training]", &other), none);
-    let masking = "[masking]\nfloor = 0\ncompensate = true\nundo_doppler = false\n[training]";
+    let same = "[masking]\nfloor = 20\ncompensate = true\n[training]";
+    assert_eq!(mismatches("[training]", same, &raster()), none);
+    let masking = "[masking]\nfloor = 0\ncompensate = false\nundo_doppler = false\n[training]";
     assert_eq!(
         mismatches("[training]", masking, &raster()),
         [
             "masking.threshold is 20 instead of 0",
+            "masking.compensate is true instead of false",
             "masking.undo_doppler is true instead of false"
         ]
     );
