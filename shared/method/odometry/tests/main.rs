@@ -5,3 +5,4 @@
 mod covariances;
 mod examples;
 mod sample_faults;
+mod standing_pair;
