@@ -224,6 +224,20 @@ fn a_car_that_turns_off_keeps_its_identity_and_its_velocity_follows() {
 }
 
 #[test]
+fn two_cars_in_a_queue_stay_two() {
+    let mut scene = Scene::settled();
+    let behind = |gap_m: f64| Car {
+        from_s: scene.time_s(),
+        ..Car::new(scene.ahead(50.0 + gap_m, 4.0), [-7.0, 0.0])
+    };
+    let cars = [behind(0.0), behind(16.0)];
+    let objects = scene.steps(10, &cars);
+    assert_eq!(objects.len(), 2, "{objects:?}");
+    let apart = objects[0].position - objects[1].position;
+    assert!((apart.norm() - 16.0).abs() < 1.0, "{objects:?}");
+}
+
+#[test]
 fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
     let mut scene = Scene::settled();
     let car = Car {

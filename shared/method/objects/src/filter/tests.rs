@@ -109,6 +109,35 @@ fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models()
 }
 
 #[test]
+fn a_vehicle_that_goes_on_turning_is_found_to_turn_and_a_straight_one_is_not() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    for wanted_radps in [-0.6, -0.35, 0.0, 0.35, 0.6] {
+        let (mut found_radps, mut error_mps, runs) = (0.0, 0.0, 40);
+        for _ in 0..runs {
+            let mut vehicle = Vehicle {
+                position: Vector2::new(20.0, -7.0),
+                velocity: Vector2::new(-6.0, 5.0),
+                model: 2,
+            };
+            let filter = tracked(&mut vehicle, 14, &mut rng, |vehicle, _| {
+                vehicle.turn(wanted_radps);
+            });
+            let turns = filter.models.iter().zip(TURNS);
+            let turn: f64 = turns.map(|(model, turn)| model.probability * turn).sum();
+            found_radps += turn * TURN_RATE_RADPS / f64::from(runs);
+            error_mps += (filter.velocity() - vehicle.velocity).norm() / f64::from(runs);
+        }
+        // A turn lasts half a second in the mean, so that each model expects it to end.
+        let share = found_radps / wanted_radps;
+        assert!(
+            (wanted_radps == 0.0 && found_radps.abs() < 0.1) || (0.2..1.0).contains(&share),
+            "{found_radps} {wanted_radps}"
+        );
+        assert!(error_mps < 1.4, "{error_mps} at {wanted_radps}");
+    }
+}
+
+#[test]
 fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let mut vehicle = Vehicle {
