@@ -1,6 +1,6 @@
 //! The exhaustive search against direct sums and known motions, and the inputs that it rejects.
 
-use crate::common::{Motion, draw, pair, pair_of, scene_aside};
+use crate::common::{Motion, Numbers, draw, pair, pair_of, scene_aside};
 use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
 use ndarray::{Array2, ArrayView2};
 use proptest::prelude::*;
@@ -132,6 +132,31 @@ fn small_angles_are_not_pushed_off_zero() {
     }
     let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
     assert!((mean - 1.0).abs() < 0.15, "{slopes:?}");
+}
+
+#[test]
+fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
+    let (n, cell_m, mut numbers) = (127, 0.8, Numbers(11));
+    let plain = ExhaustiveConfig {
+        overlap: Overlap::None,
+        peak: Peak::Parabola,
+        ..ExhaustiveConfig::default()
+    };
+    for config in [ExhaustiveConfig::default(), plain] {
+        let mut squares = [0.0; 3];
+        for k in 0..16 {
+            let [x_m, y_m, yaw_deg] = [9.0, 9.0, 14.0].map(|limit| numbers.within(limit));
+            let motion = Motion::degrees(x_m, y_m, yaw_deg);
+            let (earlier, later) = pair(n, cell_m, motion, 300 + k);
+            let found = search(n, cell_m, &config, &earlier, &later);
+            for (square, error) in squares.iter_mut().zip(errors(&found, motion)) {
+                *square += error * error / 16.0;
+            }
+        }
+        let rms = squares.map(f64::sqrt);
+        let is_within = rms[0].max(rms[1]) < 0.15 * cell_m && rms[2] < 0.2;
+        assert!(is_within, "{:?}: {rms:?} (m, m, deg)", config.overlap);
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Motions put into generated scenes come out of the search.
 
-use crate::common::{Motion, pair, pair_of, search};
+use crate::common::{Motion, Numbers, pair, pair_of, search};
 use gyre_scan_matching::{
     MotionMatch, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
 };
@@ -19,6 +19,27 @@ fn errors(found: &MotionMatch, motion: Motion) -> [f64; 3] {
         found.y_m - motion.y,
         (found.yaw_rad - motion.yaw).to_degrees(),
     ]
+}
+
+#[test]
+fn whole_range_of_angles_and_shifts_to_a_fraction_of_a_cell() {
+    let (n, cell_m, mut numbers) = (255, 0.4, Numbers(7));
+    let (mut worst, mut squares, pairs) = ([0.0_f64; 3], [0.0; 3], 40);
+    for k in 0..pairs {
+        let [x_m, y_m, yaw_deg] = [8.0, 8.0, 19.5].map(|limit| numbers.within(limit));
+        let motion = Motion::degrees(x_m, y_m, yaw_deg);
+        let found = recovered(n, cell_m, &Configs::default(), motion, 100 + k);
+        for (axis, error) in errors(&found, motion).into_iter().enumerate() {
+            worst[axis] = worst[axis].max(error.abs());
+            squares[axis] += error * error / pairs as f64;
+        }
+    }
+    let rms = squares.map(f64::sqrt);
+    let is_within = |errors: &[f64; 3], cells: f64, degrees: f64| {
+        errors[0].max(errors[1]) < cells * cell_m && errors[2] < degrees
+    };
+    assert!(is_within(&rms, 0.1, 0.08), "RMS {rms:?} (m, m, deg)");
+    assert!(is_within(&worst, 0.5, 0.3), "worst {worst:?} (m, m, deg)");
 }
 
 #[test]
