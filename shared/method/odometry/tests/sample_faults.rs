@@ -268,3 +268,11 @@ fn no_fault_of_samples_changes_a_motion_silently() {
     faults(&drive, 28, true);
     faults(&drive, 42, false);
 }
+
+#[test]
+#[ignore = ".ci/nightly: 616 faults, each with the refinement of 40 scans"]
+fn no_fault_of_many_changes_a_motion_silently() {
+    let drive = Drive::new(40);
+    faults(&drive, 308, true);
+    faults(&drive, 308, false);
+}
