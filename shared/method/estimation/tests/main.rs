@@ -5,6 +5,7 @@
 
 mod common;
 
+mod consistency;
 mod filter;
 mod g2o;
 mod graph;
