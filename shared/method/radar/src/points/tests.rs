@@ -217,7 +217,7 @@ fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
             let most_m = 0.05 + 0.5 * 0.9_f64.to_radians() * range_m;
             assert!(
                 along_m < 0.03 && miss.norm() < most_m,
-                "{sense:?} {chirps_alternate}: {scatterer} missed by {miss}"
+                "{sense:?} {chirps_alternate}: {scatterer} missed by {miss:?}"
             );
         }
     }
