@@ -152,5 +152,8 @@ fn a_folder_of_another_recording_is_refused() {
     let refused = Ended::of(simulate(recording.path(), &faster));
     refused.refused_with(&["dataset of another configuration", "another folder"]);
     let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"])).stderr;
-    assert!(unknown.contains("oxford, boreas, radiate"), "{unknown}");
+    assert!(
+        unknown.contains("`oxford`, `boreas`, `radiate`"),
+        "{unknown}"
+    );
 }

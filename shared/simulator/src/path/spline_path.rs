@@ -1,3 +1,5 @@
+//! A smooth path through poses at discrete times.
+
 use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::Pose;
@@ -26,16 +28,26 @@ pub struct SplinePath {
 }
 
 impl SplinePath {
-    /// A path close to measured poses, which have errors of some centimetres; their times ascend
-    /// from zero (seconds). The vehicle stands where they hardly change for a while.
+    /// A path close to `poses`, whose times ascend from zero (seconds), low-pass filtered with
+    /// `cutoff_hz`.
+    pub fn new(poses: &[(f64, Pose)], cutoff_hz: f64) -> Self {
+        Self::smooth(&unwrapped(poses), cutoff_hz)
+    }
+
+    /// A path close to measured poses, which have errors of some centimetres. The vehicle stands
+    /// where they hardly change for a while.
     pub fn measured(poses: &[(f64, Pose)]) -> Self {
         let mut samples = unwrapped(poses);
         hold_stands(&mut samples);
+        Self::smooth(&samples, MEASURED_HZ)
+    }
+
+    fn smooth(samples: &[Sample<3>], cutoff_hz: f64) -> Self {
         let duration_s = samples.last().map_or(0.0, |last| last.at);
         let spacing_s = duration_s / (samples.len().max(2) - 1) as f64;
-        let step_s = spacing_s.clamp(0.02, 0.5 / MEASURED_HZ);
+        let step_s = spacing_s.clamp(0.02, 0.5 / cutoff_hz);
         Self {
-            curve: UniformSpline::fit(&samples, step_s, MEASURED_HZ),
+            curve: UniformSpline::fit(samples, step_s, cutoff_hz),
             duration_s,
         }
     }
@@ -75,6 +87,7 @@ fn unwrapped(poses: &[(f64, Pose)]) -> Vec<Sample<3>> {
     poses.iter().map(sample).collect()
 }
 
+/// Sets all samples of a stand to their median.
 fn hold_stands(samples: &mut [Sample<3>]) {
     let mut first = 0;
     while first < samples.len() {

@@ -127,7 +127,7 @@ fn a_street_driven_back_is_recognised_and_the_loops_are_right() {
             if verified.outcome == VerificationOutcome::Accepted {
                 let error = verified.motion.error(&truth);
                 let is_near = error.xy().norm() < 0.15 && error.z.abs() < 0.005;
-                assert!(is_near, "{k}: {error}");
+                assert!(is_near, "{k}: {error:?}");
                 is_closed = true;
             }
         }
