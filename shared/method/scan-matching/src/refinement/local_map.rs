@@ -88,16 +88,23 @@ impl LocalMap {
 
     /// Adds a keyframe in place of the oldest one, if the map is full.
     pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose, ahead_m: Vector2<f64>) {
-        let spare = self.spare.pop().or_else(|| self.used.pop_front());
-        let Some(mut keyframe) = spare else {
+        let oldest = self.spare.is_empty().then(|| self.used.pop_front());
+        if let Some(oldest) = oldest.flatten() {
+            for (level, image) in self.levels.iter_mut().zip(&oldest.images) {
+                level.subtract(image);
+            }
+            self.spare.push(oldest);
+        }
+        let Some(mut keyframe) = self.spare.pop() else {
             return;
         };
         (keyframe.id, keyframe.pose, keyframe.ahead_m) = (id, *pose, ahead_m);
-        for (level, image) in self.levels.iter_mut().zip(&mut keyframe.images) {
-            level.draw(points, pose, image);
+        for (k, level) in self.levels.iter_mut().enumerate() {
+            level.draw(points, pose, &mut keyframe.images[k]);
+            let others = self.used.iter().map(move |it| &it.images[k]);
+            level.add_newest(&keyframe.images[k], others);
         }
         self.used.push_back(keyframe);
-        self.sum_images();
     }
 
     /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false`

@@ -143,19 +143,98 @@ impl MapLevel {
             return;
         };
         self.corner = newest.corner;
-        let n = self.n as i64;
         for image in images {
             self.images += 1;
-            let off = [0, 1].map(|axis| image.corner[axis].saturating_sub(self.corner[axis]));
-            let [rows, columns] = off.map(|off| off.max(0)..off.saturating_add(n).min(n));
-            if columns.is_empty() {
-                continue;
+            self.combine(image, [[0, 0], [self.n, self.n]], add);
+        }
+    }
+
+    /// Takes an image that is no longer in the map out of the sum.
+    pub fn subtract(&mut self, image: &Image) {
+        self.images -= 1;
+        self.combine(image, [[0, 0], [self.n, self.n]], subtract);
+    }
+
+    /// Moves the sum to the square of a new image, and adds it. `others` are all images in the sum:
+    /// newly covered cells are summed again.
+    pub fn add_newest<'a>(
+        &mut self,
+        newest: &Image,
+        others: impl Iterator<Item = &'a Image> + Clone,
+    ) {
+        let [down, right] =
+            [0, 1].map(|axis| newest.corner[axis].saturating_sub(self.corner[axis]));
+        self.corner = newest.corner;
+        for part in self.move_sum(down, right) {
+            for other in others.clone() {
+                self.combine(other, part, add);
             }
-            for row in rows {
-                let to = (row * n + columns.start) as usize..(row * n + columns.end) as usize;
-                let from = ((row - off[0]) * n + columns.start - off[1]) as usize;
-                add(&image.cells[from..from + to.len()], &mut self.sum[to]);
+        }
+        self.images += 1;
+        self.combine(newest, [[0, 0], [self.n, self.n]], add);
+    }
+
+    /// Moves the square of the sum by so many cells, and empties the newly covered ones: the rows
+    /// and the columns that are returned, each as the first cell and the one behind the last, (x,
+    /// y).
+    fn move_sum(&mut self, down: i64, right: i64) -> [[[usize; 2]; 2]; 2] {
+        let n = self.n;
+        let (rows, columns) = (exposed(down, n), exposed(right, n));
+        let kept = n - (columns.end - columns.start);
+        let (to, from) = if right >= 0 {
+            (0, n - kept)
+        } else {
+            (n - kept, 0)
+        };
+        let mut move_row = |row: usize| {
+            let source = (row as i64 + down) as usize * n + from;
+            self.sum.copy_within(source..source + kept, row * n + to);
+        };
+        // Each row is moved before another takes its place.
+        if down >= 0 {
+            (0..rows.start).for_each(&mut move_row);
+        } else {
+            (rows.end..n).rev().for_each(&mut move_row);
+        }
+        let parts = [
+            [[rows.start, 0], [rows.end, n]],
+            // The rows above have these columns already.
+            if down >= 0 {
+                [[0, columns.start], [rows.start, columns.end]]
+            } else {
+                [[rows.end, columns.start], [n, columns.end]]
+            },
+        ];
+        for [first, end] in parts {
+            for row in first[0]..end[0] {
+                self.sum[row * n + first[1]..row * n + end[1]].fill(0);
             }
+        }
+        parts
+    }
+
+    /// Combines a part of the sum, from its first cell (x, y) to the one behind its last, with an
+    /// image.
+    fn combine(
+        &mut self,
+        image: &Image,
+        [first, end]: [[usize; 2]; 2],
+        with: impl Fn(&[u8], &mut [u16]),
+    ) {
+        let n = self.n as i64;
+        let off = [0, 1].map(|axis| image.corner[axis].saturating_sub(self.corner[axis]));
+        let [rows, columns] = [0, 1].map(|axis| {
+            let (first, end) = (first[axis] as i64, end[axis] as i64);
+            first.max(off[axis])..end.min(off[axis] + n)
+        });
+        if columns.is_empty() {
+            return;
+        }
+        for row in rows {
+            let to = (row * n + columns.start) as usize..(row * n + columns.end) as usize;
+            let from = ((row - off[0]) * n + columns.start - off[1]) as usize;
+            let from = &image.cells[from..from + to.len()];
+            with(from, &mut self.sum[to]);
         }
     }
 
@@ -168,6 +247,12 @@ impl MapLevel {
             origin: self.corner.map(|cell| cell as f64 * self.cell_m),
         }
     }
+}
+
+/// Returns the newly covered cells of a range of n cells that moves by `by` cells.
+fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
+    let count = by.unsigned_abs().min(n as u64) as usize;
+    if by >= 0 { n - count..n } else { 0..count }
 }
 
 struct Drawing {
@@ -267,6 +352,14 @@ fn add(cells: &[u8], sum: &mut [u16]) {
         .for_each(|(sum, cell)| *sum += u16::from(*cell));
 }
 
+/// Takes out of the sum an image that is in it.
+#[simd]
+fn subtract(cells: &[u8], sum: &mut [u16]) {
+    sum.iter_mut()
+        .zip(cells)
+        .for_each(|(sum, cell)| *sum -= u16::from(*cell));
+}
+
 #[cfg(test)]
 mod tests {
     use gyre_geometry::pose;
@@ -304,6 +397,33 @@ mod tests {
         assert_eq!(place, [6.0, 2.0]);
         // m / (m + mean): the mean of a Gaussian is half of its peak.
         assert!((share - 2.0 / 3.0).abs() < 0.01, "{share}");
+    }
+
+    proptest::proptest! {
+        /// Wherever the vehicle drives, even back over places that have left the square.
+        #[test]
+        fn a_sum_that_is_kept_up_is_the_sum_of_all_images(
+            steps in proptest::collection::vec((-120.0..120.0, -30.0..30.0), 1..12),
+        ) {
+            let mut kept = MapLevel::new(1.0, 10.0);
+            let mut anew = MapLevel::new(1.0, 10.0);
+            let mut images: Vec<Image> = Vec::new();
+            let near: Vec<[f32; 2]> = (0..60).map(|k| [(k * 7 % 13 - 6) as f32, (k * 5 % 11 - 5) as f32]).collect();
+            let mut at = [0.0, 0.0];
+            for (dx, dy) in steps {
+                at = [at[0] + dx / 4.0, at[1] + dy / 4.0];
+                let mut image = kept.new_image();
+                kept.draw(&points(&near), &pose(at[0], at[1], 0.3), &mut image);
+                if images.len() == 4 {
+                    kept.subtract(&images.remove(0));
+                }
+                kept.add_newest(&image, images.iter());
+                images.push(image);
+                anew.sum_images(images.iter());
+                proptest::prop_assert_eq!(kept.view().sum, anew.view().sum);
+                proptest::prop_assert_eq!(kept.view().full, anew.view().full);
+            }
+        }
     }
 
     /// The definition: the points are shared between the cells around them, and these are blurred

@@ -19,6 +19,7 @@ const TRACKER_WORDS: usize = 4 + 2 * 9 + 8 + 12 + 21 + 2 * 21;
 /// corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = CORNERS + 4;
 const CORNERS: usize = 2 + 4 + 2;
+const CONTIGUOUS: &str = "the rows of an image follow each other";
 /// The checksum of an empty slot. No content has it.
 pub(super) const EMPTY: [u8; 8] = [0; 8];
 
@@ -268,10 +269,8 @@ pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
         for (k, value) in corner.iter().enumerate() {
             set_word(slot, CORNERS + 2 * level + k, *value as u64);
         }
-        slot[at..]
-            .iter_mut()
-            .zip(cells)
-            .for_each(|(to, cell)| *to = *cell);
+        let cells = cells.to_slice().expect(CONTIGUOUS);
+        slot[at..at + cells.len()].copy_from_slice(cells);
         at += cells.len();
     }
     Checksum::First.seal(slot);
@@ -298,12 +297,9 @@ pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) 
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images_mut().into_iter().enumerate() {
         *corner = [0, 1].map(|k| word(slot, CORNERS + 2 * level + k) as i64);
-        let count = cells.len();
-        cells
-            .into_iter()
-            .zip(&slot[at..])
-            .for_each(|(cell, from)| *cell = *from);
-        at += count;
+        let cells = cells.into_slice().expect(CONTIGUOUS);
+        cells.copy_from_slice(&slot[at..at + cells.len()]);
+        at += cells.len();
     }
     keyframe_name(slot) == Some(name)
 }
