@@ -187,8 +187,7 @@ pub fn interrupt_at_the_start(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     for _ in 0..LIVES {
         let running = run.start();
-        // A whole run of the small recording can take less than 60 ms.
-        scene.pause(30);
+        scene.pause(60);
         interrupted(scene, running, None)?;
     }
     scene.resumed(&run);
