@@ -117,7 +117,7 @@ fn colours() -> impl Iterator<Item = RGBColor> {
 }
 
 /// Letters of a name in the legend.
-const LABEL: usize = 20;
+const LABEL: usize = 19;
 
 /// Returns the end of a name that is too long for the legend.
 fn shortened(name: &str) -> &str {
