@@ -328,7 +328,7 @@ def check_scan(header: ScanHeader, received: Received) -> None:
     payload = received.sample.payload()
     length = payload.len() * ctypes.sizeof(payload.contained_type)
     last = header.first_byte + (rows - 1) * header.stride + header.bins
-    require(last <= length, f"its payload of {length} bytes is shorter than its header says: {last} bytes")
+    require(last <= length, f"its payload of {length} bytes is shorter than its header states: {last} bytes")
     require(rows == 1 or header.stride >= header.bins, f"stride is {header.stride}, but must be {header.bins} or more")
     require(1e-3 <= header.range_resolution_m <= 1e3, f"range_resolution_m is {header.range_resolution_m}")
     require(abs(header.range_offset_m) <= 1e4, f"range_offset_m is {header.range_offset_m}")

@@ -22,7 +22,7 @@ use crate::{errors, values};
 ///
 /// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in
 /// one key. Unknown keys and values out of their bounds raise ConfigError. A key with the value
-/// None has its default. A configuration never changes, and can be pickled.
+/// `None` stands for the default. A configuration never changes, and can be pickled.
 #[pyclass(module = "gyre", frozen, eq)]
 pub struct Config {
     method: MethodConfig,

@@ -51,7 +51,7 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
     let late = configurations::gyro_and_wheels().run();
     let late = late.set("wheels.delay_s=600");
     refused(late, &["the log of the wheels", "wheels.delay_s is wrong"]);
-    // Settings, and what is said.
+    // Settings, and words of the refusal.
     for case in [
         "source.first=24|source.first is 24|24 scans, from 0 to 23",
         "masking.treshold=3|[masking]|did you mean `threshold`?",

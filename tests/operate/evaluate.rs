@@ -104,7 +104,8 @@ fn a_table_and_all_plots_come_of_an_odometry() {
     // 23 motions have no segment of 64.
     let rows = ["1", "4", "16", "64"].map(rows_of);
     assert_eq!(rows, [1, 1, 1, 0], "{table}");
-    let words = "ATE,covariance    23 motions,first,second,times as much as their covariances say";
+    let words =
+        "ATE,covariance    23 motions,first,second,times as much as their covariances state";
     for word in words.split(',') {
         assert!(table.contains(word), "{word} is not in:\n{table}");
     }

@@ -86,7 +86,7 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
         (&["--cold"], "/nowhere/masking", "cannot start masking", ""),
     ] {
         let refused = swap(&run, "masking", options, &[program]);
-        refused.refused_with(&[reason, words, "masking goes on as before"]);
+        refused.refused_with(&[reason, words, "masking continues as before"]);
         let status = status(&run).unwrap();
         let back = process(&status, "masking");
         assert_eq!(back["is_swapped"], false);
@@ -226,7 +226,7 @@ fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
     let mut running = run.start();
     running.await_poses(2);
     let said = said(swapping(&run, &[]));
-    let note = "masking goes on as before: waiting for 8 s at most (run.start_timeout_s) for `";
+    let note = "masking continues as before: waiting for 8 s at most (run.start_timeout_s) for `";
     assert!(said.contains(note), "{said}");
     assert!(said.contains("it did not get ready"), "{said}");
     assert_eq!(status(&run).unwrap()["swap"], Value::Null);

@@ -142,7 +142,7 @@ fn assert_made_up_for(follower: &str) {
     let ended = run.finish();
     let died = format!("{follower} died 3 times");
     ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
-    let goes_on = format!("odometry goes on without {follower}");
+    let goes_on = format!("odometry continues without {follower}");
     assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
     assert!(run.odometry() == undisturbed().odometry);
     fs::remove_file(broken).unwrap();
@@ -155,7 +155,7 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
     let script = "echo 'no more loops' >&2; exit 2";
     let run = run().rate("8").stage_script(LOOP_CLOSURE, script);
     let mut running = run.start();
-    let given_up = format!("odometry goes on without {LOOP_CLOSURE}");
+    let given_up = format!("odometry continues without {LOOP_CLOSURE}");
     running.await_words(&given_up).await_poses(2);
     running.signal(Signal::INT);
     let ended = running.finish();

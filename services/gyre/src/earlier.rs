@@ -271,7 +271,7 @@ fn known_poses(
         // Not more than a power failure can take, soon after the start.
         None if content.poses <= 2 * GroupSync::LIMIT => {
             print::note(format_args!(
-                "gyre: {} knows none of the {} poses of the journal: beginning anew",
+                "gyre: {} knows none of the {} poses of the journal: starting again",
                 path.display(),
                 content.poses
             ));

@@ -127,7 +127,7 @@ impl Scans {
         if let Some(scans @ 0..2) = count {
             let (path, plural) = (configuration.data(), if scans == 1 { "" } else { "s" });
             return Err(format!(
-                "{path} has {scans} scan{plural}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there"
+                "{path} has {scans} scan{plural}: a motion is between two, so there is nothing to run; `gyre inspect` shows its content"
             )
             .into());
         }
@@ -204,7 +204,7 @@ impl Scans {
             }
         }
         if configuration.odometry.doppler.is_used() {
-            return Err("doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`".into());
+            return Err("doppler.kind is `auto`, but a live radar does not report which of its chirps rise: set it to `none`".into());
         }
         configuration.dataset.check()?;
         let radar = ask(configuration)?;

@@ -72,7 +72,8 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
-/// The constants of a `dataset.toml` go before those of its format. A recorded run has its own.
+/// The constants of a `dataset.toml` override the constants of its format. A recorded run has its
+/// own.
 pub fn radar_constants(
     data: &Path,
     wished: &DatasetOptions,

@@ -1,6 +1,6 @@
 //! Configurations: TOML that is read strictly and overridden key by key, and the settings of a
 //! recording that is played without a configuration. [`MethodConfig`] has the settings of the
-//! method alone; with the feature `run`, `Configuration` has those of a run of processes.
+//! method alone; with the feature `run`, `Configuration` has the settings of a run of processes.
 
 mod automatic;
 pub mod calibration;

@@ -182,7 +182,7 @@ impl fmt::Display for Nees {
         let factors = lengths.map(|length| format!("{:.2}", length.all.pose.ratio.sqrt()));
         let factors = factors.collect::<Vec<_>>().join(", ");
         write!(f, "\n\n{:14}poses err {factors} times as much ", "")?;
-        write!(f, "as their covariances say")
+        write!(f, "as their covariances state")
     }
 }
 

@@ -85,7 +85,7 @@ pub const GROUPS: [Group; 5] = [
         unusual("scans dropped", "/dropped"),
         unusual("scans unreadable", "/unreadable"),
         unusual("scans missing in the recording", "/missing"),
-        unusual("breaks, after which the path starts anew", "/breaks"),
+        unusual("breaks, where the path starts again", "/breaks"),
         unusual("azimuths lost, which are put back", "/lost/azimuths"),
         unusual("of them at unknown places", "/lost/unplaced"),
         count("motions refined", "/motions/refined"),

@@ -28,7 +28,7 @@ const ORIGIN: Geographic = Geographic {
     longitude_deg: 10.0,
 };
 
-/// A GNSS receiver whose antenna is that of the radar.
+/// A GNSS receiver whose antenna is at the radar.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulatedGnssConfig {

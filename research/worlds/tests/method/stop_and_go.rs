@@ -118,7 +118,7 @@ fn drive(config: &Configuration) -> Report {
 
 /// A table: with `--ignored --nocapture`, in a release build.
 #[test]
-#[ignore = "renders 680 scans of each radar, twice"]
+#[ignore = ".ci/nightly: renders 680 scans of each radar, twice"]
 fn stop_and_go_of_several_radars() {
     println!(
         "| radar | held | path | while standing | while creeping | `stationary` standing, moving |"

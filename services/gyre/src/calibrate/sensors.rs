@@ -62,7 +62,7 @@ macro_rules! sensor {
                 let found = $calibrate(drive, &track, &self.log.samples, max_gap_s);
                 match &found {
                     Ok(found) => print::line(found.table(&self.configured))?,
-                    Err(error) => print::line(format_args!("{:<21} not told: {error}", ""))?,
+                    Err(error) => print::line(format_args!("{:<21} not determined: {error}", ""))?,
                 }
                 Ok(found)
             }

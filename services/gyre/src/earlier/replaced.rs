@@ -99,7 +99,7 @@ pub(super) fn give_back(out: &Out) -> Result<(), StorageError> {
     storage::rename(&aside, &journal)?;
     storage::sync_folder(out.path())?;
     print::note(format_args!(
-        "gyre: {} has the results of the complete run before, as the new one had none",
+        "gyre: {} has the results of the complete run before, because the new run had none",
         out.path().display()
     ));
     Ok(())

@@ -15,7 +15,7 @@ use crate::{LinkError, request::Question, session};
 const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_SCANS: Question = Question("ask the robot for its scans", "the robot");
-const ASK_FOR_START: Question = Question("ask the base where to go on", "the base");
+const ASK_FOR_START: Question = Question("ask the base where to continue", "the base");
 
 pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     let side = match sender {

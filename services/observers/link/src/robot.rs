@@ -75,7 +75,12 @@ impl Robot<'_> {
     fn work(&mut self) -> Result<(), LinkError> {
         let bytes = self.launch.manifest.limits.scan_bytes;
         let key = handshake::scan_size_key(&self.config);
-        let _scan_size = request::answer(&self.session, key, "tell of the scans", move || bytes)?;
+        let _scan_size = request::answer(
+            &self.session,
+            key,
+            "report the size of the scans",
+            move || bytes,
+        )?;
         let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
         self.poses = poses.into();
         if ended {

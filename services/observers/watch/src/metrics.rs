@@ -96,7 +96,7 @@ const COUNTER: MetricType = MetricType::Counter;
 const GAUGE: MetricType = MetricType::Gauge;
 
 impl Snapshot {
-    /// Returns the metrics. Those of samples and of a live radar are missing in a run without them.
+    /// Returns the metrics. A run without samples or a live radar lacks their metrics.
     #[rustfmt::skip]
     fn metrics(&self) -> Vec<Metric<'_>> {
         let (counts, of, missed) = (&self.counts, &self.counts.witnesses, &self.counts.missed);

@@ -208,7 +208,7 @@ fn foxglove_router(shared: Shared) -> Router {
         .with_state(shared)
 }
 
-/// The sentences of the page to those that may not read, and those of viewers' connections:
+/// The sentences to readers without permission, on the page and on viewers' connections:
 /// without the token, by the name of another host, and from a page of another site.
 const REFUSALS: [[&str; 3]; 2] = [
     [

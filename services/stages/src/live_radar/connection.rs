@@ -295,7 +295,7 @@ pub enum RadarParser {
 }
 
 impl RadarParser {
-    /// `encoder_counts` per turn are those of a radar that does not report them.
+    /// `encoder_counts` per turn: for a radar that does not report them.
     pub fn new(is_udp: bool, encoder_counts: u16) -> Self {
         match is_udp {
             false => Self::Stream(Parser::default()),

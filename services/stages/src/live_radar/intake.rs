@@ -15,7 +15,7 @@ pub struct Intake {
     /// `None` until the radar has sent its configuration.
     scans: Option<ScanAssembly>,
     turns: TurnCounter,
-    /// The counts since the start of the run, those of the turns and connections not included.
+    /// The counts since the start of the run, without the counts of turns and connections.
     counts: Received,
     due_ns: Option<i64>,
 }

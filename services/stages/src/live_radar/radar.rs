@@ -171,11 +171,11 @@ impl HealthLog {
             let logged = self.unhealthy.iter().position(|it| *it == name);
             match (is_unhealthy, logged) {
                 (true, None) => {
-                    tracing::warn!("the radar says that its {name}, {value}, is {status}");
+                    tracing::warn!("the radar reports that its {name}, {value}, is {status}");
                     self.unhealthy.push(name);
                 }
                 (false, Some(index)) => {
-                    tracing::info!("the radar says that its {name}, {value}, is {status} again");
+                    tracing::info!("the radar reports that its {name}, {value}, is {status} again");
                     self.unhealthy.swap_remove(index);
                 }
                 _ => {}
@@ -183,7 +183,7 @@ impl HealthLog {
         }
         let is_silent = health.transmitting == Some(false);
         if is_silent && !self.is_silent {
-            tracing::warn!("the radar says that it does not transmit: its scans have no echoes");
+            tracing::warn!("the radar reports that it does not transmit: its scans have no echoes");
         }
         self.is_silent = is_silent;
     }

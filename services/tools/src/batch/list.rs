@@ -180,7 +180,7 @@ impl Line {
                 "`{path}` is a configuration itself: leave its column `configuration` empty"
             ));
         }
-        let unclosed = || format!("the column `set` is `{set}`, in which a quote is not closed");
+        let unclosed = || format!("the column `set` is `{set}`, with a quote that is not closed");
         Ok(Drive {
             set: shlex::split(set).ok_or_else(unclosed)?,
             configuration: self.configuration.clone(),
@@ -217,7 +217,7 @@ impl Drive {
             }),
             false => Err(format!(
                 "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
-                 {MAX_NAME} bytes; give another one in the column `name`"
+                 {MAX_NAME} bytes; give a different name in the column `name`"
             )),
         }
     }

@@ -130,9 +130,11 @@ impl<'a> Examination<'a> {
                 return Err(Interrupted.into());
             }
         }
-        self.findings.require(Rule::CreatesNothing, !has_created(), || {
-            "it creates its topics where there are none: open them, so that the supervisor's sizes hold".to_owned()
-        });
+        self.findings
+            .require(Rule::CreatesNothing, !has_created(), || {
+                "it creates topics that are missing: open them, so that the supervisor's sizes hold"
+                    .to_owned()
+            });
         Ok(process.kill()?)
     }
 
@@ -201,7 +203,7 @@ impl<'a> Examination<'a> {
                 let bytes = result_bytes(topic, own)?;
                 let same = self.findings.first_results.get(&seq) == Some(&bytes);
                 self.findings.require(Rule::SameAsOwn, same, || {
-                    format!("item {seq} has other bytes than that of our own stage")
+                    format!("item {seq} has different bytes from the item of our own stage")
                 });
             }
         }

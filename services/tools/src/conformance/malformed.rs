@@ -9,7 +9,7 @@ use crate::conformance::result::floats;
 /// A message that no stage may send, after the name of its fault.
 pub(crate) type Malformed = (&'static str, Recorded);
 
-const SHORTER: &str = "a payload shorter than its header says";
+const SHORTER: &str = "a payload shorter than its header states";
 
 /// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
 pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, StageError> {

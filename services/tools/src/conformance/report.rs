@@ -5,7 +5,7 @@ use std::fmt;
 use gyre_run::latency::Durations;
 use serde::Serialize;
 
-use crate::conformance::rule::{Rule, Verdict};
+use crate::conformance::rule::{Judged, Verdict};
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -20,16 +20,6 @@ pub struct Report {
     /// The time from sending it an item to reading its answer, one item at a time; `None` unless
     /// there is a budget.
     pub answers: Option<Work>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-pub struct Judged {
-    pub rule: Rule,
-    pub section: &'static str,
-    /// The conduct of a program that keeps it.
-    pub says: &'static str,
-    #[serde(flatten)]
-    pub verdict: Verdict,
 }
 
 /// Items that are not measured: buffers grow, and memory is touched for the first time.
@@ -135,7 +125,7 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conformance::rule::Findings;
+    use crate::conformance::rule::{Findings, Rule};
 
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 2e-3 * b

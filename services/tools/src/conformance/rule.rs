@@ -4,8 +4,6 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-use crate::conformance::report::Judged;
-
 /// Defines the rules: name, section of `docs/replace-a-stage.md` or option that demands it, and the
 /// conduct of a program that keeps it.
 macro_rules! rules {
@@ -73,6 +71,16 @@ pub enum Verdict {
     DoesNotApply(&'static str),
     /// The process did not get so far.
     NotReached,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Judged {
+    pub rule: Rule,
+    pub section: &'static str,
+    /// The conduct of a program that keeps it.
+    pub says: &'static str,
+    #[serde(flatten)]
+    pub verdict: Verdict,
 }
 
 /// The number of sentences that are kept for each rule; more would repeat the same fault.

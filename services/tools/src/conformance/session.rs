@@ -237,7 +237,7 @@ impl<'a> Session<'a> {
         };
         self.findings.checked(Rule::CopiesItem);
         for field in not_copied(stage, &input, item) {
-            let sentence = format!("item {seq}: {field} is not that of the input on `{copied}`");
+            let sentence = format!("item {seq}: {field} differs from the input on `{copied}`");
             self.findings.broken(Rule::CopiesItem, sentence);
         }
     }

@@ -130,7 +130,7 @@ impl Writer {
             Some(found) if found.count() == lost => *found,
             Some(found) => {
                 let (file, found) = (from.display(), found.count());
-                return Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording is another one now").into());
+                return Err(format!("{file} has {lost} lost azimuths, and had {found} in the run: the recording has changed since").into());
             }
         };
         self.repair(&places, &to)

@@ -33,7 +33,7 @@ fn sentence(pending: &PendingSwap) -> String {
             "`{command}` has taken over from {process}: waiting {limit} for a first scan to go through it"
         ),
         false => format!(
-            "{process} goes on as before: waiting {limit} (run.start_timeout_s) for `{command}` to say that it is ready to take over; \
+            "{process} continues as before: waiting {limit} (run.start_timeout_s) for `{command}` to report that it is ready to take over; \
              interrupt this to give it up, and start a program that cannot stand by with --cold"
         ),
     }
@@ -55,7 +55,7 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     if let Some(file) = &arguments.python {
         // By its own name: this process ends before the stage does.
         let gyre = env::current_exe()
-            .map_err(|error| format!("cannot tell the program of this process: {error}"))?;
+            .map_err(|error| format!("cannot find the program of this process: {error}"))?;
         let gyre = gyre.to_string_lossy();
         command = Some(StageConfig::own_command(&gyre, process, Some(file)));
     }
@@ -64,7 +64,7 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
         None => "the program that the run was begun with".to_owned(),
     };
     let directory = env::current_dir()
-        .map_err(|error| format!("cannot tell the current directory: {error}"))?;
+        .map_err(|error| format!("cannot find the current directory: {error}"))?;
     let swap = Swap {
         process: process.clone(),
         command,

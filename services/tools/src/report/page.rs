@@ -77,8 +77,8 @@ fn figures(subjects: &[Subject], are_last: bool) -> String {
     }
 }
 
-/// Returns a row with a figure of all subjects; `None` if none has it. Of errors the smallest is
-/// marked, where there are several.
+/// Returns a row with a figure of all subjects; `None` if no subject has it. Of errors the smallest
+/// is marked, where there are several.
 fn figure(figure: &Figure, subjects: &[Subject]) -> Option<String> {
     let values = subjects.iter().map(|it| figure.text(&it.figures));
     let values: Vec<Option<String>> = values.collect();

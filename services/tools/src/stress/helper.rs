@@ -91,7 +91,7 @@ impl Helper {
             _ => {
                 let work = &helper.work;
                 Err(
-                    format!("the helper process `{work:?}` has ended; what it printed says why")
+                    format!("the helper process `{work:?}` has ended; its output has the reason")
                         .into(),
                 )
             }

@@ -216,7 +216,7 @@ impl WitnessFaults {
         let omitted = match self.before {
             [0, _] => Some("the fault came before the measurement had begun: stop other programs"),
             [_, 0] => Some(
-                "no motion before the fault was by all that it concerns, so its end cannot be told: see the end of a plain run",
+                "no motion before the fault was by all that it concerns, so its end is unknown: see the end of a plain run",
             ),
             _ if self.found.iter().any(stood) => Some(
                 "the vehicle stood while its wheels were to slip: play another part of the drive with source.first",

@@ -93,7 +93,7 @@ budget.max_ms=-1.0 | [budget]: max_ms is -1 | 0 or more
 slam.map=a | [slam]: map is set | `graph`
 LIVE; source.address='' | address is missing
 source.kind=colossus; source.address=127.0.0.1:9 | set run.mode to `live`
-LIVE; source.address=udp://239.192.43.3 | `udp://239.192.43.3` is none for datagrams
+LIVE; source.address=udp://239.192.43.3 | `udp://239.192.43.3` is invalid for datagrams
 link.side=base; link.cut=scan; run.mode=live; run.rate=realtime | link | masking sheds load
 simulation.scans=0 | simulation | scans
 simulation.drive.speed_mps=1e9 | speed_mps | 40

@@ -111,7 +111,7 @@ impl Configuration {
             "slam" if !(0.0..=50.0).contains(&slam.submap_reach_m) =>
                 "submap_reach_m is out of its bounds: expected 0 to 50 m";
             "slam" if !slam.is_on() && !slam.map.as_os_str().is_empty() =>
-                "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
+                "map is set, but slam makes the keyframes that are found in it: set kind to `graph`";
             "gyro" if gyro.kind == GyroKind::Log && !is_named(&gyro.file) =>
                 "kind is `log`, but no file is named: set file, or kind to `auto`";
             "wheels" if wheels.kind == WheelsKind::Log && !is_named(&wheels.file) =>
@@ -165,7 +165,7 @@ impl Configuration {
             "source" if is_radar && source.scans.is_some_and(|scans| scans < 2) =>
                 "scans must be 2 or more: a motion is between two";
             "source" if source.kind == SourceKind::Ros2 && source.topic.is_empty() =>
-                "topic is missing: give that of the driver's azimuths, as in `/radar_data/fft_data`";
+                "topic is missing: give the topic of the driver's azimuths, as in `/radar_data/fft_data`";
             "source" if source.kind == SourceKind::Colossus && source.address.is_empty() =>
                 "address is missing: give the radar's, as in `192.168.0.1`";
             "source" if source.burst.get() > 1 && run.rate == Rate::Max =>

@@ -41,7 +41,7 @@ impl Address {
         };
         let bad = |_| {
             BadAddress(format!(
-                "address `{text}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
+                "address `{text}` is invalid for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
             ))
         };
         let own = |_| {

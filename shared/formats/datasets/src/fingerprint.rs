@@ -54,7 +54,7 @@ impl Fingerprint {
         let first = [self, now].map(|it| stamp(it.first_stamp_ns));
         let last = [self, now].map(|it| stamp(it.last_stamp_ns));
         let texts = |value: fn(&Self) -> String| [self, now].map(value);
-        // What comes before the earlier value, and between it and the present one.
+        // The text before the earlier value, and between the earlier and the present value.
         for ([was, now], [before, between]) in [
             (
                 texts(|it| it.format.to_string()),

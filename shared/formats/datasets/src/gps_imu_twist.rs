@@ -42,7 +42,7 @@ pub(crate) fn read<T, const N: usize>(
     }
     let is_empty = raw.entries.is_empty();
     if is_empty && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none()) {
-        let reason = "the folder is empty: unpack the recording anew";
+        let reason = "the folder is empty: unpack the recording again";
         return Err(LogError::unknown(of, folder, reason));
     }
     Ok(raw)

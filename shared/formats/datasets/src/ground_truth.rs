@@ -111,7 +111,7 @@ fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
             let header = lines(text).count().saturating_sub(stamps.len());
             let line = lines(text).nth(header + index);
             let reason = format!(
-                "its place is {apart_m:.1} m from another one of the same time: the times are rounded, and need three decimals of a second or more"
+                "its place is {apart_m:.1} m from a place of the same time: the times are rounded, and need three decimals of a second or more"
             );
             return Err(LineError::new(line.map_or(0, |(line, _)| line), reason));
         }

@@ -112,7 +112,7 @@ fn invalid_files_are_rejected_with_their_line() {
         // Rounded to four a second.
         (
             "# x\n1 0 0 0 0 0 0 1\n1.25 1 0 0 0 0 0 1\n1.25 1 2 0 0 0 0 1\n1.25 1 4 0 0 0 0 1\n",
-            "line 4: its place is 2.0 m from another one of the same time",
+            "line 4: its place is 2.0 m from a place of the same time",
         ),
     ];
     for (text, words) in cases {

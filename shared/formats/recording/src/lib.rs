@@ -8,7 +8,7 @@
 //! [`image`] takes a payload apart and puts it together again.
 //!
 //! The log time of a message is the stamp of its scan, so that a drive that was replayed faster
-//! plays at its own pace; the publish time is that of its reception by the recorder.
+//! plays at its own pace; the publish time is the time of reception by the recorder.
 //!
 //! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far,
 //! so that a reader finds a message even in a file whose writer was killed before its summary.

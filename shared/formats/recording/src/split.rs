@@ -25,7 +25,7 @@ pub struct SplitWriter {
     to: PathBuf,
     head: Head,
     split: Split,
-    /// The part that is being written, for what is no message.
+    /// The part that is being written, for records that are not messages.
     pub file: RecordingWriter,
     /// Stores the parts; `None` for a recording that nobody continues.
     ledger: Option<Ledger>,

@@ -200,7 +200,7 @@ fn round(
 ) -> Result<Round, CalibrationError> {
     let system = System::measure(drive, track, &pairs(track, revisits));
     let undetermined = || {
-        let reason = "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones";
+        let reason = "the scans have too little in common to determine the constants: their overlap has no maximum near the configured ones";
         CalibrationError::Unusable(reason.to_owned())
     };
     Ok(Round {

@@ -138,7 +138,7 @@ fn refusal(none: NoPeak, angles: &Angles) -> ClockError {
                 )
             });
             format!(
-                "the gyro turns as the radar best {best}, but about as well {rival}: the drive is too straight or too short, its turns repeat, or the log is of another drive"
+                "the gyro turns as the radar best {best}, but about as well {rival}: the drive is too straight or too short, its turns repeat, or the log is of a different drive"
             )
         }
     })

@@ -89,7 +89,7 @@ fn refusal(none: NoPeak) -> ClockError {
             "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
         ),
         NoPeak::Ambiguous { best, rival } => format!(
-            "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
+            "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of a different drive",
             best.delay_s, best.correlation, rival.delay_s, rival.correlation
         ),
     })

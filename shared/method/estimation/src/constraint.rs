@@ -62,7 +62,7 @@ impl Constraint {
         let is_finite = x.is_finite() && y.is_finite() && yaw.is_finite();
         let refusal = match self.kind {
             _ if from == to => format!(
-                "the constraint of keyframe {from} with itself says nothing: a constraint needs two keyframes"
+                "the constraint of keyframe {from} with itself is empty: a constraint needs two keyframes"
             ),
             Kind::Odometry if (from, to) != (last, last + 1) => format!(
                 "the odometry constraint from keyframe {from} to {to} does not continue the trajectory: it must lead from the last \

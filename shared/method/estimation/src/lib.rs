@@ -5,7 +5,7 @@
 //! [`TrajectoryFilter`] (the extended Kalman filter of Checchin et al.) and [`PoseGraph`] (sparse
 //! least squares) estimate the poses; [`places`] recognises places and measures the loops.
 //!
-//! Frames and units are those of [`gyre_geometry`]. Covariances are of (x, y, yaw), with x and y
+//! Frames and units are as in [`gyre_geometry`]. Covariances are of (x, y, yaw), with x and y
 //! along the axes of the frame: for a constraint, the frame of the keyframe `from`.
 
 mod constraint;

@@ -188,7 +188,7 @@ impl Model {
         let (expected, actual) = (&card.model.sha256, hexadecimal(&Sha256::digest(&bytes)));
         if !actual.eq_ignore_ascii_case(expected) {
             return Err(format!(
-                "{shown} has the SHA-256 {actual}, but its card says {expected}: it is damaged or another model's, so get it again together with its card"
+                "{shown} has the SHA-256 {actual}, but its card has {expected}: it is damaged or belongs to a different model, so get it again together with its card"
             ));
         }
         match external_file(&bytes) {

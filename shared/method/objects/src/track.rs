@@ -19,7 +19,7 @@ const HEADING_SIGMA_RAD: f64 = 0.2;
 /// prediction of the same object: wider than its own noise, so that it contains an object that
 /// brakes hard or turns off.
 const GATE: f64 = 50.0;
-/// Likelihood at which the network is as often wrong as right: it was trained to miss rather than
+/// Likelihood where the network is as often wrong as right: it was trained to miss rather than
 /// to invent.
 const EVEN_LIKELY: f64 = 0.35;
 /// Least score of a track that becomes an object: the sum of the log-likelihood ratios of an object

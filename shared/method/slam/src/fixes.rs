@@ -40,7 +40,7 @@ pub enum FixRefusal {
     )]
     Contradictory { agreeing: usize, taken: usize },
     /// They are so close together that they do not determine the heading.
-    #[error("the fixes are too near each other for their uncertainty to tell the heading")]
+    #[error("the fixes are too near each other for their uncertainty to determine the heading")]
     Undetermined,
 }
 

@@ -48,7 +48,7 @@ impl Keyframes {
             (_, Some(pose)) => {
                 let path = records_path::<Keyframe>(out);
                 Err(KeyframesError::Missing(format!(
-                    "{} lacks the keyframe of pose {pose}: the same command computes it anew",
+                    "{} lacks the keyframe of pose {pose}: the same command computes it again",
                     path.display()
                 )))
             }

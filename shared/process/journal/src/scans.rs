@@ -106,7 +106,7 @@ impl Scans {
         if scans < poses {
             let path = records_path::<LoggedScan>(out);
             return Err(ScansError::Missing(format!(
-                "{} has {scans} scans of {poses} poses: the same command computes them anew",
+                "{} has {scans} scans of {poses} poses: the same command computes them again",
                 path.display()
             )));
         }

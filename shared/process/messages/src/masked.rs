@@ -157,7 +157,7 @@ impl MaskedHeader {
         )?;
         let points = self.points(values).ok_or_else(|| {
             let bytes = payload.len();
-            Violation(format!("its payload of {bytes} bytes is shorter than its header says: {rasters} rasters of {n} x {n} cells and {points} points"))
+            Violation(format!("its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {points} points"))
         })?;
         let is_finite =
             |point: &SparsePoint| <[f32; 5]>::from(*point).iter().all(|it| it.is_finite());

@@ -128,7 +128,7 @@ impl ScanHeader {
         require(holds, "azimuths", azimuths, expected)?;
         let scan = self.view(bytes).ok_or_else(|| {
             Violation(format!(
-                "its payload of {length} bytes is shorter than its header says: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
+                "its payload of {length} bytes is shorter than its header states: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
                 self.bins, self.stride, self.first_byte
             ))
         })?;
@@ -139,7 +139,7 @@ impl ScanHeader {
         require(samples as usize <= most, "samples", samples, expected)?;
         let samples = self.samples(bytes).ok_or_else(|| {
             Violation(format!(
-                "its payload of {length} bytes is shorter than its header says: {samples} samples"
+                "its payload of {length} bytes is shorter than its header states: {samples} samples"
             ))
         })?;
         if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {

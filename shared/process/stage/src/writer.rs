@@ -173,7 +173,7 @@ impl TopicWriter {
         let (header, room) = draft.loan.parts();
         if start.len() != header.len() {
             return Err(StageError::Input(format!(
-                "a header of {} bytes is none of topic `{}`",
+                "a header of {} bytes does not belong to topic `{}`",
                 start.len(),
                 self.topic
             )));
@@ -210,7 +210,7 @@ impl TopicWriter {
         let is_whole = message.header.len() == header.len();
         let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
             return Err(StageError::Input(format!(
-                "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
+                "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration differs from the recorded run",
                 item.seq, self.topic
             )));
         };
@@ -235,7 +235,7 @@ pub(crate) fn item_of<'a>(
             ..item
         }),
         None => Err(StageError::Input(format!(
-            "the recorded message {seq} is another one"
+            "the recorded message {seq} is a different one"
         ))),
     }
 }

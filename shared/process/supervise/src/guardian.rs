@@ -43,7 +43,7 @@ impl Guardian {
         let failed = |error: io::Error| {
             let command = command.join(" ");
             SuperviseError::System(format!(
-                "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {error}"
+                "cannot start `{command}`, which ends the children of stages if the supervisor is killed: {error}"
             ))
         };
         let (program, arguments) = command

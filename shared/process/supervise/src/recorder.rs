@@ -98,7 +98,7 @@ impl Recorder {
             Ok(()) => {
                 self.restart_at = Some(Instant::now() + RESTART_BACKOFF);
                 format!(
-                    "the recorder died ({}), and is started again: it goes on in another file",
+                    "the recorder died ({}), and is started again: it continues in a different file",
                     death.cause
                 )
             }

@@ -189,7 +189,7 @@ impl Supervisor<'_> {
                 Err(SuperviseError::Process(reason)) => {
                     let name = self.processes[follower].name();
                     self.run
-                        .note(&format!("{reason}: odometry goes on without {name}"));
+                        .note(&format!("{reason}: odometry continues without {name}"));
                     self.followers.given_up.push((follower, reason));
                 }
                 recovered => recovered?,

@@ -25,7 +25,7 @@ pub(crate) struct Stalls<'a> {
     limit: Option<Duration>,
     start_limit: Option<Duration>,
     looks: Looks,
-    /// Scans up to that of the newest pose, by `Item::published`.
+    /// Scans up to the scan of the newest pose, by `Item::published`.
     poses: u64,
     /// The owed item, and since when without any progress.
     owed: Option<(Stall, Instant)>,

@@ -78,7 +78,7 @@ fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, 
     let Some(resolution_m) = settings.constants.range_resolution_m else {
         let topic = settings.configuration_topic();
         let reason = format!(
-            "the driver publishes no {topic}, and nothing else tells the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
+            "the driver publishes no {topic}, and nothing else gives the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
         );
         return Err(AskError::of(reason, false));
     };

@@ -67,11 +67,11 @@ impl Examination<'_> {
                 return Ok(());
             }
             (true, false) if lives => None,
-            (true, true) => Some("told to stand by it opens its topics before its standard input ends: the program before it is still there".to_owned()),
+            (true, true) => Some("asked to stand by, it opens its topics before its standard input ends: the program before it is still there".to_owned()),
             _ => Some(match waited {
-                Waited::TimedOut => "told to stand by it neither says that it does nor starts, within the start timeout".to_owned(),
-                Waited::Done => "told to stand by it ended at once".to_owned(),
-                Waited::Died(death) => format!("told to stand by {death}"),
+                Waited::TimedOut => "asked to stand by, it neither reports that it does nor starts, within the start timeout".to_owned(),
+                Waited::Done => "asked to stand by, it ended at once".to_owned(),
+                Waited::Died(death) => format!("asked to stand by: {death}"),
             }),
         };
         if let Some(breach) = breach {

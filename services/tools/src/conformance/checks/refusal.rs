@@ -66,12 +66,12 @@ impl Examination<'_> {
         let code = i32::from(StageError::TRANSIENT);
         let item = format!("an item on `{topic}` with {fault}");
         let breach = match ending {
-            None => format!("it goes on after {item}"),
+            None => format!("it continues after {item}"),
             Some(death) if death.code != Some(code) => {
                 format!("{item}: {death}, and the code has to be {code}")
             }
             Some(death) if death.last_output.is_none() => {
-                format!("{item}: it says nothing on standard error")
+                format!("{item}: it writes nothing to standard error")
             }
             Some(_) => return Ok(()),
         };

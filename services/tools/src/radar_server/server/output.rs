@@ -40,7 +40,7 @@ impl Output {
     ) -> Result<(Self, String, bool), Failure> {
         if let Some(to) = arguments.udp {
             if arguments.rate.factor().is_none() {
-                return Err("--rate max has no meaning with --udp: nobody says how fast datagrams are read; give a factor".into());
+                return Err("--rate max has no meaning with --udp: the speed at which datagrams are read is unknown; give a factor".into());
             }
             let wait = Duration::try_from_secs_f64(arguments.wait_s)
                 .map_err(|error| format!("--wait-s is {}: {error}", arguments.wait_s))?;

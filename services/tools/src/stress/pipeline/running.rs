@@ -135,7 +135,10 @@ impl<'a> Running<'a> {
         let (limit_s, log) = (START_LIMIT.as_secs(), self.log.display());
         match Instant::now() < self.deadline {
             true => Ok(()),
-            false => Err(format!("the run of {scenario} has made no pose within {limit_s} s; {log} shows what it waits for").into()),
+            false => Err(format!(
+                "the run of {scenario} has made no pose within {limit_s} s; {log} shows the reason"
+            )
+            .into()),
         }
     }
 

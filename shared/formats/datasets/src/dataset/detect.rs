@@ -120,7 +120,7 @@ fn has_boreas_folders(root: &Path) -> bool {
 fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
     let (configured, found) = (configured?, locate(root, None).ok()?.format);
     let fault = format!(
-        "looks like {found}, but the configuration says `format = \"{configured}\"`: use a configuration of {found}, or none"
+        "looks like {found}, but the configuration has `format = \"{configured}\"`: use a configuration of {found}, or none"
     );
     (found != configured).then(|| OpenError::at(root, fault))
 }

@@ -19,7 +19,7 @@ pub(super) fn observations(image: &FirstImage, format: Format, profile: &Profile
     if let Some(by) = image.named_by().filter(|by| *by != profile.named_by) {
         let (named, expected) = (by.description(), profile.named_by.description());
         notes.push(format!(
-            "The files are named by {named}, but {format} files by {expected}: the format may be another one."
+            "The files are named by {named}, but {format} files by {expected}: the format may be a different one."
         ));
     }
     notes

@@ -36,7 +36,7 @@ impl ScanTime {
             Self::Halfway => {
                 "Rows have stamps; the time of a scan is the mean of its first and last row's stamps."
             }
-            Self::MiddleRow => "Rows have stamps; the time of a scan is that of row n/2 - 1.",
+            Self::MiddleRow => "Rows have stamps; the time of a scan is the time of row n/2 - 1.",
         }
     }
 }

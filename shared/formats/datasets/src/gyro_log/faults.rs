@@ -118,7 +118,7 @@ impl LogFaults {
             (self.spread, SPREAD),
             (
                 self.repeated,
-                "samples have the stamp of another one: left out.",
+                "samples have the stamp of a different sample: left out.",
             ),
             (
                 self.out_of_order,

@@ -54,7 +54,7 @@ fn a_dataset_of_another_format_than_is_configured_is_called_by_its_own() {
     for (path, configured, found) in cases {
         let options = options(|o| o.format = Some(configured));
         let expected =
-            format!("looks like {found}, but the configuration says `format = \"{configured}\"`");
+            format!("looks like {found}, but the configuration has `format = \"{configured}\"`");
         assert_refused(open(&root.path().join(path), &options), &expected);
     }
 }

@@ -138,7 +138,7 @@ impl<'a> PowerImage<'a> {
             && u64::from(height) * u64::from(step) == bytes as u64;
         if !fits {
             return Err(format!(
-                "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
+                "it has {bytes} bytes, and states that it has {height} rows of {step} bytes for {width} bins"
             ));
         }
         let height = height as usize;

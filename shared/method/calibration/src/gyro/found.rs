@@ -37,7 +37,7 @@ impl GyroCalibration {
             if other.up != mean.up {
                 let [one, other] = [&mean, other].map(|it| it.up.name());
                 return Err(ClockError(format!(
-                    "one drive says that {one} points up, another that {other} does: these are not logs of one gyro as it is mounted"
+                    "one drive has {one} up, a different drive {other}: these are not logs of one gyro as it is mounted"
                 )));
             }
             mean.delay_s = mean.delay_s.combined(&other.delay_s);

@@ -284,6 +284,6 @@ fn drives_of_one_gyro_are_combined_if_they_name_one_axis() {
     let other = found(UpAxis::Z, 2).unwrap();
     assert_refused(
         one.mean(&[other]),
-        &["one drive says that -z points up, another that z does"],
+        &["one drive has -z up, a different drive z"],
     );
 }

@@ -176,7 +176,7 @@ fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
         vy_mps: -0.4,
         yaw_rate_radps: 0.4,
     };
-    // None is straight ahead, where a moving sensor may see it twice or not at all.
+    // No scatterer is straight ahead, where a moving sensor may see it twice or not at all.
     let scatterers = (1..8).map(f64::from).map(|k| {
         let (sin, cos) = (k * std::f64::consts::FRAC_PI_4).sin_cos();
         Point2::new(cos, sin) * (10.0 + 11.0 * k)

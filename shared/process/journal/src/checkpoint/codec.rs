@@ -230,7 +230,7 @@ pub(super) fn encode_state(
 }
 
 /// Decodes a state, with the item and the checksum of its motion; `None` if its checksum is wrong.
-/// Its keyframes are put into `keyframes`, oldest first.
+/// Puts the keyframes into `keyframes`, oldest first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,

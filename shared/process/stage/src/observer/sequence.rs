@@ -68,7 +68,7 @@ mod tests {
             assert_eq!(sequence.advance(&item(seq, flags)), missed, "{seq}");
         }
         assert!(sequence.missed == 3 && !sequence.ended);
-        // The end is no message, but what was missed before it counts.
+        // The end is no message, but messages that were missed before it count.
         assert_eq!(sequence.advance(&item(13, flag::END)), None);
         assert!(sequence.missed == 5 && sequence.ended);
     }

@@ -34,7 +34,7 @@ impl Recorded {
     pub fn header<M: Message>(&self) -> Result<M::Header, StageError> {
         bytemuck::try_pod_read_unaligned(&self.header).map_err(|_| {
             StageError::Input(format!(
-                "a header of {} bytes is none of topic `{}`",
+                "a header of {} bytes does not belong to topic `{}`",
                 self.header.len(),
                 M::TOPIC
             ))
