@@ -180,7 +180,7 @@ fn the_log_of_another_drive_is_refused() {
     fs::write(&other, text).unwrap();
     let words = ["radiate", "--gyro", other.to_str().unwrap()];
     let ended = calibrate(recording, out.path(), &[], &words);
-    let reason = "the log is of another drive";
+    let reason = "the log is of a different drive";
     assert!(ended.stdout.contains(reason), "{}", ended.stdout);
     ended.failed_with(&["are too few"]);
     assert!(!out.path().join("calibration.toml").exists());

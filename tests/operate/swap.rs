@@ -138,7 +138,7 @@ fn a_program_whose_messages_no_stage_can_read_gives_way_and_does_not_end_the_run
     let (run, running) = started();
     let nonsense = ["sh", "-c", &conformance::command("sends only NaN")];
     swap(&run, "rotation-search", &["--cold"], &nonsense).refused_with(&[
-        "rotation-search goes on as before",
+        "rotation-search continues as before",
         "translation-search died after it",
         "NaN",
     ]);

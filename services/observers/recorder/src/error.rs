@@ -10,7 +10,7 @@ use thiserror::Error;
 pub enum RecorderError {
     #[error(transparent)]
     Stage(#[from] StageError),
-    #[error("cannot record: {0}; the run goes on without")]
+    #[error("cannot record: {0}; the run continues without a recording")]
     Recording(#[from] RecordingError),
     #[error("{0} exists, and a recording is never overwritten: name another file, or remove it")]
     Exists(PathBuf),

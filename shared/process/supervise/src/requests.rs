@@ -148,7 +148,7 @@ impl Supervisor<'_> {
         let reason = child.start_error.take().unwrap_or_default();
         let name = child.name();
         client.answer(&Answer::Refused(format!(
-            "{name} goes on as before: {reason}"
+            "{name} continues as before: {reason}"
         )));
         Ok(())
     }

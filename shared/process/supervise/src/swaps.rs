@@ -180,7 +180,7 @@ impl Standby {
         let name = self.child.name();
         let command = self.child.plan.command.join(" ");
         let sentence =
-            format!("{name} goes on as before, since `{command}` cannot take over: {reason}");
+            format!("{name} continues as before, since `{command}` cannot take over: {reason}");
         self.client.answer(&Answer::Refused(sentence));
         // Its end is waited for.
         self.child.pid()

@@ -106,7 +106,7 @@ impl GyroCalibration {
         };
         let tells = match self.tells_scale() {
             true => scale.verdict(used(configured.scale)),
-            false => ", which is not told well enough".to_owned(),
+            false => ", which is not determined well enough".to_owned(),
         };
         [
             format!(

@@ -60,7 +60,7 @@ impl Swaps {
         let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
             trial.client.answer(&Answer::Refused(format!(
-                "{name} goes on as before, since `{command}` has failed: {reason}"
+                "{name} continues as before, since `{command}` has failed: {reason}"
             )));
         }
     }
