@@ -346,7 +346,7 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     };
     let ended = recorded.start_as(command).finish();
     ended.succeeded();
-    for part in ["No space left", "the run goes on"] {
+    for part in ["No space left", "the run continues"] {
         assert!(ended.stderr.contains(part), "{}", ended.stderr);
     }
     assert_eq!(run.odometry(), undisturbed());

@@ -132,7 +132,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
     here.await_poses(6);
     here.kill_supervisor();
     let ended = second.finish();
-    ended.failed_with(&["the base has poses of another drive", "--fresh"]);
+    ended.failed_with(&["the base has poses of a different drive", "--fresh"]);
     // The next run removes the leftovers of the killed one.
     first.option("--fresh").finish().succeeded();
 }
@@ -193,7 +193,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
     running.await_poses(3);
     let mut second = link.end("send", later.out()).spawn().unwrap();
     let received = receiving.join().unwrap();
-    received.failed_with(&["the sender is at another drive now"]);
+    received.failed_with(&["the sender plays a different drive now"]);
     end(&mut second);
     running.finish().succeeded();
 }

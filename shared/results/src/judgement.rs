@@ -90,7 +90,7 @@ pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
     if let Some(offset) = clock_offset(estimate, truth).filter(differs) {
         print::note(format_args!(
             "the motions of the ground truth are {offset}: its clock differs (UTC and GPS time: 18 s, UTC and TAI: 37 s), or it is of \
-             another drive; `gyre evaluate --find-time-offset` takes that out"
+             a different drive; `gyre evaluate --find-time-offset` takes that out"
         ));
     }
 }

@@ -151,7 +151,7 @@ fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, Lin
     match began_ns(out)? == offer.began_ns && !ended {
         true => Ok(last.item.seq.saturating_add(1)),
         false => Err(LinkError::Refused(format!(
-            "{} has the poses of another drive: choose another folder",
+            "{} has the poses of a different drive: choose another folder",
             out.display()
         ))),
     }

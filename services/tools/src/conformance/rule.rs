@@ -48,7 +48,7 @@ rules! {
     StampsWork: "contract 4", "fills in its own time stamps";
     LooksBack: "contract 5", "needs no earlier item but the previous one";
     Deterministic: "contract 6", "gives the same outputs for the same inputs";
-    Resumes: "contract 6", "goes on without a gap after kill -9";
+    Resumes: "contract 6", "continues without a gap after kill -9";
     WaitsForMotion: "masking", "waits for the motion of item seq - lag, and not longer";
     KeepsWindow: "source", "sends as many items as the window admits";
     BeginsWithNewest: "sink", "begins with the newest pose";

@@ -124,18 +124,18 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
             print::note("gyre: the stages have ended or are ending; the results are written");
         }
         if signals.sleep(PERIOD)? {
-            return Err("interrupted: the run goes on ending by itself".into());
+            return Err("interrupted: the run ends by itself".into());
         }
     }
     let (out, poses) = (status.out.display(), status.poses);
     if !status.processes.is_empty() && version_of_results(&status.out) == before {
         return Err(format!(
-            "{out} has ended, but its results are not written; the poses are kept, and the same command goes on from there. {LOG} in it says why"
+            "{out} has ended, but its results are not written; the poses are kept, and the same command continues from there. {LOG} in it says why"
         )
         .into());
     }
     print::line(format_args!(
-        "{out} has ended after some {poses} poses; the same command goes on from there"
+        "{out} has ended after some {poses} poses; the same command continues from there"
     ))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -150,7 +150,7 @@ impl ScanSamples {
                 false => format!("{}. ", faults.clock_steps()),
             };
             return Err(LogError::Unusable(format!(
-                "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.delay_s is wrong"
+                "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of a different drive, or {of}.delay_s is wrong"
             )));
         }
         let named = |sentence| format!("{}: {sentence}", path.display());

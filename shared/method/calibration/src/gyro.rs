@@ -123,7 +123,7 @@ fn refusal(none: NoPeak, angles: &Angles) -> ClockError {
                 .begins_s()
                 .filter(|begins_s| begins_s.abs() > MAX_LATE_S);
             let why = begins_s.map_or("the drive is too short, or most samples are missing".to_owned(), |begins_s| format!(
-                "it begins {begins_s:.0} s after the first scan; is it of another drive, or its clock set otherwise? Then correct its stamps first"
+                "it begins {begins_s:.0} s after the first scan; is it of a different drive, or its clock set otherwise? Then correct its stamps first"
             ));
             format!(
                 "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} turns of a second, and {MIN_TURNS} are needed: {why}"

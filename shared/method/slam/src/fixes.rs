@@ -26,7 +26,7 @@ const LEAST_SHARE: f64 = 0.5;
 pub enum FixRefusal {
     /// None was measured between two keyframes.
     #[error(
-        "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.delay_s is wrong"
+        "there is no fix from the first keyframe to the last: the log is of a different drive, or gnss.delay_s is wrong"
     )]
     Elsewhere,
     /// Their clock differs from the radar's by this.
@@ -36,7 +36,7 @@ pub enum FixRefusal {
     Clock(ClockOffset),
     /// Most of them contradict the others, the odometry or the loops.
     #[error(
-        "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of another drive"
+        "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of a different drive"
     )]
     Contradictory { agreeing: usize, taken: usize },
     /// They are so close together that they do not determine the heading.

@@ -26,7 +26,7 @@ fn ask_twice() {
     ask();
     // Another thread may have received it.
     thread::sleep(Duration::from_secs(10));
-    println!("goes on");
+    println!("continues");
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn a_signal_wakes_a_process_and_ends_it_where_nobody_waits() {
     let ended = itself.arg("--nocapture").env(STARTED, "").output().unwrap();
     let said = String::from_utf8_lossy(&ended.stdout);
     assert!(
-        said.contains("has stopped") && !said.contains("goes on"),
+        said.contains("has stopped") && !said.contains("continues"),
         "{said}"
     );
     assert_eq!(ended.status.signal(), Some(Signal::TERM.as_raw()));

@@ -105,7 +105,7 @@ impl Summary {
     fn places(&self) -> String {
         let again = match self.ending {
             Some(Ending::Complete) => "",
-            _ => "; the same command goes on from here",
+            _ => "; the same command continues from here",
         };
         let out = Path::new(&self.out);
         // As short as a person here would write it.

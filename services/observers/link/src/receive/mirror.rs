@@ -105,7 +105,7 @@ impl Mirror<'_> {
         other.topics.iter().try_for_each(require_same)?;
         if !self.is_same_drive(&other)? {
             return Err(LinkError::Refused(
-                "the sender is at another drive now: what came of this one is whole up to here; receive the other one into another folder".to_owned(),
+                "the sender plays a different drive now: what arrived of this drive is whole up to here; receive the new drive into a different folder".to_owned(),
             ));
         }
         let is_sent = |topic: &MirroredTopic| other.topics.iter().any(|it| it.name == topic.name);

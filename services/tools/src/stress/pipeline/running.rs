@@ -82,7 +82,7 @@ impl<'a> Running<'a> {
     pub fn last_words(&mut self) -> String {
         self.await_end(Instant::now() + END_LIMIT);
         match self.process.try_wait() {
-            Ok(None) => return "its stream has ended, and its process goes on".to_owned(),
+            Ok(None) => return "its stream has ended, and its process continues".to_owned(),
             Ok(Some(status)) if let Some(signal) = status.signal() => {
                 return format!("its supervisor was killed by signal {signal}");
             }
