@@ -358,6 +358,6 @@ mod tests {
         );
         let mut rising = scan();
         rising.flags[0] |= flag::CHIRP_KNOWN;
-        only(&rising, 0.0, "falling chirps");
+        only(&rising, 0.0, "the directions of chirps");
     }
 }
