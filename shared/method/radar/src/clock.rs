@@ -8,10 +8,9 @@ use crate::trajectory::Trajectory;
 
 /// Range of the offsets that are evaluated, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s.
 pub const MAX_OFFSET_S: i64 = 60;
-/// An offset beyond this one must fit better by a margin of the score, since some stretch of a long
-/// drive resembles another.
-const NEAR_NS: i64 = 10_000_000_000;
-const FAR_MARGIN: f64 = 0.02;
+/// An offset farther from zero must fit better by more than so many standard errors: a drive around
+/// a block repeats its speeds, and some stretch of a long drive resembles a different one.
+const MARGIN_SIGMAS: f64 = 3.0;
 const SECOND_NS: i64 = 1_000_000_000;
 /// Steps of the offsets, ns: first over the range, then around the best.
 const COARSE_NS: i64 = 250_000_000;
@@ -84,12 +83,19 @@ pub fn clock_offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockO
         fits.into_iter().filter(enough).collect()
     };
     let coarse = sufficient(coarse);
-    let score = |fit: &Fit| match fit.late_ns.abs() > NEAR_NS {
-        true => fit.score() - FAR_MARGIN,
-        false => fit.score(),
+    let best = coarse
+        .iter()
+        .max_by(|a, b| a.score().total_cmp(&b.score()))?;
+    let independent = independent(&motions, best.count);
+    let is_peak = |k: &usize| {
+        let lower = |other: Option<&Fit>| other.is_none_or(|it| it.score() <= coarse[*k].score());
+        lower(k.checked_sub(1).and_then(|before| coarse.get(before))) && lower(coarse.get(k + 1))
     };
-    let around = coarse.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    let around = around.late_ns;
+    let peaks = (0..coarse.len()).filter(is_peak).map(|k| &coarse[k]);
+    let around = peaks
+        .filter(|peak| best.sigmas_above(peak, independent) <= MARGIN_SIGMAS)
+        .map(|peak| peak.late_ns)
+        .min_by_key(|late_ns| late_ns.abs())?;
     let steps = COARSE_NS / STEP_NS;
     let fine = sufficient(fits(
         (-steps..=steps).map(|k| around + k * STEP_NS).collect(),
@@ -140,6 +146,16 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
     starts.map_while(over_baseline).collect()
 }
 
+/// Returns how many of so many motions are independent: those that do not overlap.
+fn independent(motions: &[Motion], count: usize) -> f64 {
+    let span_ns = match motions {
+        [first, .., last] => last.to_ns - first.from_ns,
+        _ => 0,
+    };
+    let apart = span_ns as f64 / BASELINE_NS as f64;
+    count as f64 * (apart / motions.len().max(1) as f64).min(1.0)
+}
+
 struct Fit {
     late_ns: i64,
     count: usize,
@@ -150,6 +166,19 @@ struct Fit {
 impl Fit {
     fn score(&self) -> f64 {
         self.speed + self.turn.map_or(0.0, f64::abs)
+    }
+
+    /// Returns by how many standard errors this fit is better than a different one, by Fisher's
+    /// transformation: atanh(r) of n independent pairs has the variance 1 / (n - 3).
+    fn sigmas_above(&self, other: &Self, independent: f64) -> f64 {
+        let transformed = |fit: &Self| {
+            let all = [Some(fit.speed), fit.turn.map(f64::abs)];
+            let terms = all.into_iter().flatten();
+            terms.map(|r| r.clamp(-0.9999, 0.9999).atanh()).sum::<f64>()
+        };
+        let terms = 1.0 + f64::from(u8::from(self.turn.is_some()));
+        let variance = terms / (independent - 3.0).max(1.0);
+        (transformed(self) - transformed(other)) / variance.sqrt()
     }
 }
 
@@ -243,6 +272,39 @@ mod tests {
             );
             assert!(found.is_reliable() && !found.mirrored);
             assert_eq!(found.agrees(), late_ms.abs() < 150);
+        }
+    }
+
+    /// A block is 15 s long, and its two halves are equal: with noise, one of its repetitions fits
+    /// best by chance.
+    #[test]
+    fn a_drive_around_a_block_has_the_offset_nearest_to_zero() {
+        for (seed, late_ms) in [(1_u64, 0), (2, 0), (3, 0), (4, 2_000), (5, -2_000)] {
+            let mut state = seed;
+            let mut noise = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+            };
+            let mut block = |late_ms: i64, noise_m: f64| {
+                let (mut x, mut poses, mut stamps) = (0.0, Vec::new(), Vec::new());
+                for k in 0..240_i64 {
+                    stamps.push(1_549_986_607_000_000_000 + k * 250_000_000 + late_ms * 1_000_000);
+                    poses.push(Pose::translation(x + noise_m * noise(), 0.0));
+                    let turning = (k as f64 * 0.25 / 7.5).fract() < 0.4;
+                    x += 0.25 * if turning { 4.0 } else { 9.5 };
+                }
+                Trajectory {
+                    stamp_ns: Some(stamps),
+                    poses,
+                }
+            };
+            let found = clock_offset(&block(0, 3.0), &block(late_ms, 0.0)).unwrap();
+            assert!(
+                (found.delay_s - late_ms as f64 * 1e-3).abs() < 0.3,
+                "{late_ms} ms: {found:?}"
+            );
         }
     }
 
