@@ -1,6 +1,6 @@
 //! The threads that follow a run, and the next one in the same folder after its end.
 
-use std::{thread, time::Duration};
+use std::thread;
 
 use gyre_messages::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader, outcome};
 use gyre_ros2_messages::{
