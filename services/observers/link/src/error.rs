@@ -52,7 +52,6 @@ impl From<LinkError> for StageError {
         match error {
             LinkError::Stage(error) => error,
             LinkError::Zenoh { action, reason } => Self::Transport { action, reason },
-            LinkError::Network(_) => Self::Configuration(error.to_string()),
             _ => Self::Input(error.to_string()),
         }
     }
