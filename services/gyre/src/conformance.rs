@@ -7,10 +7,10 @@ use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
-use gyre_stage::wake::Signals;
+use gyre_stage::{StageError, wake::Signals};
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
-use gyre_tools::conformance::{Candidate, Demands, InputScans, Interrupted, Report, Test, check};
+use gyre_tools::conformance::{Candidate, Demands, InputScans, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
@@ -81,7 +81,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         }
     };
     match check(&test, scans, &signals, &mut observe) {
-        Err(error) if error.is::<Interrupted>() => Ok(None),
+        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => Ok(None),
         report => report.map(Some),
     }
 }

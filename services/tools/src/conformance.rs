@@ -19,11 +19,8 @@ pub mod shadow;
 mod test;
 mod topics;
 
-use std::{io, path::Path};
-
-use gyre_stage::{StageError, wake::Signals};
+use gyre_stage::wake::Signals;
 use gyre_terminal::Failure;
-use thiserror::Error;
 
 pub use harness::Candidate;
 pub use report::{Report, Work};
@@ -34,13 +31,9 @@ pub use test::{Demands, InputScans, Prepare, Test};
 use checks::Examination;
 use reference::{Context, Reference};
 
-/// The end of a test by a signal.
-#[derive(Debug, Error)]
-#[error("interrupted")]
-pub struct Interrupted;
-
 /// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
-/// Breaches of the contract are in the report, not in the error.
+/// Breaches of the contract are in the report, not in the error. A signal ends the test with
+/// [`StageError::Stopped`](gyre_stage::StageError).
 pub fn check(
     test: &Test,
     mut scans: InputScans,
@@ -55,10 +48,4 @@ pub fn check(
         signals,
     };
     Examination::new(context, observe).run()
-}
-
-/// Returns a function that names the file of a system error.
-fn at(path: &Path) -> impl FnOnce(io::Error) -> StageError + use<> {
-    let path = path.to_owned();
-    move |source| StageError::File { path, source }
 }

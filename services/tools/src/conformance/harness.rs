@@ -1,16 +1,16 @@
 //! A program alone in the place of a stage: its process in a run of its own, and this process in
 //! place of the rest of the run.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use gyre_messages::{Item, Pose, PoseHeader, StageId, flag};
-use gyre_stage::{Manifest, StageError, wake::Signals};
+use gyre_stage::{Manifest, StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::{
     Death, Scheduling, SuperviseError,
-    rig::{Feed, Process, Recorded, Rig, Tap},
+    rig::{Process, Recorded, Rig, Tap},
 };
 
-use crate::conformance::{at, topics::StageTopics};
+use crate::conformance::topics::StageTopics;
 
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -34,28 +34,21 @@ impl Candidate {
         words.map(str::to_owned).into()
     }
 
-    /// Creates a run that writes to `out`, with or without its services.
+    /// Creates a run that writes to `out`, without its services.
     pub(crate) fn rig<'a>(
         &self,
         out: PathBuf,
         signals: &'a Signals,
-        has_services: bool,
     ) -> Result<Rig<'a>, SuperviseError> {
         for folder in ["log", "journal"] {
-            let path = out.join(folder);
-            let created = gyre_storage::create_folder(&path);
-            created.map_err(|error| at(&path)(error.source))?;
+            gyre_storage::create_folder(&out.join(folder)).map_err(StageError::from)?;
         }
         let manifest = Manifest {
             out,
             ..self.manifest.clone()
         };
         let guardian = [&self.gyre, "guard"].map(str::to_owned);
-        let create = match has_services {
-            true => Rig::new,
-            false => Rig::without_services,
-        };
-        create(manifest, &self.configuration, &guardian, signals)
+        Rig::new(manifest, &self.configuration, &guardian, signals)
     }
 }
 
@@ -64,7 +57,7 @@ pub(crate) struct Harness<'a> {
     // Dropped in this order: process, ports, run.
     process: Option<Process>,
     /// The publishers of the inputs by topic.
-    pub feeds: BTreeMap<&'static str, Feed>,
+    feeds: BTreeMap<&'static str, TopicWriter>,
     pub output: Tap,
     pub rig: Rig<'a>,
     stage: StageId,
@@ -79,7 +72,9 @@ pub(crate) enum Sent {
 }
 
 impl<'a> Harness<'a> {
-    pub(crate) fn open(rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
+    /// Creates the services of the run, and opens the topics of the stage.
+    pub(crate) fn open(mut rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
+        rig.create_services()?;
         let topics = StageTopics::of(stage, rig.manifest());
         let mut harness = Self {
             process: None,
@@ -124,7 +119,9 @@ impl<'a> Harness<'a> {
 
     /// Connects to all subscribers, whether they have notified or not.
     pub(crate) fn connect(&self) -> Result<(), StageError> {
-        self.feeds.values().try_for_each(|feed| feed.connect())
+        self.feeds
+            .values()
+            .try_for_each(TopicWriter::accept_readers)
     }
 
     pub(crate) fn has_publisher(&self) -> bool {
@@ -133,12 +130,12 @@ impl<'a> Harness<'a> {
 
     pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
         let feed = self.feeds.get(topic);
-        feed.map_or(Ok(()), |feed| feed.send(message))
+        feed.map_or(Ok(()), |feed| message.send(feed))
     }
 
     /// Receives the next message of the process; `None` if there is no message yet.
     pub(crate) fn receive(&self) -> Result<Option<Sent>, StageError> {
-        match self.output.receive() {
+        match Recorded::receive(&self.output) {
             Ok(message) => Ok(message.map(Sent::Message)),
             Err(StageError::Malformed { seq, reason, .. }) => Ok(Some(Sent::Malformed {
                 seq,
@@ -146,12 +143,6 @@ impl<'a> Harness<'a> {
             })),
             Err(error) => Err(error),
         }
-    }
-
-    /// Sleeps until the process has sent something or `limit` has passed; true on a request to
-    /// stop.
-    pub(crate) fn sleep(&self, limit: Duration) -> Result<bool, StageError> {
-        self.rig.sleep(&[&self.output], limit)
     }
 
     /// Returns the end of the process; `None` while it runs or before it is started.

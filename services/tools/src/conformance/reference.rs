@@ -10,15 +10,11 @@ use gyre_messages::{
     Hop, Item, Message, Motion, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, compose, flag,
 };
 use gyre_radar::continues;
-use gyre_stage::{StageError, clock, wake::Signals};
-use gyre_supervise::{
-    Scheduling,
-    rig::{Feed, Process, Recorded, Rig, Tap},
-};
+use gyre_stage::{StageError, clock, wake::Signals, writer::TopicWriter};
+use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
 use gyre_terminal::Failure;
 
 use crate::conformance::{
-    Interrupted,
     harness::start_of_trajectory,
     test::{InputScans, Test},
     topics::StageTopics,
@@ -56,7 +52,8 @@ impl Reference {
             let scans = scans.len().saturating_sub(1);
             return Err(format!("{scans} scans are too few to test a stage with: name a recording of more, or raise --scans").into());
         }
-        let rig = test.rig("own", signals, true)?;
+        let mut rig = test.rig("own", signals)?;
+        rig.create_services()?;
         OwnPipeline::begin(test, &rig, scans)?.run()
     }
 
@@ -112,8 +109,8 @@ fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, Failure> {
 struct OwnPipeline<'a> {
     // Dropped in this order: processes, ports, run.
     processes: Vec<(StageId, Process)>,
-    scans: Feed,
-    poses: Feed,
+    scans: TopicWriter,
+    poses: TopicWriter,
     taps: Vec<(&'static str, Tap)>,
     rig: &'a Rig<'a>,
     /// Time without progress after which it has failed.
@@ -136,11 +133,11 @@ impl<'a> OwnPipeline<'a> {
             taps.push((topic, rig.tap(topic)?));
         }
         let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
-        poses.send(&start_of_trajectory())?;
+        start_of_trajectory().send(&poses)?;
         let mut processes = Vec::new();
         for stage in stages {
             let command = test.candidate.own_command(stage);
-            let process = rig.start(stage.name(), &command, &Scheduling::default())?;
+            let process = rig.start(stage.name(), &command, &test.candidate.scheduling)?;
             processes.push((stage, process));
         }
         Ok(Self {
@@ -170,9 +167,7 @@ impl<'a> OwnPipeline<'a> {
             } else {
                 self.require_living(progress.elapsed())?;
                 let taps: Vec<&Tap> = self.taps.iter().map(|(_, tap)| tap).collect();
-                if self.rig.sleep(&taps, POLL_PERIOD)? {
-                    return Err(Interrupted.into());
-                }
+                self.rig.sleep(&taps, POLL_PERIOD)?;
             }
         }
         Ok(self.reference)
@@ -189,7 +184,7 @@ impl<'a> OwnPipeline<'a> {
     fn receive(&mut self) -> Result<bool, StageError> {
         let mut any = false;
         for (topic, tap) in &self.taps {
-            while let Some(message) = tap.receive()? {
+            while let Some(message) = Recorded::receive(tap)? {
                 self.reference.push(topic, message);
                 any = true;
             }
@@ -219,7 +214,7 @@ impl<'a> OwnPipeline<'a> {
         }
         self.last_pose = (!is_end).then_some(pose);
         let pose = Recorded::of::<Pose>(&pose, &[], 0);
-        self.poses.send(&pose)?;
+        pose.send(&self.poses)?;
         self.reference.push(Pose::TOPIC, pose);
         Ok(true)
     }
@@ -244,7 +239,7 @@ impl<'a> OwnPipeline<'a> {
                 published_ns: now_ns,
             };
             let scan = scan.about(&item);
-            self.scans.send(&scan)?;
+            scan.send(&self.scans)?;
             self.reference.push(Scan::TOPIC, scan);
             any = true;
         }

@@ -11,11 +11,10 @@ use std::{
 
 use gyre_messages::{Item, Message, Pose, StageId, flag};
 use gyre_stage::StageError;
-use gyre_supervise::{Death, Scheduling, SuperviseError, rig::Recorded};
+use gyre_supervise::{Death, SuperviseError, rig::Recorded};
 use gyre_terminal::Failure;
 
 use crate::conformance::{
-    Interrupted,
     harness::{Harness, Sent, start_of_trajectory},
     item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
@@ -89,7 +88,7 @@ impl<'a> Session<'a> {
         findings: &'a mut Findings,
     ) -> Result<Self, Failure> {
         let (test, reference) = (context.test, context.reference);
-        let rig = test.rig(name, context.signals, true)?;
+        let rig = test.rig(name, context.signals)?;
         let harness = Harness::open(rig, test.candidate.stage)?;
         harness.feed(Pose::TOPIC, &start_of_trajectory())?;
         Ok(Self {
@@ -131,7 +130,8 @@ impl<'a> Session<'a> {
     pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), SuperviseError> {
         self.last = None;
         self.notified.clear();
-        self.harness.start(command, &Scheduling::default())
+        let scheduling = &self.test.candidate.scheduling;
+        self.harness.start(command, scheduling)
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.
@@ -165,9 +165,9 @@ impl<'a> Session<'a> {
             if self.progress.elapsed() > limit {
                 return Ok(Waited::TimedOut);
             }
-            if self.harness.sleep(POLL_PERIOD)? {
-                return Err(Interrupted.into());
-            }
+            self.harness
+                .rig
+                .sleep(&[&self.harness.output], POLL_PERIOD)?;
         }
     }
 
@@ -266,27 +266,24 @@ impl<'a> Session<'a> {
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
     pub(crate) fn not_notified(&self) -> Vec<&'static str> {
-        let subscribed = self
-            .harness
-            .feeds
-            .iter()
-            .filter(|(_, it)| it.subscribers() > 0);
-        let topics = subscribed.map(|(topic, _)| *topic);
-        topics
-            .filter(|topic| !self.notified.contains(topic))
+        let inputs = self.harness.topics.inputs();
+        inputs
+            .filter(|it| self.is_read(it) && !self.notified.contains(it))
             .collect()
     }
 
     pub(crate) fn has_joined(&self) -> bool {
-        let mut feeds = self.harness.feeds.values();
-        feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
+        let mut inputs = self.harness.topics.inputs();
+        inputs.any(|it| self.is_read(it)) || self.harness.has_publisher()
     }
 
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
-        let feeds = &self.harness.feeds;
-        let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
         let inputs = self.harness.topics.forward.iter().copied();
-        inputs.filter(is_unread).collect()
+        inputs.filter(|it| !self.is_read(it)).collect()
+    }
+
+    fn is_read(&self, topic: &str) -> bool {
+        self.harness.rig.subscribers(topic) > 0
     }
 
     pub(crate) fn about(&self, seq: u64) -> impl Iterator<Item = &Recorded> {

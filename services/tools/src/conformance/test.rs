@@ -4,10 +4,10 @@ use std::{io, ops::Range, path::Path, time::Duration};
 
 use gyre_datasets::Dataset;
 use gyre_messages::StageId;
-use gyre_stage::wake::Signals;
+use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::{SuperviseError, rig::Rig};
 
-use crate::conformance::{Candidate, at};
+use crate::conformance::Candidate;
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -61,12 +61,11 @@ impl Test {
         &self,
         name: &str,
         signals: &'a Signals,
-        has_services: bool,
     ) -> Result<Rig<'a>, SuperviseError> {
         let out = self.candidate.manifest.out.join(name);
-        let rig = self.candidate.rig(out, signals, has_services)?;
+        let rig = self.candidate.rig(out, signals)?;
         let root = &rig.manifest().root;
-        (self.prepare)(root).map_err(at(root))?;
+        (self.prepare)(root).map_err(StageError::file(root))?;
         Ok(rig)
     }
 }

@@ -9,14 +9,13 @@
 use std::{fs::File, path::Path};
 
 use gyre_messages::{Item, StageId, flag};
-use gyre_stage::run::STANDBY;
+use gyre_stage::{StageError, run::STANDBY};
 use gyre_supervise::rig::Recorded;
 use gyre_terminal::Failure;
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 
 use super::Examination;
 use crate::conformance::{
-    at,
     rule::Rule,
     session::{Pace, Session, Waited},
 };
@@ -53,7 +52,7 @@ impl Examination<'_> {
         let root = session.harness.rig.manifest().root.clone();
         let ready = root.join(format!("{}.ready", candidate.stage.name()));
         let input = root.join("standing-by.input");
-        let end_of_input = named_pipe(&input).map_err(at(&input))?;
+        let end_of_input = named_pipe(&input).map_err(StageError::file(&input))?;
         session.admit()?;
         let (told, input) = (format!("{STANDBY}=1"), input.display().to_string());
         let shell = ["env", &told, "sh", "-c", WITH_INPUT, &input].map(str::to_owned);

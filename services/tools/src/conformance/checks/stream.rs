@@ -1,15 +1,13 @@
 //! A whole stream with a full window, from a history that is there before the program, to the end
 //! and SIGTERM.
 
-use std::time::Instant;
+use std::cell::Cell;
 
 use gyre_messages::{StageId, flag};
 use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{
-    Interrupted,
-    reference::POLL_PERIOD,
     rule::Rule,
     session::{Pace, Session, Waited},
 };
@@ -156,16 +154,14 @@ impl Session<'_> {
         let (topic, rig) = (self.output_topic(), &self.harness.rig);
         let history = self.harness.topics.history(&rig.manifest().window);
         let wanted = history.min(self.outputs.len());
-        let late = rig.tap(topic)?;
-        let (mut received, since) = (0, Instant::now());
-        while received < wanted && since.elapsed() < self.test.demands.item_timeout {
+        let (late, received) = (rig.tap(topic)?, Cell::new(0));
+        self.wait(self.demands().item_timeout, |_| {
             while late.receive().is_ok_and(|message| message.is_some()) {
-                received += 1;
+                received.set(received.get() + 1);
             }
-            if rig.sleep(&[&late], POLL_PERIOD)? {
-                return Err(Interrupted.into());
-            }
-        }
+            received.get() >= wanted
+        })?;
+        let received = received.get();
         self.findings.require(Rule::GivesHistory, received >= wanted, || {
             format!("a late reader that notified `{topic}_handshake` received {received} of the last {wanted} items: call update_connections, then notify `{topic}_data`")
         });
