@@ -5,15 +5,14 @@ use std::{
     hint::black_box,
     io::Write,
     path::Path,
-    sync::mpsc::{self, Sender},
     thread,
     time::{Duration, Instant},
 };
 
 use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan};
 use gyre_stage::{
-    StageError,
-    observer::{Next, ObservedRun},
+    observer::{ObservedRun, wait_for_any},
+    wake::{MAX_WAIT, Signals},
 };
 use gyre_supervise::memory::Room;
 use gyre_terminal::Failure;
@@ -29,7 +28,6 @@ const PAGE: usize = 4096;
 const TAKING: Duration = Duration::from_secs(20);
 /// Time between two polls for memory when there is no more to take.
 const PAUSE: Duration = Duration::from_millis(20);
-const CACHE_LINE: usize = 64;
 
 pub(super) fn spin() -> ! {
     say(READY);
@@ -83,53 +81,32 @@ fn piece() -> Vec<u8> {
     black_box(piece)
 }
 
-/// Reads all topics of a run until it ends, a byte of each cache line.
+/// Copies the messages of all topics of a run until it ends.
 pub(super) fn observe(out: &Path) -> Result<(), Failure> {
-    let unusable = |error| format!("cannot use {}: {error}", out.display());
-    let root = gyre_stage::run::root_of(&out.canonicalize().map_err(unusable)?);
-    let followers = [
-        follow::<Scan>,
-        follow::<Masked>,
-        follow::<Rotation>,
-        follow::<Motion>,
-        follow::<Refined>,
-        follow::<Pose>,
+    const TOPICS: [&str; 6] = [
+        Scan::TOPIC,
+        Masked::TOPIC,
+        Rotation::TOPIC,
+        Motion::TOPIC,
+        Refined::TOPIC,
+        Pose::TOPIC,
     ];
-    let (attached, attachments) = mpsc::channel();
-    let threads = followers.map(|follow| {
-        let (root, attached) = (root.clone(), attached.clone());
-        thread::spawn(move || follow(&root, attached))
-    });
-    drop(attached);
-    // A thread that cannot attach reports this when it is joined.
-    if attachments.iter().count() == threads.len() {
-        say(READY);
+    let (run, signals) = (ObservedRun::writing_to(out)?, Signals::install()?);
+    let mut observers = Vec::new();
+    for topic in TOPICS {
+        observers.extend(run.observe_topic(topic)?);
     }
-    for thread in threads {
-        thread.join().map_err(|_| "an observer panicked")??;
-    }
-    Ok(())
-}
-
-fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageError> {
-    let run = ObservedRun::at(root)?;
-    let mut observer = run.observe::<M>()?;
-    let _ = attached.send(());
-    drop(attached);
-    loop {
-        match observer.next(Duration::MAX)? {
-            Next::Message(message, _) => {
-                let bytes: &[u8] = message.values();
-                let touched = bytes
-                    .iter()
-                    .step_by(CACHE_LINE)
-                    .map(|byte| u64::from(*byte));
-                black_box(touched.sum::<u64>());
+    say(READY);
+    while !observers.iter().all(|it| it.has_ended()) {
+        let listeners: Vec<_> = observers.iter().map(|it| it.listener()).collect();
+        wait_for_any(&signals, &listeners, MAX_WAIT)?;
+        for observer in &mut observers {
+            while let Some(message) = observer.take()? {
+                black_box(message);
             }
-            Next::Idle => {}
-            Next::Ended => return Ok(()),
         }
     }
+    Ok(())
 }
 
 /// Prints a line for the process that has started this one. That it has ended is noticed by its
