@@ -60,7 +60,6 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             stage,
             command,
             scheduling: Scheduling::default(),
-            gyre: own().to_string_lossy().into_owned(),
             manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
@@ -108,7 +107,6 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
         stop_timeout: seconds("--stop-timeout-s", arguments.stop_timeout_s)?,
         same_as_own: arguments.same_as_own,
         budget: budget.transpose()?,
-        ..Demands::default()
     })
 }
 

@@ -26,7 +26,7 @@ pub use harness::Candidate;
 pub use report::{Report, Work};
 pub use result::{Spread, Spreads};
 pub use rule::{Rule, Verdict};
-pub use test::{Demands, InputScans, Prepare, Test};
+pub use test::{Demands, InputScans, Test};
 
 use checks::Examination;
 use reference::{Context, Reference};

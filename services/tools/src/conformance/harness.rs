@@ -9,6 +9,7 @@ use gyre_supervise::{
     Death, Scheduling, SuperviseError,
     rig::{Process, Recorded, Rig, Tap},
 };
+use gyre_terminal::own;
 
 use crate::conformance::topics::StageTopics;
 
@@ -17,8 +18,6 @@ pub struct Candidate {
     pub stage: StageId,
     pub command: Vec<String>,
     pub scheduling: Scheduling,
-    /// The program `gyre`: the guardian, and Gyre's own stages.
-    pub gyre: String,
     /// The manifest of the run, without prefix and root.
     pub manifest: Manifest,
     pub configuration: String,
@@ -27,11 +26,6 @@ pub struct Candidate {
 impl Candidate {
     pub(crate) fn topics(&self) -> StageTopics {
         StageTopics::of(self.stage, &self.manifest)
-    }
-
-    pub(crate) fn own_command(&self, stage: StageId) -> Vec<String> {
-        let words = [&self.gyre, "stage", stage.name()];
-        words.map(str::to_owned).into()
     }
 
     /// Creates a run that writes to `out`, without its services.
@@ -47,7 +41,7 @@ impl Candidate {
             out,
             ..self.manifest.clone()
         };
-        let guardian = [&self.gyre, "guard"].map(str::to_owned);
+        let guardian = [own().display().to_string(), "guard".to_owned()];
         Rig::new(manifest, &self.configuration, &guardian, signals)
     }
 }

@@ -7,12 +7,13 @@ use std::{
 };
 
 use gyre_messages::{
-    Hop, Item, Message, Motion, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, compose, flag,
+    Hop, Item, Message, Motion, Pose, PoseHeader, Scan, ScanHeader, StageId, compose, flag,
 };
 use gyre_radar::continues;
+use gyre_run::StageConfig;
 use gyre_stage::{StageError, clock, wake::Signals, writer::TopicWriter};
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, own};
 
 use crate::conformance::{
     harness::start_of_trajectory,
@@ -116,9 +117,6 @@ struct OwnPipeline<'a> {
     /// Time without progress after which it has failed.
     stall_timeout: Duration,
     reference: Reference,
-    last_pose: Option<PoseHeader>,
-    /// The topic of the motions that poses are composed of.
-    motions: &'static str,
     unsent: std::iter::Peekable<std::vec::IntoIter<Recorded>>,
 }
 
@@ -134,9 +132,9 @@ impl<'a> OwnPipeline<'a> {
         }
         let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
         start_of_trajectory().send(&poses)?;
-        let mut processes = Vec::new();
+        let (gyre, mut processes) = (own().display().to_string(), Vec::new());
         for stage in stages {
-            let command = test.candidate.own_command(stage);
+            let command = StageConfig::own_command(&gyre, stage.name(), None);
             let process = rig.start(stage.name(), &command, &test.candidate.scheduling)?;
             processes.push((stage, process));
         }
@@ -148,11 +146,6 @@ impl<'a> OwnPipeline<'a> {
             rig,
             stall_timeout: test.demands.start_timeout,
             reference: Reference::default(),
-            last_pose: None,
-            motions: match manifest.refines {
-                true => Refined::TOPIC,
-                false => Motion::TOPIC,
-            },
             unsent: scans.into_iter().peekable(),
         })
     }
@@ -194,12 +187,15 @@ impl<'a> OwnPipeline<'a> {
 
     /// Publishes the pose of an item that all stages have answered; returns whether there was one.
     fn integrate(&mut self) -> Result<bool, StageError> {
-        let next = self.reference.topic(Pose::TOPIC).len() as u64;
-        let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
-        if !self.taps.iter().all(is_done) {
+        let poses = self.reference.topic(Pose::TOPIC);
+        let next = poses.len() as u64;
+        let answers = self.taps.iter();
+        let answers = answers.map(|(topic, _)| self.reference.get(topic, next));
+        let Some(answers) = answers.collect::<Option<Vec<_>>>() else {
             return Ok(false);
-        }
-        let Some(motion) = self.reference.get(self.motions, next) else {
+        };
+        // Poses are composed of the motions of the last stage.
+        let Some(motion) = answers.last() else {
             return Ok(false);
         };
         let motion = motion.header::<Motion>()?;
@@ -207,12 +203,11 @@ impl<'a> OwnPipeline<'a> {
             item: motion.item,
             ..PoseHeader::default()
         };
-        let is_end = motion.item.is(flag::END);
-        if !is_end {
-            pose = compose(self.last_pose.as_ref(), &motion);
+        if !motion.item.is(flag::END) {
+            let last = poses.last().map(Recorded::header::<Pose>).transpose()?;
+            pose = compose(last.as_ref(), &motion);
             pose.item.flags |= flag::SYNC;
         }
-        self.last_pose = (!is_end).then_some(pose);
         let pose = Recorded::of::<Pose>(&pose, &[], 0);
         pose.send(&self.poses)?;
         self.reference.push(Pose::TOPIC, pose);
@@ -247,22 +242,13 @@ impl<'a> OwnPipeline<'a> {
     }
 
     fn require_living(&mut self, idle: Duration) -> Result<(), Failure> {
-        for (stage, process) in &mut self.processes {
-            if let Some(death) = process.death() {
-                let reason = death.last_output.unwrap_or(death.cause);
-                return Err(own_ended(stage.name(), &reason));
-            }
-        }
-        match idle < self.stall_timeout {
-            true => Ok(()),
-            false => Err(own_ended(
-                "pipeline",
-                &format!("it made no progress for {idle:.0?}"),
-            )),
-        }
+        let processes = self.processes.iter_mut();
+        let mut dead = processes.filter_map(|(stage, it)| Some((stage.name(), it.death()?)));
+        let (name, reason) = match dead.next() {
+            Some((stage, death)) => (stage, death.last_output.unwrap_or(death.cause)),
+            None if idle < self.stall_timeout => return Ok(()),
+            None => ("pipeline", format!("it made no progress for {idle:.0?}")),
+        };
+        Err(format!("cannot compute the inputs: our own {name} ended: {reason}").into())
     }
-}
-
-fn own_ended(stage: &str, reason: &str) -> Failure {
-    format!("cannot compute the inputs: our own {stage} ended: {reason}").into()
 }

@@ -23,6 +23,9 @@ use crate::conformance::{
     test::{Demands, Test},
 };
 
+/// The time of watching a program that must send nothing.
+const QUIET: Duration = Duration::from_millis(300);
+
 /// The number of items under way at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
@@ -171,10 +174,10 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Waits for a time while the run continues around the process; returns whether the process is
-    /// still alive.
-    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, Failure> {
-        Ok(self.ended_within(time)?.is_none())
+    /// Waits while the run continues around a process that must send nothing; returns whether the
+    /// process is still alive.
+    pub(crate) fn rest(&mut self) -> Result<bool, Failure> {
+        Ok(self.ended_within(QUIET)?.is_none())
     }
 
     fn receive(&mut self) -> Result<(), StageError> {

@@ -32,8 +32,6 @@ use shadowing::Shadowing;
 pub struct Options {
     pub stage: StageId,
     pub command: Vec<String>,
-    /// The program of the guardian, which ends the shadow if this process is killed.
-    pub gyre: String,
     pub scheduling: Scheduling,
     /// Time for it to open its topics.
     pub start_timeout: Duration,
@@ -100,7 +98,6 @@ fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageErr
         stage: options.stage,
         command: options.command.clone(),
         scheduling: options.scheduling.clone(),
-        gyre: options.gyre.clone(),
         manifest: Manifest {
             live: false,
             window: Window {

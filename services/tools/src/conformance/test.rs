@@ -9,16 +9,13 @@ use gyre_supervise::{SuperviseError, rig::Rig};
 
 use crate::conformance::Candidate;
 
-/// Writes files into the root of a run.
-pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
-
 /// A program that is to keep the contract of a stage, and its limits.
 pub struct Test {
     /// The program. Each of its runs writes to a folder below its manifest's `out`.
     pub candidate: Candidate,
     pub stages: Vec<StageId>,
     /// Writes the other files of a run's root, as the list of a recording's files.
-    pub prepare: Prepare,
+    pub prepare: Box<dyn Fn(&Path) -> io::Result<()>>,
     pub demands: Demands,
 }
 
@@ -28,26 +25,11 @@ pub struct Demands {
     pub item_timeout: Duration,
     /// Time for its exit after SIGTERM, and after an input that it has to refuse.
     pub stop_timeout: Duration,
-    /// The time of watching a program that must send nothing.
-    pub quiet: Duration,
     /// True if its results must equal the results of Gyre's own stage, to the bit.
     pub same_as_own: bool,
     /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
     /// the maximum.
     pub budget: Option<Duration>,
-}
-
-impl Default for Demands {
-    fn default() -> Self {
-        Self {
-            start_timeout: Duration::from_secs(30),
-            item_timeout: Duration::from_secs(10),
-            stop_timeout: Duration::from_secs(2),
-            quiet: Duration::from_millis(300),
-            same_as_own: false,
-            budget: None,
-        }
-    }
 }
 
 pub struct InputScans {

@@ -59,7 +59,7 @@ impl Examination<'_> {
         session.spawn(&[&shell[..], &candidate.command[..]].concat())?;
         let limit = session.demands().start_timeout;
         let waited = session.wait(limit, |session| ready.exists() || session.has_joined())?;
-        let lives = session.rest(session.demands().quiet)?;
+        let lives = session.rest()?;
         let breach = match (ready.exists(), session.has_joined()) {
             (false, true) => {
                 session.findings.not_for(Rule::StandsBy, DOES_NOT);

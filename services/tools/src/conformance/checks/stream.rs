@@ -53,13 +53,10 @@ impl Examination<'_> {
     pub(super) fn window(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end() as usize;
         let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
-        let (demands, scans) = (
-            session.demands(),
-            session.harness.rig.manifest().window.scans,
-        );
-        let window = scans.min(end);
-        session.wait(demands.item_timeout, |it| it.outputs.len() >= window)?;
-        session.rest(demands.quiet)?;
+        let window = session.harness.rig.manifest().window.scans.min(end);
+        let limit = session.demands().item_timeout;
+        session.wait(limit, |it| it.outputs.len() >= window)?;
+        session.rest()?;
         let sent = session.outputs.len();
         session
             .findings
@@ -137,7 +134,7 @@ impl Session<'_> {
 
     fn waits_after_the_end(&mut self) -> Result<(), Failure> {
         let sent = self.outputs.len();
-        let lives = self.rest(self.demands().quiet)?;
+        let lives = self.rest()?;
         self.findings.require(Rule::PassesEnd, lives, || {
             "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
                 .to_owned()
