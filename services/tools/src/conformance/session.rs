@@ -55,7 +55,6 @@ pub(crate) struct Session<'a> {
     /// The time of the first sending of each item: an item that a sink has journalled in one life
     /// and sends in the next keeps its stamps.
     sent_ns: BTreeMap<u64, i64>,
-    progress: Instant,
 }
 
 #[derive(Clone, Debug)]
@@ -107,7 +106,6 @@ impl<'a> Session<'a> {
             outputs: Vec::new(),
             notified: BTreeSet::new(),
             sent_ns: BTreeMap::new(),
-            progress: Instant::now(),
         })
     }
 
@@ -121,13 +119,6 @@ impl<'a> Session<'a> {
 
     pub(crate) fn output_topic(&self) -> &'static str {
         self.harness.topics.output
-    }
-
-    /// Starts the process and waits until it has opened the topic that it publishes.
-    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, Failure> {
-        self.spawn(command)?;
-        let limit = self.demands().start_timeout;
-        self.wait(limit, |session| session.harness.has_publisher())
     }
 
     pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), SuperviseError> {
@@ -150,10 +141,12 @@ impl<'a> Session<'a> {
         limit: Duration,
         done: impl Fn(&Self) -> bool,
     ) -> Result<Waited, Failure> {
-        self.progress = Instant::now();
+        let mut progress = Instant::now();
         loop {
             self.notified.extend(self.harness.answer_handshakes()?);
-            self.receive()?;
+            if self.receive()? {
+                progress = Instant::now();
+            }
             self.admit()?;
             if done(self) {
                 return Ok(Waited::Done);
@@ -165,7 +158,7 @@ impl<'a> Session<'a> {
                     false => Waited::Died(death),
                 });
             }
-            if self.progress.elapsed() > limit {
+            if progress.elapsed() > limit {
                 return Ok(Waited::TimedOut);
             }
             self.harness
@@ -180,8 +173,11 @@ impl<'a> Session<'a> {
         Ok(self.ended_within(QUIET)?.is_none())
     }
 
-    fn receive(&mut self) -> Result<(), StageError> {
+    /// Takes what the process has sent; returns whether there was anything.
+    fn receive(&mut self) -> Result<bool, StageError> {
+        let mut any = false;
         while let Some(sent) = self.harness.receive()? {
+            any = true;
             match sent {
                 Sent::Message(output) => {
                     self.findings.checked(Rule::SendsValid);
@@ -200,9 +196,8 @@ impl<'a> Session<'a> {
                     self.answered(seq)?;
                 }
             }
-            self.progress = Instant::now();
         }
-        Ok(())
+        Ok(any)
     }
 
     fn examine(&mut self, item: &Item, read_ns: i64) {
@@ -251,13 +246,6 @@ impl<'a> Session<'a> {
         Ok(self.harness.rig.remove_dead()?)
     }
 
-    /// Sends SIGTERM; returns how the process ended, `None` if it did not in time.
-    pub(crate) fn stop(&mut self) -> Result<Option<Death>, Failure> {
-        self.harness.terminate();
-        self.pace = Pace::Hold;
-        self.ended_within(self.demands().stop_timeout)
-    }
-
     /// Waits for the end of the process; `None` if it does not end in time.
     pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, Failure> {
         let since = Instant::now();
@@ -303,15 +291,6 @@ impl<'a> Session<'a> {
     pub(crate) fn answer_ns(&self, seq: u64) -> Option<i64> {
         let (sent_ns, answer) = (self.sent_ns.get(&seq)?, self.about(seq).next()?);
         Some(answer.received_ns.saturating_sub(*sent_ns))
-    }
-
-    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, StageError> {
-        let mut results = BTreeMap::new();
-        for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
-            let bytes = result_bytes(self.output_topic(), output)?;
-            results.entry(output.item().seq).or_insert(bytes);
-        }
-        Ok(results)
     }
 
     /// Notes each output from a place on whose bytes differ from the first scenario.

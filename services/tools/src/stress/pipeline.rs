@@ -115,10 +115,7 @@ pub fn measure(
     let ended_load =
         ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
-        omitted: omitted
-            .or(unplayed)
-            .or(ended_load)
-            .or_else(|| latency.counts.omitted()),
+        omitted: omitted.or(unplayed).or(ended_load),
         figures: Figures {
             latency,
             faults,

@@ -8,6 +8,7 @@ use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{
+    result::result_bytes,
     rule::Rule,
     session::{Pace, Session, Waited},
 };
@@ -43,10 +44,14 @@ impl Examination<'_> {
             });
         }
         session.stops("after the end of the stream")?;
-        let results = session.results()?;
         self.outputs = std::mem::take(&mut session.outputs);
-        session.findings.first_results = results;
-        Ok(session.findings.first_results.len() > 1)
+        let topic = session.output_topic();
+        let results = &mut session.findings.first_results;
+        for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
+            let bytes = result_bytes(topic, output)?;
+            results.entry(output.item().seq).or_insert(bytes);
+        }
+        Ok(results.len() > 1)
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
@@ -70,7 +75,9 @@ impl Examination<'_> {
 impl Session<'_> {
     pub(super) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
-        let waited = self.start(&self.test.candidate.command)?;
+        self.spawn(&self.test.candidate.command)?;
+        let limit = self.demands().start_timeout;
+        let waited = self.wait(limit, |session| session.harness.has_publisher())?;
         let is_open = waited.is_done();
         self.findings
             .require(Rule::StartsInTime, is_open, || match &waited {
@@ -167,7 +174,9 @@ impl Session<'_> {
 
     pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
         let limit = self.demands().stop_timeout;
-        let breach = match self.stop()? {
+        self.harness.terminate();
+        self.pace = Pace::Hold;
+        let breach = match self.ended_within(limit)? {
             None => Some(format!(
                 "it has not exited within {limit:.0?} of SIGTERM {when}"
             )),
