@@ -156,8 +156,8 @@ impl Session<'_> {
     /// Requires that a reader which comes now receives the newest items.
     fn gives_history(&mut self) -> Result<(), Failure> {
         let (topic, rig) = (self.output_topic(), &self.harness.rig);
-        let history = self.harness.topics.history(&rig.manifest().window);
-        let wanted = history.min(self.outputs.len());
+        let sizes = gyre_messages::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
+        let wanted = sizes.map_or(0, |it| it.history).min(self.outputs.len());
         let (late, received) = (rig.tap(topic)?, Cell::new(0));
         self.wait(self.demands().item_timeout, |_| {
             while late.receive().is_ok_and(|message| message.is_some()) {

@@ -51,12 +51,9 @@ impl<'a> Running<'a> {
     pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, Failure> {
         let out = tested.run_out(&setup.name);
         let log = tested.run_out(&format!("{}.txt", setup.name));
-        let unusable =
-            |path: &Path, error: std::io::Error| format!("cannot use {}: {error}", path.display());
-        let runs = tested.out.join("runs");
-        create_folder(&runs).map_err(|error| unusable(&runs, error.source))?;
-        let output = File::create(&log).map_err(|error| unusable(&log, error))?;
-        let errors = output.try_clone().map_err(|error| unusable(&log, error))?;
+        create_folder(&tested.out.join("runs"))?;
+        let output = File::create(&log).map_err(StageError::file(&log))?;
+        let errors = output.try_clone().map_err(StageError::file(&log))?;
         // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));
