@@ -26,7 +26,6 @@ pub use report::{Provenance, Report};
 
 #[derive(Clone, Debug)]
 pub struct TestedPipeline {
-    pub program: PathBuf,
     /// The resolved configuration, whose source is a recording.
     pub configuration: PathBuf,
     pub out: PathBuf,

@@ -117,7 +117,7 @@ impl<'a> Examination<'a> {
         let test = self.context.test;
         let rig = test.rig("absence", self.context.signals)?;
         let (command, scheduling) = (&test.candidate.command, &test.candidate.scheduling);
-        let mut process = rig.start(self.stage().name(), command, scheduling)?;
+        let mut process = rig.start(self.stage().name(), command, scheduling, false)?;
         let since = Instant::now();
         let has_created = || !rig.services().is_empty();
         // It may wait for its topics as long as it likes.

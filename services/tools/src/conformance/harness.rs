@@ -54,7 +54,7 @@ pub(crate) struct Harness<'a> {
     feeds: BTreeMap<&'static str, TopicWriter>,
     pub output: Tap,
     pub rig: Rig<'a>,
-    stage: StageId,
+    candidate: &'a Candidate,
     pub topics: StageTopics,
 }
 
@@ -67,15 +67,15 @@ pub(crate) enum Sent {
 
 impl<'a> Harness<'a> {
     /// Creates the services of the run, and opens the topics of the stage.
-    pub(crate) fn open(mut rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
+    pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, StageError> {
         rig.create_services()?;
-        let topics = StageTopics::of(stage, rig.manifest());
+        let topics = StageTopics::of(candidate.stage, rig.manifest());
         let mut harness = Self {
             process: None,
             feeds: BTreeMap::new(),
             output: rig.tap(topics.output)?,
             rig,
-            stage,
+            candidate,
             topics,
         };
         harness.open_feeds()?;
@@ -91,13 +91,16 @@ impl<'a> Harness<'a> {
         Ok(())
     }
 
-    pub(crate) fn start(
-        &mut self,
-        command: &[String],
-        scheduling: &Scheduling,
-    ) -> Result<(), SuperviseError> {
-        self.process = Some(self.rig.start(self.stage.name(), command, scheduling)?);
+    pub(crate) fn start(&mut self, stands_by: bool) -> Result<(), SuperviseError> {
+        let (candidate, name) = (self.candidate, self.candidate.stage.name());
+        let (command, scheduling) = (&candidate.command, &candidate.scheduling);
+        self.process = Some(self.rig.start(name, command, scheduling, stands_by)?);
         Ok(())
+    }
+
+    /// Lets a process that stands by begin.
+    pub(crate) fn end_input(&mut self) {
+        self.process.iter_mut().for_each(Process::end_input);
     }
 
     /// Answers the subscribe handshakes of the process; returns the topics that it has notified.
@@ -119,7 +122,7 @@ impl<'a> Harness<'a> {
     }
 
     pub(crate) fn has_publisher(&self) -> bool {
-        self.rig.has_publisher(self.stage)
+        self.rig.has_publisher(self.candidate.stage)
     }
 
     pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {

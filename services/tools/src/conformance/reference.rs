@@ -135,7 +135,8 @@ impl<'a> OwnPipeline<'a> {
         let (gyre, mut processes) = (own().display().to_string(), Vec::new());
         for stage in stages {
             let command = StageConfig::own_command(&gyre, stage.name(), None);
-            let process = rig.start(stage.name(), &command, &test.candidate.scheduling)?;
+            let scheduling = &test.candidate.scheduling;
+            let process = rig.start(stage.name(), &command, scheduling, false)?;
             processes.push((stage, process));
         }
         Ok(Self {

@@ -91,7 +91,7 @@ impl<'a> Session<'a> {
     ) -> Result<Self, Failure> {
         let (test, reference) = (context.test, context.reference);
         let rig = test.rig(name, context.signals)?;
-        let harness = Harness::open(rig, test.candidate.stage)?;
+        let harness = Harness::open(rig, &test.candidate)?;
         harness.feed(Pose::TOPIC, &start_of_trajectory())?;
         Ok(Self {
             harness,
@@ -121,11 +121,10 @@ impl<'a> Session<'a> {
         self.harness.topics.output
     }
 
-    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), SuperviseError> {
+    pub(crate) fn spawn(&mut self, stands_by: bool) -> Result<(), SuperviseError> {
         self.last = None;
         self.notified.clear();
-        let scheduling = &self.test.candidate.scheduling;
-        self.harness.start(command, scheduling)
+        self.harness.start(stands_by)
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.

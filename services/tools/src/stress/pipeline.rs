@@ -89,8 +89,7 @@ pub fn measure(
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let loads = setup.loads.iter();
-    let loads = loads.map(|work| Helper::start(&tested.program, work.clone()));
+    let loads = setup.loads.iter().cloned().map(Helper::start);
     let mut loads: Vec<Helper> = loads.collect::<Result<_, _>>()?;
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;

@@ -86,20 +86,26 @@ impl<'a> Rig<'a> {
         &self.manifest
     }
 
-    /// The output is appended to the log of the process.
+    /// The output is appended to the log of the process. One that stands by waits for
+    /// [`Process::end_input`].
     pub fn start(
         &self,
         name: &str,
         command: &[String],
         scheduling: &Scheduling,
+        stands_by: bool,
     ) -> Result<Process, SuperviseError> {
         let plan = StagePlan {
             scheduling: scheduling.clone(),
             ..StagePlan::new(name, command.to_vec())
         };
         let starter = Starter::new(self.signals, &self.guardian);
+        let position = match stands_by {
+            true => Position::Taken,
+            false => Position::Free,
+        };
         Ok(Process {
-            child: Child::spawn(&plan, &self.manifest, &starter, Position::Free)?,
+            child: Child::spawn(&plan, &self.manifest, &starter, position)?,
             death: None,
         })
     }
@@ -160,6 +166,10 @@ impl Process {
             self.death = Some(self.child.death());
         }
         self.death.clone()
+    }
+
+    pub fn end_input(&mut self) {
+        self.child.end_input();
     }
 
     /// Sends SIGTERM to the group.

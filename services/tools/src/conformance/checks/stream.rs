@@ -75,7 +75,7 @@ impl Examination<'_> {
 impl Session<'_> {
     pub(super) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
-        self.spawn(&self.test.candidate.command)?;
+        self.spawn(false)?;
         let limit = self.demands().start_timeout;
         let waited = self.wait(limit, |session| session.harness.has_publisher())?;
         let is_open = waited.is_done();

@@ -41,7 +41,7 @@ pub(crate) struct Life<'a> {
 impl<'a> Life<'a> {
     /// Starts the program in a run of its own, with a copy of the state of the observed run's
     /// refinement.
-    pub fn begin(program: &ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
+    pub fn begin(program: &'a ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
         let (candidate, out) = (&program.candidate, program.folder.join("out"));
         if out.exists() {
             fs::remove_dir_all(&out).map_err(StageError::file(&out))?;
@@ -50,8 +50,8 @@ impl<'a> Life<'a> {
             copy_state(&candidate.manifest.out, &out)?;
         }
         let rig = candidate.rig(out, signals)?;
-        let mut harness = Harness::open(rig, candidate.stage)?;
-        harness.start(&candidate.command, &candidate.scheduling)?;
+        let mut harness = Harness::open(rig, candidate)?;
+        harness.start(false)?;
         Ok(Self {
             harness,
             began: Instant::now(),

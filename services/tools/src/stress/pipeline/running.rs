@@ -59,7 +59,7 @@ impl<'a> Running<'a> {
         let work = Work::Run(words(tested, setup, &out));
         Ok(Self {
             setup,
-            process: spawn(&tested.program, &work, output.into(), errors.into())?,
+            process: spawn(&work, output.into(), errors.into())?,
             out,
             log,
             deadline: Instant::now() + START_LIMIT,
