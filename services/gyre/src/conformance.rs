@@ -10,7 +10,7 @@ use gyre_scan_matching::RefinementKind;
 use gyre_stage::{StageError, wake::Signals};
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
-use gyre_tools::conformance::{Candidate, Demands, InputScans, Report, Test, check};
+use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
@@ -50,11 +50,6 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")
         .tempdir()?;
-    let dataset = gyre_configuration::open(&configuration)?.dataset;
-    let scans = InputScans {
-        played: configuration.source.played(dataset.scans()),
-        dataset,
-    };
     let test = Test {
         candidate: Candidate {
             stage,
@@ -79,7 +74,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             print::note(format_args!("gyre: testing {what}"));
         }
     };
-    match check(&test, scans, &signals, &mut observe) {
+    match check(&test, &signals, &mut observe) {
         Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => Ok(None),
         report => report.map(Some),
     }

@@ -26,22 +26,21 @@ pub use harness::Candidate;
 pub use report::{Report, Work};
 pub use result::{Spread, Spreads};
 pub use rule::{Rule, Verdict};
-pub use test::{Demands, InputScans, Test};
+pub use test::{Demands, Test};
 
 use checks::Examination;
 use reference::{Context, Reference};
 
-/// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
+/// Tests a program; `observe` receives the name of each scenario.
 /// Breaches of the contract are in the report, not in the error. A signal ends the test with
 /// [`StageError::Stopped`](gyre_stage::StageError).
 pub fn check(
     test: &Test,
-    mut scans: InputScans,
     signals: &Signals,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {
     observe("the inputs, by our own stages");
-    let reference = Reference::compute(test, &mut scans, signals)?;
+    let reference = Reference::compute(test, signals)?;
     let context = Context {
         test,
         reference: &reference,

@@ -1,8 +1,7 @@
 //! The program that is tested, and its limits.
 
-use std::{io, ops::Range, path::Path, time::Duration};
+use std::{io, path::Path, time::Duration};
 
-use gyre_datasets::Dataset;
 use gyre_messages::StageId;
 use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::{SuperviseError, rig::Rig};
@@ -30,12 +29,6 @@ pub struct Demands {
     /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
     /// the maximum.
     pub budget: Option<Duration>,
-}
-
-pub struct InputScans {
-    /// An open recording or simulation.
-    pub dataset: Box<dyn Dataset>,
-    pub played: Range<usize>,
 }
 
 impl Test {
