@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan};
+use gyre_messages::topics;
 use gyre_stage::{
     observer::{ObservedRun, wait_for_any},
     wake::{MAX_WAIT, Signals},
@@ -83,18 +83,10 @@ fn piece() -> Vec<u8> {
 
 /// Copies the messages of all topics of a run until it ends.
 pub(super) fn observe(out: &Path) -> Result<(), Failure> {
-    const TOPICS: [&str; 6] = [
-        Scan::TOPIC,
-        Masked::TOPIC,
-        Rotation::TOPIC,
-        Motion::TOPIC,
-        Refined::TOPIC,
-        Pose::TOPIC,
-    ];
     let (run, signals) = (ObservedRun::writing_to(out)?, Signals::install()?);
     let mut observers = Vec::new();
-    for topic in TOPICS {
-        observers.extend(run.observe_topic(topic)?);
+    for topic in topics(&run.manifest().window) {
+        observers.extend(run.observe_topic(topic.name)?);
     }
     say(READY);
     while !observers.iter().all(|it| it.has_ended()) {

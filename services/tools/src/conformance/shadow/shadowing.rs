@@ -182,15 +182,12 @@ impl<'a> Shadowing<'a> {
             return self.start();
         };
         let is_open = life.attend()?;
+        // Before its messages: those of a dead program are all there.
+        let death = life.harness.death();
         for sent in life.take()? {
             self.receive(sent)?;
         }
-        if let Some(death) = self.life.as_mut().and_then(|life| life.harness.death()) {
-            // Its last messages.
-            let last = self.life.as_ref().map(Life::take).transpose()?;
-            last.into_iter()
-                .flatten()
-                .try_for_each(|it| self.receive(it))?;
+        if let Some(death) = death {
             self.record.counts.deaths += 1;
             return Ok(self.fail(death.to_string())?);
         }
