@@ -99,7 +99,12 @@ impl<'run> Observation<'run> {
             loop {
                 match self.observers[place].take() {
                     Ok(Some(message)) => {
-                        complete.extend(self.add(place, Recorded::from_bytes(message)));
+                        let message = Recorded {
+                            header: message.header,
+                            payload: message.payload,
+                            received_ns: 0,
+                        };
+                        complete.extend(self.add(place, message));
                     }
                     Ok(None) => break,
                     // The run judges the messages of its stages. The item counts as missed.

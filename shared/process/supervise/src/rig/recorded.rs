@@ -1,7 +1,7 @@
 //! A message as a value.
 
 use gyre_messages::{Item, Message};
-use gyre_stage::{StageError, source::RecordedMessage, writer::TopicWriter};
+use gyre_stage::{StageError, writer::TopicWriter};
 
 use super::Tap;
 
@@ -9,7 +9,7 @@ use super::Tap;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     /// The bytes of the header, which starts with an [`Item`].
-    header: Vec<u8>,
+    pub header: Vec<u8>,
     pub payload: Vec<u8>,
     /// Time of receipt, `CLOCK_MONOTONIC`, ns; 0 for a synthetic message.
     pub received_ns: i64,
@@ -21,15 +21,6 @@ impl Recorded {
             header: bytemuck::bytes_of(header).to_vec(),
             payload: payload.to_vec(),
             received_ns,
-        }
-    }
-
-    /// Creates a message of these bytes, whose header starts with an [`Item`].
-    pub fn from_bytes(message: RecordedMessage) -> Self {
-        Self {
-            header: message.header,
-            payload: message.payload,
-            received_ns: 0,
         }
     }
 
@@ -60,10 +51,6 @@ impl Recorded {
     #[must_use]
     pub fn with<M: Message>(&self, header: &M::Header) -> Self {
         Self::of::<M>(header, &self.payload, self.received_ns)
-    }
-
-    pub fn header_bytes(&self) -> &[u8] {
-        &self.header
     }
 
     pub fn item(&self) -> Item {
