@@ -28,8 +28,6 @@ pub(crate) struct Observed {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Feedback {
-    pub seq: u64,
-    breaks: bool,
     pub motion: Recorded,
     pub pose: Recorded,
 }
@@ -148,8 +146,7 @@ impl<'run> Observation<'run> {
         let topics = self.topics.iter().copied();
         let inputs: Vec<_> = topics.zip(messages.by_ref().take(self.forward)).collect();
         let output = messages.next()?;
-        let seq = output.item().seq;
-        self.count_missed(seq);
+        self.count_missed(output.item().seq);
         let mut observed = Observed {
             inputs,
             output,
@@ -158,12 +155,7 @@ impl<'run> Observation<'run> {
         };
         if let (Some(motion), Some(pose)) = (messages.next(), messages.next()) {
             self.add_feedback(&mut observed);
-            self.recent.push_back(Feedback {
-                seq,
-                breaks: observed.breaks(),
-                motion,
-                pose,
-            });
+            self.recent.push_back(Feedback { motion, pose });
             while self.recent.len() as u64 > self.lag + 1 {
                 self.recent.pop_front();
             }
@@ -187,9 +179,8 @@ impl<'run> Observation<'run> {
         let before = &observed.before;
         let has_all = before.len() as u64 > lag;
         // A chain that has just begun is compensated by nothing.
-        let begins_before = before
-            .iter()
-            .any(|it| it.breaks && it.seq.saturating_add(lag) > seq);
+        let mut items = before.iter().map(|it| it.pose.item());
+        let begins_before = items.any(|it| it.is(flag::BREAK) && it.seq.saturating_add(lag) > seq);
         observed.can_open = match observed.breaks() {
             true => seq == 0 || has_all,
             false => has_all && !begins_before,
