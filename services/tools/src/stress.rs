@@ -42,10 +42,6 @@ pub struct TestedPipeline {
 }
 
 impl TestedPipeline {
-    pub fn turn_s(&self) -> f64 {
-        self.turn.len() as f64 * self.period.as_secs_f64()
-    }
-
     /// Returns the seconds of the recording that are played in a second at this rate.
     pub fn relative_rate(&self, rate_hz: f64) -> f64 {
         (rate_hz * self.period.as_secs_f64()).clamp(0.001, 1000.0)

@@ -181,12 +181,7 @@ impl Campaign<'_> {
 
     /// The limits of each step: the limits of the budget, else no drop and a p99 of a period.
     fn step_limits(&self) -> Limits {
-        let limits = Limits {
-            rate_hz: None,
-            radars: None,
-            ..self.limits.clone()
-        };
-        limits.or(&Limits {
+        self.limits.or(&Limits {
             p99_ms: Some(PERIOD_MS),
             drops_percent: Some(0.0),
             ..Limits::default()
@@ -283,8 +278,11 @@ fn problem(measured: &Measured) -> Option<String> {
     if let Some(said) = &measured.died {
         return Some(format!("the run has ended: {said}"));
     }
-    if let Some(unseen) = figures.latency.counts.omitted() {
-        return Some(unseen);
+    let unseen = figures.latency.counts.unseen;
+    if unseen > 0 {
+        return Some(format!(
+            "{unseen} poses were not seen by the process that measures: the machine was too busy for it"
+        ));
     }
     let mut lost = figures.faults.iter().filter(|it| it.recovery_ms.is_none());
     if let Some(fault) = lost.next() {
