@@ -13,7 +13,7 @@ use gyre_messages::{Pose, PoseHeader};
 use gyre_run::Scenario;
 use gyre_stage::{
     StageError,
-    control::Control,
+    control::{Control, Phase},
     observer::{ObservedRun, Observer},
     run::sweep,
 };
@@ -96,29 +96,21 @@ impl<'a> Running<'a> {
     }
 
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
-        loop {
-            // A supervisor of the same results may still be there, if an earlier run was killed.
-            if self.is_supervised_by_its_process()
-                && let Ok(run) = ObservedRun::writing_to(&self.out)
-            {
-                match run.observe::<Pose>().map(drop) {
-                    Ok(()) => return Ok(run),
-                    Err(StageError::NoPlace { observers: 0, .. }) => {
-                        return Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into());
-                    }
-                    Err(error @ StageError::NoPlace { .. }) => return Err(error.into()),
-                    // Its topics are not there yet.
-                    Err(_) => {}
-                }
-            }
+        while !self.is_up() {
             self.require_life()?;
             thread::sleep(POLL_PERIOD);
         }
+        let run = ObservedRun::writing_to(&self.out)?;
+        match run.manifest().window.observers {
+            0 => Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into()),
+            _ => Ok(run),
+        }
     }
 
-    fn is_supervised_by_its_process(&self) -> bool {
+    /// A supervisor of the same results may still be there, if an earlier run was killed.
+    fn is_up(&self) -> bool {
         let status = Control::of(&self.out).and_then(|run| run.status());
-        status.is_ok_and(|status| status.pid == self.pid())
+        status.is_ok_and(|it| it.pid == self.pid() && it.phase != Phase::Starting)
     }
 
     fn require_life(&mut self) -> Result<(), Failure> {
