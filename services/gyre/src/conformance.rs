@@ -74,12 +74,8 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             print::note(format_args!("gyre: testing {what}"));
         }
     };
-    let is_stop = |error: &Failure| {
-        let error = error.downcast_ref::<StageError>();
-        matches!(error, Some(StageError::Stopped))
-    };
     match check(&test, &signals, &mut observe) {
-        Err(error) if is_stop(&error) => Ok(None),
+        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => Ok(None),
         report => report.map(Some),
     }
 }
