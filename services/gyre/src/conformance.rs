@@ -50,6 +50,8 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")
         .tempdir()?;
+    // Refuses a radar, which has no scans to test with again and again.
+    gyre_configuration::open(&configuration)?;
     let test = Test {
         candidate: Candidate {
             stage,
