@@ -16,6 +16,7 @@ mod top;
 pub use arguments::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
 };
+pub(crate) use background::status_of;
 pub use background::{detach_if_asked, down, up};
 pub use choice::chosen;
 pub use echo::{EchoArguments, echo};

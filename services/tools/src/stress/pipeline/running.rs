@@ -13,7 +13,6 @@ use gyre_messages::{Pose, PoseHeader};
 use gyre_run::Scenario;
 use gyre_stage::{
     StageError,
-    control::{Control, Phase},
     observer::{ObservedRun, Observer},
     run::sweep,
 };
@@ -23,9 +22,12 @@ use gyre_terminal::Failure;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, TICK, drain};
-use crate::stress::{
-    TestedPipeline,
-    helper::{Work, spawn},
+use crate::{
+    operate::status_of,
+    stress::{
+        TestedPipeline,
+        helper::{Work, spawn},
+    },
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.
@@ -96,7 +98,8 @@ impl<'a> Running<'a> {
     }
 
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
-        while !self.is_up() {
+        // A supervisor of the same results may still be there, if an earlier run was killed.
+        while status_of(&self.out, self.pid()).is_none() {
             self.require_life()?;
             thread::sleep(POLL_PERIOD);
         }
@@ -105,12 +108,6 @@ impl<'a> Running<'a> {
             0 => Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into()),
             _ => Ok(run),
         }
-    }
-
-    /// A supervisor of the same results may still be there, if an earlier run was killed.
-    fn is_up(&self) -> bool {
-        let status = Control::of(&self.out).and_then(|run| run.status());
-        status.is_ok_and(|it| it.pid == self.pid() && it.phase != Phase::Starting)
     }
 
     fn require_life(&mut self) -> Result<(), Failure> {
