@@ -123,7 +123,7 @@ impl Campaign<'_> {
         let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), options.duration);
         let faults = |kind| {
             let stages = match options.stages.as_slice() {
-                [] => &self.tested.stages,
+                [] => self.tested.stages.as_slice(),
                 stages => stages,
             };
             Some((kind, stages.to_vec(), options.seed))

@@ -28,7 +28,7 @@ impl Recorded {
     pub fn receive(tap: &Tap) -> Result<Option<Self>, StageError> {
         Ok(tap.receive()?.map(|received| Self {
             header: received.header_bytes().to_vec(),
-            payload: received.values().to_vec(),
+            payload: received.values::<u8>().to_vec(),
             received_ns: received.received_ns,
         }))
     }
