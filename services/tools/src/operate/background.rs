@@ -20,7 +20,7 @@ use gyre_supervise::last_line;
 use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::operate::{arguments::RunChoice, choice::chosen_to_change};
+use crate::operate::choice::{RunChoice, chosen_to_change};
 
 /// The environment variable of a run that is to leave the terminal that started it.
 const DETACHED: &str = "GYRE_DETACHED";

@@ -19,7 +19,7 @@ use gyre_stage::{
 };
 use gyre_terminal::Failure;
 
-use crate::operate::arguments::RunChoice;
+use crate::operate::choice::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct EchoArguments {

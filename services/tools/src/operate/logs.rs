@@ -9,12 +9,28 @@ use std::{
     time::Duration,
 };
 
+use clap::Args;
 use gyre_configuration::process_names;
 use gyre_stage::{control::Control, wake::Signals};
 use gyre_terminal::{Failure, print};
 use serde_json::Value;
 
-use crate::operate::arguments::LogsArguments;
+use crate::operate::choice::RunChoice;
+
+#[derive(Debug, Args)]
+pub struct LogsArguments {
+    /// The process, as masking. Default: all.
+    pub process: Option<String>,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Continue with new lines, until the run ends.
+    #[arg(short, long)]
+    pub follow: bool,
+    /// Number of lines to begin with, of each log.
+    #[arg(short = 'n', long, default_value_t = 50)]
+    pub lines: usize,
+}
 
 const PERIOD: Duration = Duration::from_millis(200);
 
