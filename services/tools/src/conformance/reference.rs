@@ -12,7 +12,7 @@ use gyre_stage::{StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
 use gyre_terminal::{Failure, own};
 
-use crate::conformance::{harness::start_of_trajectory, test::Test, topics::StageTopics};
+use crate::conformance::{Test, harness::start_of_trajectory, topics::StageTopics};
 
 /// Time between two polls of what does not wake the tester.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);

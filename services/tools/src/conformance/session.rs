@@ -15,12 +15,12 @@ use gyre_supervise::{Death, SuperviseError, rig::Recorded};
 use gyre_terminal::Failure;
 
 use crate::conformance::{
+    Demands, Test,
     harness::{Harness, Sent, start_of_trajectory},
     item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
     result::result_bytes,
     rule::{Findings, Rule},
-    test::{Demands, Test},
 };
 
 /// The time of watching a program that must send nothing.
