@@ -3,7 +3,6 @@
 use std::{
     fs,
     hint::black_box,
-    io::Write,
     path::Path,
     thread,
     time::{Duration, Instant},
@@ -15,7 +14,7 @@ use gyre_stage::{
     wake::{MAX_WAIT, Signals},
 };
 use gyre_supervise::memory::Room;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";
@@ -30,7 +29,7 @@ const TAKING: Duration = Duration::from_secs(20);
 const PAUSE: Duration = Duration::from_millis(20);
 
 pub(super) fn spin() -> ! {
-    say(READY);
+    let _ = print::line(READY);
     let mut number = 1_u64;
     loop {
         number = black_box(number.wrapping_mul(6_364_136_223_846_793_005));
@@ -55,7 +54,7 @@ pub(super) fn churn(share: f64) -> Result<(), Failure> {
         let (available_mb, left_mb) = (available as f64 * 1e-6, LEFT as f64 * 1e-6);
         return Err(format!("no memory was taken: {available_mb:.0} MB are available, and {left_mb:.0} MB are always left").into());
     }
-    say(READY);
+    print::line(READY)?;
     loop {
         for taken in &mut pieces {
             *taken = Vec::new();
@@ -88,7 +87,7 @@ pub(super) fn observe(out: &Path) -> Result<(), Failure> {
     for topic in topics(&run.manifest().window) {
         observers.extend(run.observe_topic(topic.name)?);
     }
-    say(READY);
+    print::line(READY)?;
     while !observers.iter().all(|it| it.has_ended()) {
         let listeners: Vec<_> = observers.iter().map(|it| it.listener()).collect();
         wait_for_any(&signals, &listeners, MAX_WAIT)?;
@@ -99,11 +98,4 @@ pub(super) fn observe(out: &Path) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Prints a line for the process that has started this one. That it has ended is noticed by its
-/// death.
-fn say(line: &str) {
-    let mut output = std::io::stdout();
-    let _ = writeln!(output, "{line}").and_then(|()| output.flush());
 }
