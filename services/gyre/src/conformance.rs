@@ -7,10 +7,10 @@ use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
-use gyre_stage::wake::Signals;
+use gyre_stage::{StageError, wake::Signals};
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
-use gyre_tools::conformance::{Candidate, Demands, InputScans, Interrupted, Report, Test, check};
+use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},
@@ -50,17 +50,13 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")
         .tempdir()?;
-    let dataset = gyre_configuration::open(&configuration)?.dataset;
-    let scans = InputScans {
-        played: configuration.source.played(dataset.scans()),
-        dataset,
-    };
+    // Refuses a radar, which has no scans to test with again and again.
+    gyre_configuration::open(&configuration)?;
     let test = Test {
         candidate: Candidate {
             stage,
             command,
             scheduling: Scheduling::default(),
-            gyre: own().to_string_lossy().into_owned(),
             manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
@@ -80,8 +76,8 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             print::note(format_args!("gyre: testing {what}"));
         }
     };
-    match check(&test, scans, &signals, &mut observe) {
-        Err(error) if error.is::<Interrupted>() => Ok(None),
+    match check(&test, &signals, &mut observe) {
+        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => Ok(None),
         report => report.map(Some),
     }
 }
@@ -108,7 +104,6 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
         stop_timeout: seconds("--stop-timeout-s", arguments.stop_timeout_s)?,
         same_as_own: arguments.same_as_own,
         budget: budget.transpose()?,
-        ..Demands::default()
     })
 }
 

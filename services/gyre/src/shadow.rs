@@ -89,6 +89,5 @@ fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failu
         scans: arguments.scans,
         duration: duration.transpose()?,
         report: arguments.report.clone(),
-        gyre,
     })
 }

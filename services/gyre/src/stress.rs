@@ -49,7 +49,7 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 }
 
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_tools::stress::helper::help(&own(), arguments)?;
+    gyre_tools::stress::helper::help(arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -72,7 +72,6 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let turn = configuration.source.played(played.dataset.scans());
     let odometry = &configuration.odometry;
     let tested = TestedPipeline {
-        program: own(),
         configuration: file,
         out: out.path().to_owned(),
         period,

@@ -16,49 +16,74 @@ mod result;
 mod rule;
 mod session;
 pub mod shadow;
-mod test;
 mod topics;
 
-use std::{io, path::Path};
+use std::{io, path::Path, time::Duration};
 
+use gyre_messages::StageId;
 use gyre_stage::{StageError, wake::Signals};
+use gyre_supervise::{SuperviseError, rig::Rig};
 use gyre_terminal::Failure;
-use thiserror::Error;
 
 pub use harness::Candidate;
 pub use report::{Report, Work};
 pub use result::{Spread, Spreads};
 pub use rule::{Rule, Verdict};
-pub use test::{Demands, InputScans, Prepare, Test};
 
 use checks::Examination;
 use reference::{Context, Reference};
 
-/// The end of a test by a signal.
-#[derive(Debug, Error)]
-#[error("interrupted")]
-pub struct Interrupted;
+/// A program that is to keep the contract of a stage, and its limits.
+pub struct Test {
+    /// The program. Each of its runs writes to a folder below its manifest's `out`.
+    pub candidate: Candidate,
+    pub stages: Vec<StageId>,
+    /// Writes the other files of a run's root, as the list of a recording's files.
+    pub prepare: Box<dyn Fn(&Path) -> io::Result<()>>,
+    pub demands: Demands,
+}
 
-/// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
-/// Breaches of the contract are in the report, not in the error.
+#[derive(Clone, Debug)]
+pub struct Demands {
+    pub start_timeout: Duration,
+    pub item_timeout: Duration,
+    /// Time for its exit after SIGTERM, and after an input that it has to refuse.
+    pub stop_timeout: Duration,
+    /// True if its results must equal the results of Gyre's own stage, to the bit.
+    pub same_as_own: bool,
+    /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
+    /// the maximum.
+    pub budget: Option<Duration>,
+}
+
+impl Test {
+    pub(crate) fn rig<'a>(
+        &self,
+        name: &str,
+        signals: &'a Signals,
+    ) -> Result<Rig<'a>, SuperviseError> {
+        let out = self.candidate.manifest.out.join(name);
+        let rig = self.candidate.rig(out, signals)?;
+        let root = &rig.manifest().root;
+        (self.prepare)(root).map_err(StageError::file(root))?;
+        Ok(rig)
+    }
+}
+
+/// Tests a program; `observe` receives the name of each scenario.
+/// Breaches of the contract are in the report, not in the error. A signal ends the test with
+/// [`StageError::Stopped`].
 pub fn check(
     test: &Test,
-    mut scans: InputScans,
     signals: &Signals,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {
     observe("the inputs, by our own stages");
-    let reference = Reference::compute(test, &mut scans, signals)?;
+    let reference = Reference::compute(test, signals)?;
     let context = Context {
         test,
         reference: &reference,
         signals,
     };
     Examination::new(context, observe).run()
-}
-
-/// Returns a function that names the file of a system error.
-fn at(path: &Path) -> impl FnOnce(io::Error) -> StageError + use<> {
-    let path = path.to_owned();
-    move |source| StageError::File { path, source }
 }

@@ -4,7 +4,6 @@
 //! Each asks the supervisor of a run at its control socket ([`gyre_stage::control`]); nothing of a
 //! run is looked up elsewhere, but its logs.
 
-mod arguments;
 mod background;
 mod choice;
 mod echo;
@@ -13,13 +12,11 @@ mod processes;
 mod programs;
 mod top;
 
-pub use arguments::{
-    LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
-};
+pub(crate) use background::status_of;
 pub use background::{detach_if_asked, down, up};
-pub use choice::chosen;
+pub use choice::{RunChoice, chosen};
 pub use echo::{EchoArguments, echo};
-pub use logs::logs;
-pub use processes::ps;
-pub use programs::{restart, swap};
-pub use top::top;
+pub use logs::{LogsArguments, logs};
+pub use processes::{PsArguments, ps};
+pub use programs::{RestartArguments, SwapArguments, restart, swap};
+pub use top::{TopArguments, top};

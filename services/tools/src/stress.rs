@@ -26,7 +26,6 @@ pub use report::{Provenance, Report};
 
 #[derive(Clone, Debug)]
 pub struct TestedPipeline {
-    pub program: PathBuf,
     /// The resolved configuration, whose source is a recording.
     pub configuration: PathBuf,
     pub out: PathBuf,
@@ -43,10 +42,6 @@ pub struct TestedPipeline {
 }
 
 impl TestedPipeline {
-    pub fn turn_s(&self) -> f64 {
-        self.turn.len() as f64 * self.period.as_secs_f64()
-    }
-
     /// Returns the seconds of the recording that are played in a second at this rate.
     pub fn relative_rate(&self, rate_hz: f64) -> f64 {
         (rate_hz * self.period.as_secs_f64()).clamp(0.001, 1000.0)

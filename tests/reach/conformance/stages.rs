@@ -6,8 +6,8 @@ use std::{env, fs, thread, time::Duration};
 use gyre_messages::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
 };
-use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY};
-use gyre_supervise::rig::{Feed, Recorded, Tap};
+use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY, writer::TopicWriter};
+use gyre_supervise::rig::{Recorded, Tap};
 
 /// The environment variable with the fault of a stage.
 pub const BREACH: &str = "GYRE_TEST_BREACH";
@@ -32,11 +32,15 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
     let silently = breach == "joins silently";
     let is_masking = breach.starts_with("masking ");
     let (input, output) = match is_masking {
-        true => (Scan::TOPIC, Masked::TOPIC),
-        false => (Masked::TOPIC, Rotation::TOPIC),
+        true => (Scan::ENTRY, Masked::ENTRY),
+        false => (Masked::ENTRY, Rotation::ENTRY),
     };
-    let motions = is_masking.then(|| Tap::of(launch, Motion::TOPIC, silently));
-    let motions = motions.transpose()?;
+    let (node, manifest) = (launch.node(), &launch.manifest);
+    let tap = |topic| match silently {
+        true => Tap::silent(topic, node, manifest),
+        false => Tap::to(topic, node, manifest),
+    };
+    let motions = is_masking.then(|| tap(Motion::ENTRY)).transpose()?;
     let mut stage = Broken {
         launch,
         breach,
@@ -44,10 +48,10 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
             true => StageId::Masking,
             false => StageId::RotationSearch,
         },
-        input: Tap::of(launch, input, silently)?,
+        input: tap(input)?,
         motions,
         newest_motion: None,
-        output: Feed::of(launch, output)?,
+        output: TopicWriter::to(output, node, manifest)?,
         next: None,
         waiting: None,
         begun: false,
@@ -65,7 +69,7 @@ struct Broken<'a> {
     input: Tap,
     motions: Option<Tap>,
     newest_motion: Option<u64>,
-    output: Feed,
+    output: TopicWriter,
     next: Option<u64>,
     waiting: Option<Recorded>,
     begun: bool,
@@ -94,7 +98,7 @@ impl Broken<'_> {
     }
 
     fn receive_motion(&mut self) -> Result<bool, StageError> {
-        let motion = self.motions.as_ref().map(|it| it.receive()).transpose()?;
+        let motion = self.motions.as_ref().map(Recorded::receive).transpose()?;
         let Some(motion) = motion.flatten() else {
             return Ok(false);
         };
@@ -144,7 +148,7 @@ impl Broken<'_> {
         if let Some(message) = self.waiting.take() {
             return Ok(Some(message));
         }
-        match self.input.receive() {
+        match Recorded::receive(&self.input) {
             Err(StageError::Malformed { .. }) if self.does("swallows") => Ok(None),
             received => received,
         }
@@ -183,13 +187,13 @@ impl Broken<'_> {
             item.stamp_ns = 0;
         }
         let output = self.output_about(item)?;
-        self.output.send(&output)?;
+        output.send(&self.output)?;
         let copies = match self.breach {
             "sends twice" if item.seq == WRONG => 1,
             "floods" => FLOOD,
             _ => 0,
         };
-        (0..copies).try_for_each(|_| self.output.send(&output))
+        (0..copies).try_for_each(|_| output.send(&self.output))
     }
 
     fn output_about(&self, item: Item) -> Result<Recorded, StageError> {
@@ -227,6 +231,6 @@ impl Broken<'_> {
         if self.does("keeps the end") {
             return Ok(());
         }
-        self.output.send(&self.output_about(*item)?)
+        self.output_about(*item)?.send(&self.output)
     }
 }

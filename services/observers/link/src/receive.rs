@@ -99,7 +99,8 @@ pub fn receive(
     let journal = Journal::open(&journal::path(&manifest.out))?;
     let next_pose = next_pose(&journal, &remote.offer, &options.out)?;
     let guardian = [options.gyre.clone(), "guard".to_owned()];
-    let rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals)?;
+    let mut rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals)?;
+    rig.create_services()?;
     let _log = launch::start_log(rig.manifest(), NAME)?;
     let RemoteRun { session, offer } = remote;
     let mut mirror = Mirror {
@@ -112,6 +113,7 @@ pub fn receive(
         answers: None,
         offer,
         waker: Waker::new()?,
+        signals,
         rig,
     };
     for offered in mirror.offer.topics.clone() {

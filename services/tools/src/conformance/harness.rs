@@ -1,24 +1,23 @@
 //! A program alone in the place of a stage: its process in a run of its own, and this process in
 //! place of the rest of the run.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use gyre_messages::{Item, Pose, PoseHeader, StageId, flag};
-use gyre_stage::{Manifest, StageError, wake::Signals};
+use gyre_stage::{Manifest, StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::{
     Death, Scheduling, SuperviseError,
-    rig::{Feed, Process, Recorded, Rig, Tap},
+    rig::{Process, Recorded, Rig, Tap},
 };
+use gyre_terminal::own;
 
-use crate::conformance::{at, topics::StageTopics};
+use crate::conformance::topics::StageTopics;
 
 #[derive(Clone, Debug)]
 pub struct Candidate {
     pub stage: StageId,
     pub command: Vec<String>,
     pub scheduling: Scheduling,
-    /// The program `gyre`: the guardian, and Gyre's own stages.
-    pub gyre: String,
     /// The manifest of the run, without prefix and root.
     pub manifest: Manifest,
     pub configuration: String,
@@ -29,33 +28,21 @@ impl Candidate {
         StageTopics::of(self.stage, &self.manifest)
     }
 
-    pub(crate) fn own_command(&self, stage: StageId) -> Vec<String> {
-        let words = [&self.gyre, "stage", stage.name()];
-        words.map(str::to_owned).into()
-    }
-
-    /// Creates a run that writes to `out`, with or without its services.
+    /// Creates a run that writes to `out`, without its services.
     pub(crate) fn rig<'a>(
         &self,
         out: PathBuf,
         signals: &'a Signals,
-        has_services: bool,
     ) -> Result<Rig<'a>, SuperviseError> {
         for folder in ["log", "journal"] {
-            let path = out.join(folder);
-            let created = gyre_storage::create_folder(&path);
-            created.map_err(|error| at(&path)(error.source))?;
+            gyre_storage::create_folder(&out.join(folder)).map_err(StageError::from)?;
         }
         let manifest = Manifest {
             out,
             ..self.manifest.clone()
         };
-        let guardian = [&self.gyre, "guard"].map(str::to_owned);
-        let create = match has_services {
-            true => Rig::new,
-            false => Rig::without_services,
-        };
-        create(manifest, &self.configuration, &guardian, signals)
+        let guardian = [own().display().to_string(), "guard".to_owned()];
+        Rig::new(manifest, &self.configuration, &guardian, signals)
     }
 }
 
@@ -64,10 +51,10 @@ pub(crate) struct Harness<'a> {
     // Dropped in this order: process, ports, run.
     process: Option<Process>,
     /// The publishers of the inputs by topic.
-    pub feeds: BTreeMap<&'static str, Feed>,
+    feeds: BTreeMap<&'static str, TopicWriter>,
     pub output: Tap,
     pub rig: Rig<'a>,
-    stage: StageId,
+    candidate: &'a Candidate,
     pub topics: StageTopics,
 }
 
@@ -79,14 +66,16 @@ pub(crate) enum Sent {
 }
 
 impl<'a> Harness<'a> {
-    pub(crate) fn open(rig: Rig<'a>, stage: StageId) -> Result<Self, StageError> {
-        let topics = StageTopics::of(stage, rig.manifest());
+    /// Creates the services of the run, and opens the topics of the stage.
+    pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, StageError> {
+        rig.create_services()?;
+        let topics = StageTopics::of(candidate.stage, rig.manifest());
         let mut harness = Self {
             process: None,
             feeds: BTreeMap::new(),
             output: rig.tap(topics.output)?,
             rig,
-            stage,
+            candidate,
             topics,
         };
         harness.open_feeds()?;
@@ -102,13 +91,16 @@ impl<'a> Harness<'a> {
         Ok(())
     }
 
-    pub(crate) fn start(
-        &mut self,
-        command: &[String],
-        scheduling: &Scheduling,
-    ) -> Result<(), SuperviseError> {
-        self.process = Some(self.rig.start(self.stage.name(), command, scheduling)?);
+    pub(crate) fn start(&mut self, stands_by: bool) -> Result<(), SuperviseError> {
+        let (candidate, name) = (self.candidate, self.candidate.stage.name());
+        let (command, scheduling) = (&candidate.command, &candidate.scheduling);
+        self.process = Some(self.rig.start(name, command, scheduling, stands_by)?);
         Ok(())
+    }
+
+    /// Lets a process that stands by begin.
+    pub(crate) fn end_input(&mut self) {
+        self.process.iter_mut().for_each(Process::end_input);
     }
 
     /// Answers the subscribe handshakes of the process; returns the topics that it has notified.
@@ -124,21 +116,23 @@ impl<'a> Harness<'a> {
 
     /// Connects to all subscribers, whether they have notified or not.
     pub(crate) fn connect(&self) -> Result<(), StageError> {
-        self.feeds.values().try_for_each(|feed| feed.connect())
+        self.feeds
+            .values()
+            .try_for_each(TopicWriter::accept_readers)
     }
 
     pub(crate) fn has_publisher(&self) -> bool {
-        self.rig.has_publisher(self.stage)
+        self.rig.has_publisher(self.candidate.stage)
     }
 
     pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
         let feed = self.feeds.get(topic);
-        feed.map_or(Ok(()), |feed| feed.send(message))
+        feed.map_or(Ok(()), |feed| message.send(feed))
     }
 
     /// Receives the next message of the process; `None` if there is no message yet.
     pub(crate) fn receive(&self) -> Result<Option<Sent>, StageError> {
-        match self.output.receive() {
+        match Recorded::receive(&self.output) {
             Ok(message) => Ok(message.map(Sent::Message)),
             Err(StageError::Malformed { seq, reason, .. }) => Ok(Some(Sent::Malformed {
                 seq,
@@ -146,12 +140,6 @@ impl<'a> Harness<'a> {
             })),
             Err(error) => Err(error),
         }
-    }
-
-    /// Sleeps until the process has sent something or `limit` has passed; true on a request to
-    /// stop.
-    pub(crate) fn sleep(&self, limit: Duration) -> Result<bool, StageError> {
-        self.rig.sleep(&[&self.output], limit)
     }
 
     /// Returns the end of the process; `None` while it runs or before it is started.

@@ -1,28 +1,18 @@
 //! The inputs: the results of Gyre's own stages for the scans. The stages run as in a pipeline,
-//! between a source and a sink that are part of this process and lose nothing.
+//! before a sink that is part of this process and loses nothing.
 
 use std::{
     collections::BTreeMap,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{
-    Hop, Item, Message, Motion, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, compose, flag,
-};
-use gyre_radar::continues;
-use gyre_stage::{StageError, clock, wake::Signals};
-use gyre_supervise::{
-    Scheduling,
-    rig::{Feed, Process, Recorded, Rig, Tap},
-};
-use gyre_terminal::Failure;
+use gyre_messages::{Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag};
+use gyre_run::StageConfig;
+use gyre_stage::{StageError, wake::Signals, writer::TopicWriter};
+use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
+use gyre_terminal::{Failure, own};
 
-use crate::conformance::{
-    Interrupted,
-    harness::start_of_trajectory,
-    test::{InputScans, Test},
-    topics::StageTopics,
-};
+use crate::conformance::{Test, harness::start_of_trajectory, topics::StageTopics};
 
 /// Time between two polls of what does not wake the tester.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);
@@ -46,18 +36,21 @@ impl Reference {
         self.topic(Pose::TOPIC).len().saturating_sub(1) as u64
     }
 
-    pub(crate) fn compute(
-        test: &Test,
-        scans: &mut InputScans,
-        signals: &Signals,
-    ) -> Result<Self, Failure> {
-        let scans = read(scans)?;
-        if scans.len() < 3 {
-            let scans = scans.len().saturating_sub(1);
+    pub(crate) fn compute(test: &Test, signals: &Signals) -> Result<Self, Failure> {
+        let mut rig = test.rig("own", signals)?;
+        rig.create_services()?;
+        let mut reference = OwnPipeline::begin(test, &rig)?.run()?;
+        let scans = reference.end();
+        if scans < 2 {
             return Err(format!("{scans} scans are too few to test a stage with: name a recording of more, or raise --scans").into());
         }
-        let rig = test.rig("own", signals, true)?;
-        OwnPipeline::begin(test, &rig, scans)?.run()
+        for message in reference.0.values_mut().flatten() {
+            // Any but 0, which a stage may write that does not copy it.
+            let generation = 1;
+            let item = message.item();
+            *message = message.about(&Item { generation, ..item });
+        }
+        Ok(reference)
     }
 
     fn push(&mut self, topic: &'static str, message: Recorded) {
@@ -72,107 +65,56 @@ pub(crate) struct Context<'a> {
     pub signals: &'a Signals,
 }
 
-/// Reads the scans, as the source does; the end of the stream follows.
-fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, Failure> {
-    let mut read: Vec<Recorded> = Vec::new();
-    let mut bytes = vec![0; scans.dataset.limits().bytes];
-    let mut before: Option<Item> = None;
-    for index in scans.played.clone() {
-        let mut header = ScanHeader::default();
-        let Ok(geometry) = scans.dataset.read(index, header.slot(&mut bytes)) else {
-            continue;
-        };
-        header.set_geometry(&geometry);
-        let follows = before.filter(|it| continues(it.stamp_ns, header.item.stamp_ns));
-        let seq = read.len() as u64;
-        header.item = Item {
-            seq,
-            scan: index as u64,
-            previous_scan: follows.map_or(index as u64, |before| before.scan),
-            published: seq,
-            flags: if follows.is_none() { flag::BREAK } else { 0 },
-            ..header.item
-        };
-        before = Some(header.item);
-        read.push(Recorded::of::<Scan>(&header, &bytes, 0));
-    }
-    let end = ScanHeader {
-        item: Item {
-            seq: read.len() as u64,
-            published: read.len() as u64,
-            flags: flag::END,
-            ..Item::default()
-        },
-        ..ScanHeader::default()
-    };
-    read.push(Recorded::of::<Scan>(&end, &[], 0));
-    Ok(read)
-}
-
 struct OwnPipeline<'a> {
     // Dropped in this order: processes, ports, run.
     processes: Vec<(StageId, Process)>,
-    scans: Feed,
-    poses: Feed,
+    poses: TopicWriter,
     taps: Vec<(&'static str, Tap)>,
     rig: &'a Rig<'a>,
     /// Time without progress after which it has failed.
     stall_timeout: Duration,
     reference: Reference,
-    last_pose: Option<PoseHeader>,
-    /// The topic of the motions that poses are composed of.
-    motions: &'static str,
-    unsent: std::iter::Peekable<std::vec::IntoIter<Recorded>>,
 }
 
 impl<'a> OwnPipeline<'a> {
-    fn begin(test: &Test, rig: &'a Rig<'a>, scans: Vec<Recorded>) -> Result<Self, Failure> {
+    fn begin(test: &Test, rig: &'a Rig<'a>) -> Result<Self, Failure> {
         let manifest = rig.manifest();
         let mut stages = test.stages.clone();
-        stages.retain(|it| !matches!(it, StageId::RadarReplay | StageId::PoseIntegration));
+        stages.retain(|it| *it != StageId::PoseIntegration);
         let mut taps = Vec::new();
         for stage in &stages {
             let topic = StageTopics::of(*stage, manifest).output;
             taps.push((topic, rig.tap(topic)?));
         }
-        let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
-        poses.send(&start_of_trajectory())?;
-        let mut processes = Vec::new();
+        let poses = rig.feed(Pose::TOPIC)?;
+        start_of_trajectory().send(&poses)?;
+        let (gyre, mut processes) = (own().display().to_string(), Vec::new());
         for stage in stages {
-            let command = test.candidate.own_command(stage);
-            let process = rig.start(stage.name(), &command, &Scheduling::default())?;
+            let command = StageConfig::own_command(&gyre, stage.name(), None);
+            let scheduling = &test.candidate.scheduling;
+            let process = rig.start(stage.name(), &command, scheduling, false)?;
             processes.push((stage, process));
         }
         Ok(Self {
             processes,
-            scans: scan_feed,
             poses,
             taps,
             rig,
             stall_timeout: test.demands.start_timeout,
             reference: Reference::default(),
-            last_pose: None,
-            motions: match manifest.refines {
-                true => Refined::TOPIC,
-                false => Motion::TOPIC,
-            },
-            unsent: scans.into_iter().peekable(),
         })
     }
 
     fn run(mut self) -> Result<Reference, Failure> {
         let mut progress = Instant::now();
         while !self.has_ended() {
-            self.scans.answer_handshakes()?;
             self.poses.answer_handshakes()?;
-            if self.receive()? | self.integrate()? | self.admit()? {
+            if self.receive()? | self.integrate()? {
                 progress = Instant::now();
             } else {
                 self.require_living(progress.elapsed())?;
                 let taps: Vec<&Tap> = self.taps.iter().map(|(_, tap)| tap).collect();
-                if self.rig.sleep(&taps, POLL_PERIOD)? {
-                    return Err(Interrupted.into());
-                }
+                self.rig.sleep(&taps, POLL_PERIOD)?;
             }
         }
         Ok(self.reference)
@@ -189,7 +131,7 @@ impl<'a> OwnPipeline<'a> {
     fn receive(&mut self) -> Result<bool, StageError> {
         let mut any = false;
         for (topic, tap) in &self.taps {
-            while let Some(message) = tap.receive()? {
+            while let Some(message) = Recorded::receive(tap)? {
                 self.reference.push(topic, message);
                 any = true;
             }
@@ -199,12 +141,15 @@ impl<'a> OwnPipeline<'a> {
 
     /// Publishes the pose of an item that all stages have answered; returns whether there was one.
     fn integrate(&mut self) -> Result<bool, StageError> {
-        let next = self.reference.topic(Pose::TOPIC).len() as u64;
-        let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
-        if !self.taps.iter().all(is_done) {
+        let poses = self.reference.topic(Pose::TOPIC);
+        let next = poses.len() as u64;
+        let answers = self.taps.iter();
+        let answers = answers.map(|(topic, _)| self.reference.get(topic, next));
+        let Some(answers) = answers.collect::<Option<Vec<_>>>() else {
             return Ok(false);
-        }
-        let Some(motion) = self.reference.get(self.motions, next) else {
+        };
+        // Poses are composed of the motions of the last stage.
+        let Some(motion) = answers.last() else {
             return Ok(false);
         };
         let motion = motion.header::<Motion>()?;
@@ -212,62 +157,25 @@ impl<'a> OwnPipeline<'a> {
             item: motion.item,
             ..PoseHeader::default()
         };
-        let is_end = motion.item.is(flag::END);
-        if !is_end {
-            pose = compose(self.last_pose.as_ref(), &motion);
+        if !motion.item.is(flag::END) {
+            let last = poses.last().map(Recorded::header::<Pose>).transpose()?;
+            pose = compose(last.as_ref(), &motion);
             pose.item.flags |= flag::SYNC;
         }
-        self.last_pose = (!is_end).then_some(pose);
         let pose = Recorded::of::<Pose>(&pose, &[], 0);
-        self.poses.send(&pose)?;
+        pose.send(&self.poses)?;
         self.reference.push(Pose::TOPIC, pose);
         Ok(true)
     }
 
-    /// Publishes the scans that the window admits; returns whether there was one.
-    fn admit(&mut self) -> Result<bool, StageError> {
-        let newest = (self.reference.topic(Pose::TOPIC).len() as u64).checked_sub(1);
-        let window = self.rig.manifest().window;
-        let mut any = false;
-        while let Some(scan) = self
-            .unsent
-            .next_if(|it| window.admits(it.item().seq, newest))
-        {
-            let now_ns = clock::now_ns();
-            let mut item = scan.item();
-            // Any but 0, which a stage may write that does not copy it.
-            (item.due_ns, item.generation) = (now_ns, 1);
-            *item.hop_mut(StageId::RadarReplay) = Hop {
-                received_ns: now_ns,
-                started_ns: now_ns,
-                finished_ns: now_ns,
-                published_ns: now_ns,
-            };
-            let scan = scan.about(&item);
-            self.scans.send(&scan)?;
-            self.reference.push(Scan::TOPIC, scan);
-            any = true;
-        }
-        Ok(any)
-    }
-
     fn require_living(&mut self, idle: Duration) -> Result<(), Failure> {
-        for (stage, process) in &mut self.processes {
-            if let Some(death) = process.death() {
-                let reason = death.last_output.unwrap_or(death.cause);
-                return Err(own_ended(stage.name(), &reason));
-            }
-        }
-        match idle < self.stall_timeout {
-            true => Ok(()),
-            false => Err(own_ended(
-                "pipeline",
-                &format!("it made no progress for {idle:.0?}"),
-            )),
-        }
+        let processes = self.processes.iter_mut();
+        let mut dead = processes.filter_map(|(stage, it)| Some((stage.name(), it.death()?)));
+        let (name, reason) = match dead.next() {
+            Some((stage, death)) => (stage, death.last_output.unwrap_or(death.cause)),
+            None if idle < self.stall_timeout => return Ok(()),
+            None => ("pipeline", format!("it made no progress for {idle:.0?}")),
+        };
+        Err(format!("cannot compute the inputs: our own {name} ended: {reason}").into())
     }
-}
-
-fn own_ended(stage: &str, reason: &str) -> Failure {
-    format!("cannot compute the inputs: our own {stage} ended: {reason}").into()
 }

@@ -29,7 +29,7 @@ pub(crate) fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, S
     match topic {
         Scan::TOPIC => scan(&message),
         Masked::TOPIC => masked(&message),
-        _ => Ok(message.header_bytes().to_vec()),
+        _ => Ok(message.header),
     }
 }
 
@@ -46,13 +46,13 @@ fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
     }
     // Where in the payload the rows are is no result.
     (header.first_byte, header.stride) = (0, 0);
-    Ok([message.with::<Scan>(&header).header_bytes(), &rows].concat())
+    Ok([message.with::<Scan>(&header).header, rows].concat())
 }
 
 fn masked(message: &Recorded) -> Result<Vec<u8>, StageError> {
     let header = message.header::<Masked>()?;
     let values = floats(&message.payload);
-    let mut bytes = message.header_bytes().to_vec();
+    let mut bytes = message.header.clone();
     for raster in rasters(&header, &values) {
         bytes.extend_from_slice(cast_slice(&raster));
     }

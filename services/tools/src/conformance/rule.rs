@@ -19,20 +19,10 @@ macro_rules! rules {
         }
 
         impl Rule {
-            pub const ALL: [Self; [$($says,)+].len()] = [$(Self::$rule,)+];
-
-            pub fn says(self) -> &'static str {
-                match self {
-                    $(Self::$rule => $says,)+
-                }
-            }
-
-            /// Returns the section of `docs/replace-a-stage.md`, or the option, that demands it.
-            pub fn section(self) -> &'static str {
-                match self {
-                    $(Self::$rule => $section,)+
-                }
-            }
+            /// All rules, each with the section of `docs/replace-a-stage.md` or the option that
+            /// demands it, and the conduct of a program that keeps it.
+            const ALL: [(Self, &'static str, &'static str); [$($says,)+].len()] =
+                [$((Self::$rule, $section, $says),)+];
         }
     };
 }
@@ -123,10 +113,10 @@ impl Findings {
     }
 
     pub(crate) fn judged(mut self) -> Vec<Judged> {
-        let of = |rule: Rule| Judged {
+        let of = |(rule, section, says)| Judged {
             rule,
-            section: rule.section(),
-            says: rule.says(),
+            section,
+            says,
             verdict: self.verdicts.remove(&rule).unwrap_or(Verdict::NotReached),
         };
         Rule::ALL.map(of).into()

@@ -11,18 +11,20 @@ use std::{
 
 use gyre_messages::{Item, Message, Pose, StageId, flag};
 use gyre_stage::StageError;
-use gyre_supervise::{Death, Scheduling, SuperviseError, rig::Recorded};
+use gyre_supervise::{Death, SuperviseError, rig::Recorded};
 use gyre_terminal::Failure;
 
 use crate::conformance::{
-    Interrupted,
+    Demands, Test,
     harness::{Harness, Sent, start_of_trajectory},
     item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
     result::result_bytes,
     rule::{Findings, Rule},
-    test::{Demands, Test},
 };
+
+/// The time of watching a program that must send nothing.
+const QUIET: Duration = Duration::from_millis(300);
 
 /// The number of items under way at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +55,6 @@ pub(crate) struct Session<'a> {
     /// The time of the first sending of each item: an item that a sink has journalled in one life
     /// and sends in the next keeps its stamps.
     sent_ns: BTreeMap<u64, i64>,
-    progress: Instant,
 }
 
 #[derive(Clone, Debug)]
@@ -89,8 +90,8 @@ impl<'a> Session<'a> {
         findings: &'a mut Findings,
     ) -> Result<Self, Failure> {
         let (test, reference) = (context.test, context.reference);
-        let rig = test.rig(name, context.signals, true)?;
-        let harness = Harness::open(rig, test.candidate.stage)?;
+        let rig = test.rig(name, context.signals)?;
+        let harness = Harness::open(rig, &test.candidate)?;
         harness.feed(Pose::TOPIC, &start_of_trajectory())?;
         Ok(Self {
             harness,
@@ -105,7 +106,6 @@ impl<'a> Session<'a> {
             outputs: Vec::new(),
             notified: BTreeSet::new(),
             sent_ns: BTreeMap::new(),
-            progress: Instant::now(),
         })
     }
 
@@ -121,17 +121,10 @@ impl<'a> Session<'a> {
         self.harness.topics.output
     }
 
-    /// Starts the process and waits until it has opened the topic that it publishes.
-    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, Failure> {
-        self.spawn(command)?;
-        let limit = self.demands().start_timeout;
-        self.wait(limit, |session| session.harness.has_publisher())
-    }
-
-    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), SuperviseError> {
+    pub(crate) fn spawn(&mut self, stands_by: bool) -> Result<(), SuperviseError> {
         self.last = None;
         self.notified.clear();
-        self.harness.start(command, &Scheduling::default())
+        self.harness.start(stands_by)
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.
@@ -147,10 +140,12 @@ impl<'a> Session<'a> {
         limit: Duration,
         done: impl Fn(&Self) -> bool,
     ) -> Result<Waited, Failure> {
-        self.progress = Instant::now();
+        let mut progress = Instant::now();
         loop {
             self.notified.extend(self.harness.answer_handshakes()?);
-            self.receive()?;
+            if self.receive()? {
+                progress = Instant::now();
+            }
             self.admit()?;
             if done(self) {
                 return Ok(Waited::Done);
@@ -162,23 +157,26 @@ impl<'a> Session<'a> {
                     false => Waited::Died(death),
                 });
             }
-            if self.progress.elapsed() > limit {
+            if progress.elapsed() > limit {
                 return Ok(Waited::TimedOut);
             }
-            if self.harness.sleep(POLL_PERIOD)? {
-                return Err(Interrupted.into());
-            }
+            self.harness
+                .rig
+                .sleep(&[&self.harness.output], POLL_PERIOD)?;
         }
     }
 
-    /// Waits for a time while the run continues around the process; returns whether the process is
-    /// still alive.
-    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, Failure> {
-        Ok(self.ended_within(time)?.is_none())
+    /// Waits while the run continues around a process that must send nothing; returns whether the
+    /// process is still alive.
+    pub(crate) fn rest(&mut self) -> Result<bool, Failure> {
+        Ok(self.ended_within(QUIET)?.is_none())
     }
 
-    fn receive(&mut self) -> Result<(), StageError> {
+    /// Takes what the process has sent; returns whether there was anything.
+    fn receive(&mut self) -> Result<bool, StageError> {
+        let mut any = false;
         while let Some(sent) = self.harness.receive()? {
+            any = true;
             match sent {
                 Sent::Message(output) => {
                     self.findings.checked(Rule::SendsValid);
@@ -197,9 +195,8 @@ impl<'a> Session<'a> {
                     self.answered(seq)?;
                 }
             }
-            self.progress = Instant::now();
         }
-        Ok(())
+        Ok(any)
     }
 
     fn examine(&mut self, item: &Item, read_ns: i64) {
@@ -248,13 +245,6 @@ impl<'a> Session<'a> {
         Ok(self.harness.rig.remove_dead()?)
     }
 
-    /// Sends SIGTERM; returns how the process ended, `None` if it did not in time.
-    pub(crate) fn stop(&mut self) -> Result<Option<Death>, Failure> {
-        self.harness.terminate();
-        self.pace = Pace::Hold;
-        self.ended_within(self.demands().stop_timeout)
-    }
-
     /// Waits for the end of the process; `None` if it does not end in time.
     pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, Failure> {
         let since = Instant::now();
@@ -266,27 +256,24 @@ impl<'a> Session<'a> {
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
     pub(crate) fn not_notified(&self) -> Vec<&'static str> {
-        let subscribed = self
-            .harness
-            .feeds
-            .iter()
-            .filter(|(_, it)| it.subscribers() > 0);
-        let topics = subscribed.map(|(topic, _)| *topic);
-        topics
-            .filter(|topic| !self.notified.contains(topic))
+        let inputs = self.harness.topics.inputs();
+        inputs
+            .filter(|it| self.is_read(it) && !self.notified.contains(it))
             .collect()
     }
 
     pub(crate) fn has_joined(&self) -> bool {
-        let mut feeds = self.harness.feeds.values();
-        feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
+        let mut inputs = self.harness.topics.inputs();
+        inputs.any(|it| self.is_read(it)) || self.harness.has_publisher()
     }
 
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
-        let feeds = &self.harness.feeds;
-        let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
         let inputs = self.harness.topics.forward.iter().copied();
-        inputs.filter(is_unread).collect()
+        inputs.filter(|it| !self.is_read(it)).collect()
+    }
+
+    fn is_read(&self, topic: &str) -> bool {
+        self.harness.rig.subscribers(topic) > 0
     }
 
     pub(crate) fn about(&self, seq: u64) -> impl Iterator<Item = &Recorded> {
@@ -303,15 +290,6 @@ impl<'a> Session<'a> {
     pub(crate) fn answer_ns(&self, seq: u64) -> Option<i64> {
         let (sent_ns, answer) = (self.sent_ns.get(&seq)?, self.about(seq).next()?);
         Some(answer.received_ns.saturating_sub(*sent_ns))
-    }
-
-    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, StageError> {
-        let mut results = BTreeMap::new();
-        for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
-            let bytes = result_bytes(self.output_topic(), output)?;
-            results.entry(output.item().seq).or_insert(bytes);
-        }
-        Ok(results)
     }
 
     /// Notes each output from a place on whose bytes differ from the first scenario.

@@ -19,7 +19,7 @@ use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
 use gyre_supervise::Scheduling;
 use gyre_terminal::Failure;
 
-use crate::conformance::{Candidate, at};
+use crate::conformance::Candidate;
 
 pub use record::Counts;
 pub use report::{Beside, Report, Verdict};
@@ -32,8 +32,6 @@ use shadowing::Shadowing;
 pub struct Options {
     pub stage: StageId,
     pub command: Vec<String>,
-    /// The program of the guardian, which ends the shadow if this process is killed.
-    pub gyre: String,
     pub scheduling: Scheduling,
     /// Time for it to open its topics.
     pub start_timeout: Duration,
@@ -66,18 +64,17 @@ pub fn shadow(
     let signals = Signals::install()?;
     let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
     if let Some(folder) = &options.report {
-        let created = gyre_storage::create_folder(folder);
-        created.map_err(|error| at(folder)(error.source))?;
+        gyre_storage::create_folder(folder).map_err(StageError::from)?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
-    let folder = folder.map_err(at(&std::env::temp_dir()))?;
+    let folder = folder.map_err(StageError::file(&std::env::temp_dir()))?;
     let program = ShadowProgram {
         candidate: candidate(run, options)?,
         folder: folder.path().to_owned(),
         output: in_report("shadow.txt"),
     };
     if let Some(path) = &program.output {
-        fs::write(path, "").map_err(at(path))?;
+        fs::write(path, "").map_err(StageError::file(path))?;
     }
     let topic = program.candidate.topics().output;
     let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
@@ -87,7 +84,7 @@ pub fn shadow(
     if let Some(path) = in_report("shadow.json") {
         let text = serde_json::to_string_pretty(&report);
         let text = text.map_err(|error| format!("cannot write shadow.json: {error}"))?;
-        fs::write(&path, text).map_err(at(&path))?;
+        fs::write(&path, text).map_err(StageError::file(&path))?;
     }
     Ok(report)
 }
@@ -101,7 +98,6 @@ fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageErr
         stage: options.stage,
         command: options.command.clone(),
         scheduling: options.scheduling.clone(),
-        gyre: options.gyre.clone(),
         manifest: Manifest {
             live: false,
             window: Window {
@@ -111,6 +107,7 @@ fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageErr
             },
             ..manifest.clone()
         },
-        configuration: fs::read_to_string(&configuration).map_err(at(&configuration))?,
+        configuration: fs::read_to_string(&configuration)
+            .map_err(StageError::file(&configuration))?,
     })
 }

@@ -1,6 +1,6 @@
 //! The topics of each stage.
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window};
+use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
 use gyre_stage::Manifest;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,11 +56,5 @@ impl StageTopics {
     /// Returns the topic whose items the stage copies; `None` for a source.
     pub(crate) fn copied(&self) -> Option<&'static str> {
         self.forward.last().copied()
-    }
-
-    /// Returns the number of messages that the stage keeps for late readers.
-    pub(crate) fn history(&self, window: &Window) -> usize {
-        let sizes = gyre_messages::topic(self.output).map(|topic| (topic.sizes)(window));
-        sizes.unwrap_or_else(|| Pose::sizes(window)).history
     }
 }

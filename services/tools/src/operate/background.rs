@@ -20,7 +20,7 @@ use gyre_supervise::last_line;
 use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::operate::{arguments::RunChoice, choice::chosen_to_change};
+use crate::operate::choice::{RunChoice, chosen_to_change};
 
 /// The environment variable of a run that is to leave the terminal that started it.
 const DETACHED: &str = "GYRE_DETACHED";
@@ -90,7 +90,7 @@ fn start(output: &File) -> std::io::Result<Child> {
 
 /// Returns the status of the run that this process supervises, when all its stages are there, or
 /// it waits for its radar.
-fn status_of(out: &Path, pid: u32) -> Option<Status> {
+pub fn status_of(out: &Path, pid: u32) -> Option<Status> {
     let status = Control::of(out).ok()?.status().ok()?;
     let is_up = status.phase != Phase::Starting || status.notice.is_some();
     (status.pid == pid && is_up).then_some(status)

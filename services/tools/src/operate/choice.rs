@@ -2,10 +2,18 @@
 
 use std::{env, path::PathBuf};
 
+use clap::Args;
 use gyre_stage::control::Control;
 use gyre_terminal::{Failure, print};
 
-use crate::operate::arguments::RunChoice;
+/// The run that a command is about.
+#[derive(Debug, Args)]
+pub struct RunChoice {
+    /// The run: the folder of its results. Default: the only run there is; a command that changes a
+    /// run takes only one that was started from the current folder.
+    #[arg(value_name = "RUN")]
+    pub run: Option<PathBuf>,
+}
 
 impl RunChoice {
     pub fn folder(&self) -> Result<PathBuf, Failure> {

@@ -10,8 +10,8 @@ use std::{
 use clap::Args;
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
-    Correction, Fix, FixHeader, Loop, Masked, Message, Motion, MotionEstimate, MotionHeader,
-    Objects, ObjectsHeader, Pose, Refined, Rotation, Scan, fix_status,
+    Correction, Fix, Loop, Masked, Message, Motion, MotionEstimate, MotionHeader, Objects, Pose,
+    Refined, Rotation, Scan, fix_status,
 };
 use gyre_stage::{
     observer::{Next, ObservedRun},
@@ -19,7 +19,7 @@ use gyre_stage::{
 };
 use gyre_terminal::Failure;
 
-use crate::operate::arguments::RunChoice;
+use crate::operate::choice::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct EchoArguments {
@@ -35,21 +35,15 @@ const TOPICS: [(&str, Echo); 10] = [
     (Scan::TOPIC, |out| observe::<Scan>(out, scan)),
     (Masked::TOPIC, |out| observe::<Masked>(out, masked)),
     (Rotation::TOPIC, |out| observe::<Rotation>(out, rotation)),
-    (Motion::TOPIC, |out| {
-        observe::<Motion>(out, |it| motion(it.header()))
-    }),
-    (Refined::TOPIC, |out| {
-        observe::<Refined>(out, |it| motion(it.header()))
-    }),
+    (Motion::TOPIC, |out| observe::<Motion>(out, motion)),
+    (Refined::TOPIC, |out| observe::<Refined>(out, motion)),
     (Pose::TOPIC, |out| observe::<Pose>(out, pose)),
     (Loop::TOPIC, |out| observe::<Loop>(out, closed)),
     (Correction::TOPIC, |out| {
         observe::<Correction>(out, correction)
     }),
-    (Fix::TOPIC, |out| observe::<Fix>(out, |it| fix(it.header()))),
-    (Objects::TOPIC, |out| {
-        observe::<Objects>(out, |it| objects(it.header()))
-    }),
+    (Fix::TOPIC, |out| observe::<Fix>(out, fix)),
+    (Objects::TOPIC, |out| observe::<Objects>(out, objects)),
 ];
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
@@ -140,8 +134,8 @@ fn rotation(message: &Received<Rotation>) -> String {
     format!("yaw {yaw_deg:.3} deg, score {score:.3}")
 }
 
-fn motion(header: &MotionHeader) -> String {
-    let motion = &header.motion;
+fn motion<M: Message<Header = MotionHeader>>(message: &Received<M>) -> String {
+    let motion = &message.header().motion;
     let place = place(motion.x_m, motion.y_m, motion.yaw_rad);
     let standing = standing(motion);
     format!("{place}, score {:.3}{standing}", motion.score)
@@ -174,7 +168,8 @@ fn correction(message: &Received<Correction>) -> String {
     format!("{place}, {keyframes} keyframes, {loops} loops")
 }
 
-fn fix(header: &FixHeader) -> String {
+fn fix(message: &Received<Fix>) -> String {
+    let header = message.header();
     let Some(pose) = header.pose() else {
         return "lost".to_owned();
     };
@@ -186,7 +181,8 @@ fn fix(header: &FixHeader) -> String {
     }
 }
 
-fn objects(header: &ObjectsHeader) -> String {
+fn objects(message: &Received<Objects>) -> String {
+    let header = message.header();
     let mut text = format!("{} objects, {} move", header.objects, header.moving);
     for object in header.list().iter().filter(|object| object.is_moving()) {
         let place = place(object.x_m, object.y_m, object.yaw_rad);

@@ -1,20 +1,30 @@
 //! `gyre logs`: the events of a run's processes and their printed lines, as lines for a person.
 
-use std::{
-    fs::File,
-    io::{self, BufRead, BufReader, Seek, SeekFrom},
-    os::unix::fs::MetadataExt,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    time::Duration,
-};
+use std::{path::Path, process::ExitCode, time::Duration};
 
+use clap::Args;
 use gyre_configuration::process_names;
+use gyre_recording::LogTail;
 use gyre_stage::{control::Control, wake::Signals};
 use gyre_terminal::{Failure, print};
 use serde_json::Value;
 
-use crate::operate::arguments::LogsArguments;
+use crate::operate::choice::RunChoice;
+
+#[derive(Debug, Args)]
+pub struct LogsArguments {
+    /// The process, as masking. Default: all.
+    pub process: Option<String>,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Continue with new lines, until the run ends.
+    #[arg(short, long)]
+    pub follow: bool,
+    /// Number of lines to begin with, of each log.
+    #[arg(short = 'n', long, default_value_t = 50)]
+    pub lines: usize,
+}
 
 const PERIOD: Duration = Duration::from_millis(200);
 
@@ -72,54 +82,37 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
         return Err(format!("there is no process `{process}`; there are {names}").into());
     }
     names.retain(|name| process.is_none_or(|process| process == *name));
-    let log = |path, printed_by: Option<&str>| Log {
-        path,
+    let log = |path: &Path, printed_by: Option<&str>| Log {
+        tail: LogTail::whole(path),
         printed_by: printed_by.map(str::to_owned),
         process: process.map(str::to_owned),
-        position: None,
     };
     let path = |name: &str| out.join("log").join(format!("{name}.txt"));
-    let printed = names.iter().map(|name| log(path(name), Some(*name)));
-    let printed = printed.filter(|log| log.path.exists());
-    Ok(printed.chain([log(events, None)]).collect())
+    let printed = names.iter().map(|name| (path(name), Some(*name)));
+    let printed = printed.filter(|(path, _)| path.exists());
+    let all = printed.chain([(events, None)]);
+    Ok(all.map(|(path, name)| log(&path, name)).collect())
 }
 
 struct Log {
-    path: PathBuf,
+    tail: LogTail,
     /// The process that has printed it; `None`: it is `log.jsonl`.
     printed_by: Option<String>,
     /// The process whose events are printed; `None`: all.
     process: Option<String>,
-    /// The file that was read last, by its inode, and how far.
-    position: Option<(u64, u64)>,
 }
 
 impl Log {
-    /// Returns the complete lines since the last call. A log that cannot be read has none: it may
-    /// come later.
+    /// Returns the complete lines since the last call.
     fn lines(&mut self) -> Vec<String> {
-        self.read().unwrap_or_default()
-    }
-
-    fn read(&mut self) -> io::Result<Vec<String>> {
-        let mut file = File::open(&self.path)?;
-        let (inode, length) = (file.metadata()?.ino(), file.metadata()?.len());
-        // A log that has become too long is emptied.
-        let begin = self.position.filter(|(i, at)| *i == inode && *at <= length);
-        let mut position = begin.map_or(0, |(_, at)| at);
-        file.seek(SeekFrom::Start(position))?;
-        let (mut reader, mut bytes, mut lines) = (BufReader::new(file), Vec::new(), Vec::new());
-        while reader.read_until(b'\n', &mut bytes)? > 0 {
-            // The rest of the last line is not written yet.
-            if bytes.last() != Some(&b'\n') {
-                break;
+        let mut lines = Vec::new();
+        loop {
+            let appended = self.tail.texts();
+            if appended.is_empty() {
+                return lines;
             }
-            position += bytes.len() as u64;
-            lines.extend(self.line(&String::from_utf8_lossy(&bytes)));
-            bytes.clear();
+            lines.extend(appended.iter().filter_map(|line| self.line(line)));
         }
-        self.position = Some((inode, position));
-        Ok(lines)
     }
 
     /// Returns a line for a person; `None` if it is of another process.
@@ -165,10 +158,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("masking.txt");
         let mut log = Log {
-            path: path.clone(),
+            tail: LogTail::whole(&path),
             printed_by: Some("masking".to_owned()),
             process: None,
-            position: None,
         };
         assert!(log.lines().is_empty(), "it is not there yet");
         let mut file = OpenOptions::new()

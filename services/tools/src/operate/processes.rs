@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use clap::Args;
 use gyre_stage::{
     StageError,
     control::{Activity, Control, Phase, ProcessStatus, Status},
@@ -10,7 +11,21 @@ use gyre_stage::{
 use gyre_supervise::UsedRun;
 use gyre_terminal::{Failure, print};
 
-use crate::operate::arguments::PsArguments;
+use crate::operate::choice::RunChoice;
+
+#[derive(Debug, Args)]
+pub struct PsArguments {
+    /// The run to list. Default: all runs of this user.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Fail unless a run is running, and all processes of each run work as they should: for health
+    /// checks.
+    #[arg(long)]
+    pub check: bool,
+}
 
 const NO_RUN: &str = "no run is running";
 

@@ -1,16 +1,43 @@
 //! `gyre restart` and `gyre swap`: replace processes of a running run.
 
-use std::{env, process::ExitCode};
+use std::{env, path::PathBuf, process::ExitCode};
 
+use clap::Args;
 use gyre_run::StageConfig;
 use gyre_stage::control::{PendingSwap, Swap};
 use gyre_supervise::Program;
 use gyre_terminal::{Failure, print, words};
 
-use crate::operate::{
-    arguments::{RestartArguments, SwapArguments},
-    choice::chosen_to_change,
-};
+use crate::operate::choice::{RunChoice, chosen_to_change};
+
+#[derive(Debug, Args)]
+pub struct RestartArguments {
+    /// The process, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+}
+
+#[derive(Debug, Args)]
+pub struct SwapArguments {
+    /// The process whose place is taken, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The program that takes over and its arguments, as in 'python3 stage.py --fast'; no shell is
+    /// involved. Default: the one that the run was begun with.
+    #[arg(long, value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
+    /// End the program before first. For a program that cannot stand by; scans wait for it
+    /// meanwhile, or are dropped in live mode.
+    #[arg(long)]
+    pub cold: bool,
+}
 
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     let run = chosen_to_change(&arguments.run)?;

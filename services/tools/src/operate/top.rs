@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use clap::Args;
 use gyre_stage::{
     observer::{ObservedRun, Observer},
     wake::Signals,
@@ -19,8 +20,21 @@ use ratatui::{
     crossterm::event::{self, Event, KeyCode, KeyModifiers},
 };
 
-use crate::operate::{arguments::TopArguments, choice::chosen};
+use crate::operate::choice::{RunChoice, chosen};
 use snapshot::{Snapshot, Snapshots};
+
+#[derive(Debug, Args)]
+pub struct TopArguments {
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Time between two looks, s.
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    pub every: f64,
+    /// Print one look as text and end.
+    #[arg(long)]
+    pub once: bool,
+}
 
 /// Time between two snapshots at the queue of poses, which has room for nine.
 const PERIOD: Duration = Duration::from_millis(50);

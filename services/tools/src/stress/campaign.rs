@@ -3,7 +3,7 @@
 use std::{sync::Arc, thread, time::Duration};
 
 use gyre_messages::StageId;
-use gyre_run::{Limits, PlayedFault, RADAR_HZ, Scenario};
+use gyre_run::{Limits, RADAR_HZ, Scenario};
 use gyre_stage::run::{free_shared_memory, sweep};
 use gyre_terminal::Failure;
 
@@ -100,7 +100,7 @@ impl Campaign<'_> {
         if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
             return Err(lacking.into());
         }
-        let setup = self.setup();
+        let setup = self.setup()?;
         if setup.faults.is_some() && setup.duration < fault::LEAST {
             let (scenario, least_s) = (self.scenario, fault::LEAST.as_secs());
             return Err(format!("{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it").into());
@@ -118,17 +118,15 @@ impl Campaign<'_> {
         .unless(omitted))
     }
 
-    fn setup(&self) -> Setup {
+    fn setup(&self) -> Result<Setup, Failure> {
         let (scenario, options) = (self.scenario, self.options);
         let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), options.duration);
         let faults = |kind| {
-            let all = options.stages.is_empty();
-            let stages = if all {
-                &self.tested.stages
-            } else {
-                &options.stages
+            let stages = match options.stages.as_slice() {
+                [] => self.tested.stages.as_slice(),
+                stages => stages,
             };
-            Some((kind, stages.clone(), options.seed))
+            Some((kind, stages.to_vec(), options.seed))
         };
         match scenario {
             Scenario::Bursts => {
@@ -149,28 +147,23 @@ impl Campaign<'_> {
             Scenario::SlowStage => setup.set.extend(self.slow_stages()),
             Scenario::Stopped => setup.faults = faults(FaultKind::Stop),
             Scenario::Kills => setup.faults = faults(FaultKind::Kill),
-            _ => self.play_faults(&mut setup),
+            _ => self.play_faults(&mut setup)?,
         }
-        setup
+        Ok(setup)
     }
 
     /// Adds the faults that the source plays, and the time that they take.
-    fn play_faults(&self, setup: &mut Setup) {
+    fn play_faults(&self, setup: &mut Setup) -> Result<(), Failure> {
         setup.played = witness_fault::faults(self.scenario);
         if setup.played.is_empty() {
-            return;
+            return Ok(());
         }
         let needed_s = witness_fault::needed_s(&setup.played);
         let needed_s = needed_s / self.tested.relative_rate(setup.rate_hz);
         setup.duration = setup.duration.max(Duration::from_secs_f64(needed_s));
-        let fault = |fault: &PlayedFault| {
-            let PlayedFault { from_s, for_s, .. } = fault;
-            let kind = fault.kind.name();
-            format!("{{kind='{kind}',from_s={from_s:?},for_s={for_s:?}}}")
-        };
-        let faults: Vec<String> = setup.played.iter().map(fault).collect();
-        let faults = faults.join(",");
-        setup.set.push(format!("source.faults=[{faults}]"));
+        let faults = toml::Value::try_from(&setup.played)?;
+        setup.set.push(format!("source.faults={faults}"));
+        Ok(())
     }
 
     fn slow_stages(&self) -> impl Iterator<Item = String> {
@@ -188,12 +181,7 @@ impl Campaign<'_> {
 
     /// The limits of each step: the limits of the budget, else no drop and a p99 of a period.
     fn step_limits(&self) -> Limits {
-        let limits = Limits {
-            rate_hz: None,
-            radars: None,
-            ..self.limits.clone()
-        };
-        limits.or(&Limits {
+        self.limits.or(&Limits {
             p99_ms: Some(PERIOD_MS),
             drops_percent: Some(0.0),
             ..Limits::default()
@@ -290,8 +278,11 @@ fn problem(measured: &Measured) -> Option<String> {
     if let Some(said) = &measured.died {
         return Some(format!("the run has ended: {said}"));
     }
-    if let Some(unseen) = figures.latency.counts.omitted() {
-        return Some(unseen);
+    let unseen = figures.latency.counts.unseen;
+    if unseen > 0 {
+        return Some(format!(
+            "{unseen} poses were not seen by the process that measures: the machine was too busy for it"
+        ));
     }
     let mut lost = figures.faults.iter().filter(|it| it.recovery_ms.is_none());
     if let Some(fault) = lost.next() {

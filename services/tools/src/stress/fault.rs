@@ -46,6 +46,9 @@ pub struct Fault {
     /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked
     /// on since, ms; `None`: there was no such pose.
     pub recovery_ms: Option<f64>,
+    /// The stage, and the end of its fault, `CLOCK_MONOTONIC`, ns; `None` while it is stopped.
+    #[serde(skip)]
+    pub ended: Option<(StageId, i64)>,
 }
 
 /// Faults one after the other. The stages have a random order, and each stage has its turn.
@@ -62,11 +65,9 @@ pub struct Faults {
     every_ns: i64,
     /// The stage whose turn it is and whose process was not found.
     sought: Option<StageId>,
-    /// The process group that is stopped, its fault, and the time for continuing it.
-    stopped: Option<(Pid, (usize, StageId), i64)>,
+    /// The process group of the last fault while it is stopped, and the time for continuing it.
+    stopped: Option<(Pid, StageId, i64)>,
     done: Vec<Fault>,
-    /// Faults by their index in `done` that no pose has followed, with the times of their ends.
-    open: Vec<(usize, StageId, i64)>,
 }
 
 impl Faults {
@@ -90,17 +91,16 @@ impl Faults {
             sought: None,
             stopped: None,
             done: Vec::new(),
-            open: Vec::new(),
         }
     }
 
     pub fn act(&mut self, processes: &Sampler) {
         let now_ns = clock::now_ns();
-        let is_due = |(_, _, until_ns): &mut (Pid, (usize, StageId), i64)| now_ns >= *until_ns;
-        if let Some((group, (fault, stage), _)) = self.stopped.take_if(is_due) {
+        let stopped = self.stopped.take_if(|(.., until_ns)| now_ns >= *until_ns);
+        if let (Some((group, stage, _)), Some(fault)) = (stopped, self.done.last_mut()) {
             // That it has been killed meanwhile is no error.
             let _ = kill_process_group(group, Signal::CONT);
-            self.open.push((fault, stage, clock::now_ns()));
+            fault.ended = Some((stage, clock::now_ns()));
         }
         let has_time = now_ns + nanoseconds(STOP + RECOVERY) < self.ends_ns;
         if now_ns < self.next_ns || self.stopped.is_some() || !has_time {
@@ -139,18 +139,15 @@ impl Faults {
         let Some(group) = group.filter(|group| kill_process_group(*group, signal).is_ok()) else {
             return false;
         };
-        let fault = self.done.len();
+        let is_stop = self.kind == FaultKind::Stop;
         self.done.push(Fault {
             kind: self.kind,
             stage: stage.name(),
             at_s: (now_ns - self.began_ns) as f64 * 1e-9,
             recovery_ms: None,
+            ended: (!is_stop).then_some((stage, now_ns)),
         });
-        let until_ns = now_ns + nanoseconds(STOP);
-        match self.kind {
-            FaultKind::Kill => self.open.push((fault, stage, now_ns)),
-            FaultKind::Stop => self.stopped = Some((group, (fault, stage), until_ns)),
-        }
+        self.stopped = is_stop.then(|| (group, stage, now_ns + nanoseconds(STOP)));
         true
     }
 
@@ -167,18 +164,17 @@ impl Faults {
     pub fn pose(&mut self, pose: &PoseHeader) {
         let hops = &pose.item.hops;
         let posed_ns = hops[StageId::PoseIntegration as usize].published_ns;
-        let done = &mut self.done;
-        self.open.retain(|(fault, stage, ended_ns)| {
-            let has_recovered = hops[*stage as usize].started_ns > *ended_ns;
-            if has_recovered {
-                done[*fault].recovery_ms = Some((posed_ns - ended_ns) as f64 * 1e-6);
-            }
-            !has_recovered
-        });
+        let open = self.done.iter_mut().filter(|it| it.recovery_ms.is_none());
+        for fault in open {
+            let has_worked =
+                |(stage, ended_ns): &(StageId, i64)| hops[*stage as usize].started_ns > *ended_ns;
+            let ended = fault.ended.filter(has_worked);
+            fault.recovery_ms = ended.map(|(_, ended_ns)| (posed_ns - ended_ns) as f64 * 1e-6);
+        }
     }
 
     pub fn are_open(&self) -> bool {
-        self.stopped.is_some() || !self.open.is_empty()
+        self.done.iter().any(|fault| fault.recovery_ms.is_none())
     }
 
     /// Returns all faults, and the reason why some are missing. A stopped stage is continued first.
@@ -241,8 +237,8 @@ mod tests {
             stage: StageId::Masking.name(),
             at_s: 1.0,
             recovery_ms: None,
+            ended: Some((StageId::Masking, 1_000_000_000)),
         });
-        faults.open.push((0, StageId::Masking, 1_000_000_000));
         let mut pose = PoseHeader::default();
         let pose_at = |pose: &mut PoseHeader, started_ns: i64| {
             pose.item.hop_mut(StageId::Masking).started_ns = started_ns;

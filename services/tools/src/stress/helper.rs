@@ -6,12 +6,12 @@
 use std::{
     io::{BufRead, BufReader},
     os::unix::process::CommandExt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::{Child, Command, Stdio},
 };
 
 use gyre_stage::run::end_with;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, own};
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +33,7 @@ pub enum Work {
     Observe(PathBuf),
 }
 
-pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
+pub fn help(arguments: &[String]) -> Result<(), Failure> {
     let usage = || format!("`gyre {COMMAND}` is what `gyre stress` starts");
     let [parent, work] = arguments else {
         return Err(usage().into());
@@ -50,8 +50,8 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     }
     match work {
         Work::Run(words) => {
-            let error = Command::new(program).args(words).exec();
-            Err(format!("cannot start `{}`: {error}", program.display()).into())
+            let error = Command::new(own()).args(words).exec();
+            Err(format!("cannot start a run: {error}").into())
         }
         Work::Spin => load::spin(),
         Work::Memory(share) => load::churn(share),
@@ -59,8 +59,8 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), Failure> {
     }
 }
 
-pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
-    let spawned = Command::new(program)
+pub fn spawn(work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
+    let spawned = Command::new(own())
         .arg(COMMAND)
         .arg(std::process::id().to_string())
         .arg(serde_json::to_string(work)?)
@@ -68,7 +68,7 @@ pub fn spawn(program: &Path, work: &Work, output: Stdio, errors: Stdio) -> Resul
         .stdout(output)
         .stderr(errors)
         .spawn();
-    Ok(spawned.map_err(|error| format!("cannot start `{}`: {error}", program.display()))?)
+    Ok(spawned.map_err(|error| format!("cannot start a helper process: {error}"))?)
 }
 
 /// A helper process. It is killed when this is dropped.
@@ -80,8 +80,8 @@ pub struct Helper {
 
 impl Helper {
     /// Starts a helper, and waits until it works.
-    pub fn start(program: &Path, work: Work) -> Result<Self, Failure> {
-        let mut process = spawn(program, &work, Stdio::piped(), Stdio::inherit())?;
+    pub fn start(work: Work) -> Result<Self, Failure> {
+        let mut process = spawn(&work, Stdio::piped(), Stdio::inherit())?;
         let mut line = String::new();
         let output = process.stdout.take().map(BufReader::new);
         let read = output.map(|mut output| output.read_line(&mut line));

@@ -3,20 +3,18 @@
 use std::{
     fs,
     hint::black_box,
-    io::Write,
     path::Path,
-    sync::mpsc::{self, Sender},
     thread,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan};
+use gyre_messages::topics;
 use gyre_stage::{
-    StageError,
-    observer::{Next, ObservedRun},
+    observer::{ObservedRun, wait_for_any},
+    wake::{MAX_WAIT, Signals},
 };
 use gyre_supervise::memory::Room;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";
@@ -29,10 +27,9 @@ const PAGE: usize = 4096;
 const TAKING: Duration = Duration::from_secs(20);
 /// Time between two polls for memory when there is no more to take.
 const PAUSE: Duration = Duration::from_millis(20);
-const CACHE_LINE: usize = 64;
 
 pub(super) fn spin() -> ! {
-    say(READY);
+    let _ = print::line(READY);
     let mut number = 1_u64;
     loop {
         number = black_box(number.wrapping_mul(6_364_136_223_846_793_005));
@@ -57,7 +54,7 @@ pub(super) fn churn(share: f64) -> Result<(), Failure> {
         let (available_mb, left_mb) = (available as f64 * 1e-6, LEFT as f64 * 1e-6);
         return Err(format!("no memory was taken: {available_mb:.0} MB are available, and {left_mb:.0} MB are always left").into());
     }
-    say(READY);
+    print::line(READY)?;
     loop {
         for taken in &mut pieces {
             *taken = Vec::new();
@@ -83,58 +80,22 @@ fn piece() -> Vec<u8> {
     black_box(piece)
 }
 
-/// Reads all topics of a run until it ends, a byte of each cache line.
+/// Copies the messages of all topics of a run until it ends.
 pub(super) fn observe(out: &Path) -> Result<(), Failure> {
-    let unusable = |error| format!("cannot use {}: {error}", out.display());
-    let root = gyre_stage::run::root_of(&out.canonicalize().map_err(unusable)?);
-    let followers = [
-        follow::<Scan>,
-        follow::<Masked>,
-        follow::<Rotation>,
-        follow::<Motion>,
-        follow::<Refined>,
-        follow::<Pose>,
-    ];
-    let (attached, attachments) = mpsc::channel();
-    let threads = followers.map(|follow| {
-        let (root, attached) = (root.clone(), attached.clone());
-        thread::spawn(move || follow(&root, attached))
-    });
-    drop(attached);
-    // A thread that cannot attach reports this when it is joined.
-    if attachments.iter().count() == threads.len() {
-        say(READY);
+    let (run, signals) = (ObservedRun::writing_to(out)?, Signals::install()?);
+    let mut observers = Vec::new();
+    for topic in topics(&run.manifest().window) {
+        observers.extend(run.observe_topic(topic.name)?);
     }
-    for thread in threads {
-        thread.join().map_err(|_| "an observer panicked")??;
-    }
-    Ok(())
-}
-
-fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageError> {
-    let run = ObservedRun::at(root)?;
-    let mut observer = run.observe::<M>()?;
-    let _ = attached.send(());
-    drop(attached);
-    loop {
-        match observer.next(Duration::MAX)? {
-            Next::Message(message, _) => {
-                let bytes: &[u8] = message.values();
-                let touched = bytes
-                    .iter()
-                    .step_by(CACHE_LINE)
-                    .map(|byte| u64::from(*byte));
-                black_box(touched.sum::<u64>());
+    print::line(READY)?;
+    while !observers.iter().all(|it| it.has_ended()) {
+        let listeners: Vec<_> = observers.iter().map(|it| it.listener()).collect();
+        wait_for_any(&signals, &listeners, MAX_WAIT)?;
+        for observer in &mut observers {
+            while let Some(message) = observer.take()? {
+                black_box(message);
             }
-            Next::Idle => {}
-            Next::Ended => return Ok(()),
         }
     }
-}
-
-/// Prints a line for the process that has started this one. That it has ended is noticed by its
-/// death.
-fn say(line: &str) {
-    let mut output = std::io::stdout();
-    let _ = writeln!(output, "{line}").and_then(|()| output.flush());
+    Ok(())
 }

@@ -89,8 +89,7 @@ pub fn measure(
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let loads = setup.loads.iter();
-    let loads = loads.map(|work| Helper::start(&tested.program, work.clone()));
+    let loads = setup.loads.iter().cloned().map(Helper::start);
     let mut loads: Vec<Helper> = loads.collect::<Result<_, _>>()?;
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;
@@ -115,10 +114,7 @@ pub fn measure(
     let ended_load =
         ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
-        omitted: omitted
-            .or(unplayed)
-            .or(ended_load)
-            .or_else(|| latency.counts.omitted()),
+        omitted: omitted.or(unplayed).or(ended_load),
         figures: Figures {
             latency,
             faults,

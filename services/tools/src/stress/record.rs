@@ -30,16 +30,6 @@ pub struct Counts {
     pub unseen: u64,
 }
 
-impl Counts {
-    /// Returns the reason why the distributions are incomplete: poses were not seen.
-    pub fn omitted(&self) -> Option<String> {
-        let unseen = self.unseen;
-        (unseen > 0).then(|| {
-            format!("{unseen} poses were not seen by the process that measures: the machine was too busy for it")
-        })
-    }
-}
-
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLatency {
     pub counts: Counts,

@@ -5,6 +5,7 @@ mod outcome;
 
 use std::{fs, path::Path};
 
+use gyre_stage::StageError;
 use gyre_terminal::Failure;
 use serde::Serialize;
 
@@ -51,8 +52,7 @@ impl Report {
 
     pub fn write(&self, out: &Path) -> Result<(), Failure> {
         let path = out.join("report.json");
-        fs::write(&path, serde_json::to_string_pretty(self)?)
-            .map_err(|error| format!("cannot use {}: {error}", path.display()))?;
-        Ok(())
+        let text = serde_json::to_string_pretty(self)?;
+        Ok(fs::write(&path, text).map_err(StageError::file(&path))?)
     }
 }

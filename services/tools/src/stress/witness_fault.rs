@@ -62,7 +62,8 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
             "{scenario} needs motions that say what they rest on, and refinement.kind is none: set it to local-map"
         ));
     }
-    let (has_s, needed_s) = (tested.turn_s(), needed_s(&faults));
+    let has_s = tested.turn.len() as f64 * tested.period.as_secs_f64();
+    let needed_s = needed_s(&faults);
     (has_s < needed_s).then(|| {
         format!(
             "{scenario} needs {needed_s:.0} s of a drive without a jump, and the recording lasts {has_s:.0} s: give a longer one, or raise simulation.scans"
@@ -88,14 +89,6 @@ pub struct WitnessFault {
 }
 
 impl WitnessFault {
-    fn new(fault: &PlayedFault) -> Self {
-        Self {
-            kind: fault.kind,
-            for_s: fault.for_s,
-            ..Self::default()
-        }
-    }
-
     pub fn problem(&self) -> Option<String> {
         let (name, for_s, motions) = (self.kind.name(), self.for_s, self.motions);
         match self.recovery_ms {
@@ -155,8 +148,13 @@ impl WitnessFaults {
         clock: PlayedClock,
         began_ns: i64,
     ) -> Self {
+        let found = |fault: &PlayedFault| WitnessFault {
+            kind: fault.kind,
+            for_s: fault.for_s,
+            ..WitnessFault::default()
+        };
         Self {
-            found: faults.iter().map(WitnessFault::new).collect(),
+            found: faults.iter().map(found).collect(),
             faults,
             others,
             clock,

@@ -1,4 +1,4 @@
-//! The lines that are appended to `log.jsonl` of a run.
+//! The lines that are appended to a log of a run, as to its `log.jsonl`.
 
 use std::{
     fs::File,
@@ -24,15 +24,32 @@ impl LogTail {
     /// Begins at the present end.
     pub fn new(path: &Path) -> Self {
         Self {
-            path: path.to_owned(),
             offset: path.metadata().map_or(0, |file| file.len()),
+            ..Self::whole(path)
+        }
+    }
+
+    /// Begins with the first line.
+    pub fn whole(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            offset: 0,
             begun: Vec::new(),
         }
     }
 
-    /// Returns the lines that were appended since the last call. A log that cannot be read has
-    /// none.
+    /// Returns the events that were appended since the last call.
     pub fn lines(&mut self, now_ns: i64) -> Vec<LogLine> {
+        let lines = self.texts();
+        lines
+            .iter()
+            .filter_map(|line| parse(line, now_ns))
+            .collect()
+    }
+
+    /// Returns the complete lines that were appended since the last call, or the first of them. A
+    /// log that cannot be read has none: it may come later.
+    pub fn texts(&mut self) -> Vec<String> {
         let Some(appended) = self.appended() else {
             return Vec::new();
         };
@@ -46,16 +63,16 @@ impl LogTail {
         };
         let rest = self.begun.split_off(end + 1);
         let lines = std::mem::replace(&mut self.begun, rest);
-        let lines = lines.split(|byte| *byte == b'\n');
-        lines.filter_map(|line| parse(line, now_ns)).collect()
+        let lines = String::from_utf8_lossy(&lines);
+        lines.lines().map(str::to_owned).collect()
     }
 
     fn appended(&mut self) -> Option<Vec<u8>> {
         let mut file = File::open(&self.path).ok()?;
         let bytes = file.metadata().ok()?.len();
         if bytes < self.offset {
-            // The supervisor has cut it.
-            (self.offset, self.begun) = (bytes, Vec::new());
+            // It had become too long, and was emptied.
+            (self.offset, self.begun) = (0, Vec::new());
         }
         let mut appended = Vec::new();
         file.seek(SeekFrom::Start(self.offset)).ok()?;
@@ -66,8 +83,8 @@ impl LogTail {
 }
 
 /// Parses a line; `None` if the line is not from the log.
-fn parse(line: &[u8], now_ns: i64) -> Option<LogLine> {
-    let line: Value = serde_json::from_slice(line).ok()?;
+fn parse(line: &str, now_ns: i64) -> Option<LogLine> {
+    let line: Value = serde_json::from_str(line).ok()?;
     let text = |value: &Value| match value {
         Value::String(text) => text.clone(),
         other => other.to_string(),

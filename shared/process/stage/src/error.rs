@@ -86,7 +86,7 @@ impl StageError {
     }
 
     /// Names the file of an error.
-    pub(crate) fn file(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub fn file(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::File {
             path: path.to_owned(),
             source,

@@ -41,6 +41,11 @@ impl Services {
         })
     }
 
+    pub fn subscribers(&self, topic: &str) -> usize {
+        let topics = self.topics.iter().filter(|it| it.0.name == topic);
+        topics.map(|(_, service)| service.subscribers()).sum()
+    }
+
     /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead
     /// stage counts until its resources are removed.
     pub fn has_publisher(&self, stage: StageId) -> bool {

@@ -101,14 +101,18 @@ impl Child {
 
     /// Takes the place of a process that has ended, with another program that stood by for it.
     pub fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
-        // It opens its topics when its standard input ends.
-        drop(successor.process.stdin.take());
+        successor.end_input();
         successor.started = Instant::now();
         successor.pose_at_restart = Some(newest_pose);
         successor.last_death = self.last_death.take();
         (successor.before, successor.is_on_trial) = (self.before.take(), self.is_on_trial);
         successor.try_after(self.plan.clone());
         std::mem::swap(self, &mut successor);
+    }
+
+    /// Lets a process that stands by open its topics.
+    pub fn end_input(&mut self) {
+        drop(self.process.stdin.take());
     }
 
     /// Uses a different program from the next start on.

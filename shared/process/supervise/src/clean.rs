@@ -173,7 +173,8 @@ mod tests {
     fn an_empty_file_that_a_stopped_observer_began_does_not_stay() {
         let (out, signals) = (tempfile::tempdir().unwrap(), Signals::install().unwrap());
         let guardian = ["cat".to_owned()];
-        let run = Rig::new(manifest(out.path()), "", &guardian, &signals).unwrap();
+        let mut run = Rig::new(manifest(out.path()), "", &guardian, &signals).unwrap();
+        run.create_services().unwrap();
         let manifest = run.manifest();
         let transport = manifest.transport().unwrap();
         let observed = ObservedRun::at(&manifest.root).unwrap();

@@ -7,16 +7,16 @@
 
 mod recorded;
 
-use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, time::Duration};
+use std::{collections::BTreeSet, fs, time::Duration};
 
 use gyre_messages::{StageId, Topic};
 use gyre_stage::{
-    Launch, Manifest, StageError,
+    Manifest, StageError,
     message::AnyMessage,
     reader::Port,
     run::{self, RunRoot},
     services::Services,
-    transport::{self, Listener, Node, Service, Transport},
+    transport::{self, Node, Transport},
     wake::Signals,
     writer::TopicWriter,
 };
@@ -48,29 +48,13 @@ pub struct Process {
     death: Option<Death>,
 }
 
-/// The publisher of a topic, in place of the stage that it is of.
-pub struct Feed {
-    writer: TopicWriter,
-    topic: Service,
-}
-
-pub struct Tap(Port<AnyMessage>);
+/// A reader of a topic.
+pub type Tap = Port<AnyMessage>;
 
 impl<'a> Rig<'a> {
     /// Creates the root of a run with this manifest, whose prefix and root are set, and this
-    /// configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
+    /// configuration. `guardian` is as in [`Plan`](crate::Plan). The run has no services yet.
     pub fn new(
-        manifest: Manifest,
-        configuration: &str,
-        guardian: &[String],
-        signals: &'a Signals,
-    ) -> Result<Self, SuperviseError> {
-        let mut rig = Self::without_services(manifest, configuration, guardian, signals)?;
-        rig.services = Some(Services::create(&rig.node, &rig.manifest.window)?);
-        Ok(rig)
-    }
-
-    pub fn without_services(
         mut manifest: Manifest,
         configuration: &str,
         guardian: &[String],
@@ -93,24 +77,35 @@ impl<'a> Rig<'a> {
         })
     }
 
+    pub fn create_services(&mut self) -> Result<(), StageError> {
+        self.services = Some(Services::create(&self.node, &self.manifest.window)?);
+        Ok(())
+    }
+
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// The output is appended to the log of the process.
+    /// The output is appended to the log of the process. One that stands by waits for
+    /// [`Process::end_input`].
     pub fn start(
         &self,
         name: &str,
         command: &[String],
         scheduling: &Scheduling,
+        stands_by: bool,
     ) -> Result<Process, SuperviseError> {
         let plan = StagePlan {
             scheduling: scheduling.clone(),
             ..StagePlan::new(name, command.to_vec())
         };
         let starter = Starter::new(self.signals, &self.guardian);
+        let position = match stands_by {
+            true => Position::Taken,
+            false => Position::Free,
+        };
         Ok(Process {
-            child: Child::spawn(&plan, &self.manifest, &starter, Position::Free)?,
+            child: Child::spawn(&plan, &self.manifest, &starter, position)?,
             death: None,
         })
     }
@@ -134,32 +129,28 @@ impl<'a> Rig<'a> {
             .collect()
     }
 
-    pub fn feed(&self, topic: &str) -> Result<Feed, StageError> {
-        Feed::on(&self.node, &self.manifest, topic)
+    /// Returns a publisher of a topic, in place of the stage that it is of.
+    pub fn feed(&self, topic: &str) -> Result<TopicWriter, StageError> {
+        TopicWriter::to(known(topic)?, &self.node, &self.manifest)
     }
 
     pub fn tap(&self, topic: &str) -> Result<Tap, StageError> {
-        Port::to(known(topic)?, &self.node, &self.manifest).map(Tap)
+        Tap::to(known(topic)?, &self.node, &self.manifest)
     }
 
-    /// True on a request to stop.
-    pub fn sleep_until_readable(
-        &self,
-        feeds: &[&Feed],
-        connection: BorrowedFd<'_>,
-        limit: Duration,
-    ) -> Result<bool, StageError> {
-        let handshakes: Vec<_> = feeds.iter().map(|feed| feed.writer.listener()).collect();
-        let woken = self
-            .signals
-            .wait_or_readable(&[], &handshakes, Some(connection), limit)?;
-        Ok(woken.stop)
+    pub fn subscribers(&self, topic: &str) -> usize {
+        let services = self.services.as_ref();
+        services.map_or(0, |services| services.subscribers(topic))
     }
 
-    /// True on a request to stop.
-    pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<bool, StageError> {
+    /// Sleeps until a message may be there or `limit` has passed; [`StageError::Stopped`] on a
+    /// request to stop.
+    pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<(), StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
-        Ok(self.signals.wait(&listeners, None, limit)?.stop)
+        match self.signals.wait(&listeners, None, limit)?.stop {
+            true => Err(StageError::Stopped),
+            false => Ok(()),
+        }
     }
 }
 
@@ -169,17 +160,16 @@ fn known(topic: &str) -> Result<&'static Topic, StageError> {
 }
 
 impl Process {
-    /// Returns the process id, which is also its group's.
-    pub fn pid(&self) -> u32 {
-        self.child.pid()
-    }
-
     pub fn death(&mut self) -> Option<Death> {
         if self.death.is_none() && self.child.has_exited() {
             // Once: it takes the last words.
             self.death = Some(self.child.death());
         }
         self.death.clone()
+    }
+
+    pub fn end_input(&mut self) {
+        self.child.end_input();
     }
 
     /// Sends SIGTERM to the group.
@@ -190,66 +180,5 @@ impl Process {
     pub fn kill(mut self) -> Result<(), SuperviseError> {
         self.child.kill();
         self.child.await_end()
-    }
-}
-
-impl Feed {
-    /// Publishes a topic of the run that a process has joined.
-    pub fn of(launch: &Launch, topic: &str) -> Result<Self, StageError> {
-        Self::on(launch.node(), &launch.manifest, topic)
-    }
-
-    fn on(node: &Node, manifest: &Manifest, topic: &str) -> Result<Self, StageError> {
-        let topic = known(topic)?;
-        Ok(Self {
-            writer: TopicWriter::to(topic, node, manifest)?,
-            topic: Service::open(node, topic)?,
-        })
-    }
-
-    /// Sends a message as it is, with its time stamps, and notifies its readers.
-    pub fn send(&self, message: &Recorded) -> Result<(), StageError> {
-        let (header, payload) = (message.header_bytes(), &message.payload);
-        self.writer.send_unchanged(header, payload)
-    }
-
-    /// Sends the history to readers that have notified since the last call; returns whether there
-    /// were any. A reader that does not notify is not connected to.
-    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
-        self.writer.answer_handshakes()
-    }
-
-    /// Sends the history to all new readers, whether they have notified or not.
-    pub fn connect(&self) -> Result<(), StageError> {
-        self.writer.accept_readers()
-    }
-
-    pub fn subscribers(&self) -> usize {
-        self.topic.subscribers()
-    }
-}
-
-impl Tap {
-    /// Subscribes to a topic of the run that a process has joined; `silently`, it does not ask for
-    /// its history.
-    pub fn of(launch: &Launch, topic: &str, silently: bool) -> Result<Self, StageError> {
-        let (topic, node, manifest) = (known(topic)?, launch.node(), &launch.manifest);
-        let port = match silently {
-            true => Port::silent(topic, node, manifest)?,
-            false => Port::to(topic, node, manifest)?,
-        };
-        Ok(Self(port))
-    }
-
-    pub fn receive(&self) -> Result<Option<Recorded>, StageError> {
-        Ok(self.0.receive()?.map(|received| Recorded {
-            header: received.header_bytes().to_vec(),
-            payload: received.values::<u8>().to_vec(),
-            received_ns: received.received_ns,
-        }))
-    }
-
-    pub fn listener(&self) -> &Listener {
-        self.0.listener()
     }
 }

@@ -2,8 +2,13 @@
 
 use gyre_journal::Journal;
 use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
-use gyre_stage::{observer::Sequence, source::RecordedMessage, wake::MAX_WAIT};
-use gyre_supervise::rig::{Feed, Recorded, Rig};
+use gyre_stage::{
+    observer::Sequence,
+    source::RecordedMessage,
+    wake::{MAX_WAIT, Signals},
+    writer::TopicWriter,
+};
+use gyre_supervise::rig::Rig;
 use zenoh::{Session, qos::Priority};
 
 use super::{ASK_FOR_RUN, Received, ReceivedCount, require_same};
@@ -28,6 +33,7 @@ pub(super) struct Mirror<'a> {
     pub journal: Journal,
     pub next_pose: u64,
     pub waker: Waker,
+    pub signals: &'a Signals,
     pub rig: Rig<'a>,
 }
 
@@ -35,7 +41,7 @@ pub(super) struct MirroredTopic {
     name: &'static str,
     header_bytes: usize,
     pub fetcher: Fetcher,
-    feed: Feed,
+    feed: TopicWriter,
     sequence: Sequence,
     count: ReceivedCount,
 }
@@ -158,7 +164,9 @@ impl Mirror<'_> {
                         self.next_pose =
                             append(&mut self.journal, &message, self.next_pose, &limits)?;
                     }
-                    topic.feed.send(&Recorded::from_bytes(message))?;
+                    topic
+                        .feed
+                        .send_unchanged(&message.header, &message.payload)?;
                 }
             }
             if have_ended {
@@ -172,12 +180,15 @@ impl Mirror<'_> {
                 true => self.answers = None,
                 false => self.find_another_sender()?,
             }
-            let feeds: Vec<&Feed> = self.topics.iter().map(|topic| &topic.feed).collect();
-            for feed in &feeds {
-                feed.answer_handshakes()?;
+            for topic in &self.topics {
+                topic.feed.answer_handshakes()?;
             }
-            let (rig, descriptor) = (&self.rig, self.waker.descriptor());
-            if rig.sleep_until_readable(&feeds, descriptor, MAX_WAIT)? {
+            let readers = self.topics.iter().map(|topic| topic.feed.listener());
+            let readers: Vec<_> = readers.collect();
+            let descriptor = Some(self.waker.descriptor());
+            let signals = self.signals;
+            let woken = signals.wait_or_readable(&[], &readers, descriptor, MAX_WAIT)?;
+            if woken.stop {
                 return Ok(self.received(true));
             }
         }

@@ -45,7 +45,7 @@ impl Examination<'_> {
             if !compensates || !waited.is_done() {
                 continue;
             }
-            session.rest(demands.quiet)?;
+            session.rest()?;
             let early = session.has(answered + 1);
             session.findings.require(Rule::WaitsForMotion, !early, || {
                 format!("it sent item {} before the motion of item {} was there: the result depends on which is faster", answered + 1, motion + 1)

@@ -6,17 +6,12 @@
 //! A program that stands by, as for a swap, reports when it is ready, opens nothing before its
 //! standard input ends, and then works as after a normal start.
 
-use std::{fs::File, path::Path};
-
 use gyre_messages::{Item, StageId, flag};
-use gyre_stage::run::STANDBY;
 use gyre_supervise::rig::Recorded;
 use gyre_terminal::Failure;
-use rustix::fs::{CWD, FileType, Mode, mknodat};
 
 use super::Examination;
 use crate::conformance::{
-    at,
     rule::Rule,
     session::{Pace, Session, Waited},
 };
@@ -25,8 +20,6 @@ use crate::conformance::{
 const UNDER_WAY: u64 = 2;
 /// A program need not stand by.
 const DOES_NOT: &str = "it does not stand by: `gyre swap` needs --cold";
-/// Becomes the program behind it, with the pipe as its standard input.
-const WITH_INPUT: &str = "exec \"$@\" < \"$0\"";
 
 impl Examination<'_> {
     pub(super) fn restart(&mut self) -> Result<(), Failure> {
@@ -49,18 +42,13 @@ impl Examination<'_> {
 
     pub(super) fn standing_by(&mut self) -> Result<(), Failure> {
         let mut session = Session::open(self.context, "standing-by", &mut self.findings)?;
-        let candidate = &session.test.candidate;
-        let root = session.harness.rig.manifest().root.clone();
-        let ready = root.join(format!("{}.ready", candidate.stage.name()));
-        let input = root.join("standing-by.input");
-        let end_of_input = named_pipe(&input).map_err(at(&input))?;
+        let root = &session.harness.rig.manifest().root;
+        let ready = root.join(format!("{}.ready", session.stage().name()));
         session.admit()?;
-        let (told, input) = (format!("{STANDBY}=1"), input.display().to_string());
-        let shell = ["env", &told, "sh", "-c", WITH_INPUT, &input].map(str::to_owned);
-        session.spawn(&[&shell[..], &candidate.command[..]].concat())?;
+        session.spawn(true)?;
         let limit = session.demands().start_timeout;
         let waited = session.wait(limit, |session| ready.exists() || session.has_joined())?;
-        let lives = session.rest(session.demands().quiet)?;
+        let lives = session.rest()?;
         let breach = match (ready.exists(), session.has_joined()) {
             (false, true) => {
                 session.findings.not_for(Rule::StandsBy, DOES_NOT);
@@ -78,7 +66,7 @@ impl Examination<'_> {
             session.findings.broken(Rule::StandsBy, breach);
             return Ok(());
         }
-        drop(end_of_input);
+        session.harness.end_input();
         let until = session.reference.end() / 3;
         let mut waited = session.wait(limit, |session| session.harness.has_publisher())?;
         if waited.is_done() {
@@ -139,11 +127,4 @@ fn examine_life(
             format!("{when} it has to send its last poses again, with the flag SYNC on the newest alone, item {} or later", next.saturating_sub(1))
         });
     }
-}
-
-/// Creates a named pipe for the standard input of a program, which ends when this is dropped.
-fn named_pipe(path: &Path) -> std::io::Result<File> {
-    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)?;
-    // Opened for both, it does not wait for the program.
-    File::options().read(true).write(true).open(path)
 }

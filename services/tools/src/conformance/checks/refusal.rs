@@ -49,12 +49,9 @@ impl Examination<'_> {
         }
         session.pace = Pace::Hold;
         let forward = session.harness.topics.forward.clone();
-        let others: Vec<_> = forward
-            .iter()
-            .copied()
-            .filter(|other| *other != topic)
-            .collect();
-        session.feed(&others, WRONG)?;
+        for other in forward.iter().filter(|other| **other != topic) {
+            session.feed(&[*other], WRONG)?;
+        }
         session.harness.feed(topic, message)?;
         let ending = session.ended_within(session.demands().item_timeout)?;
         let is_sent = forward.contains(&topic) && session.has(WRONG);

@@ -1,15 +1,14 @@
 //! A whole stream with a full window, from a history that is there before the program, to the end
 //! and SIGTERM.
 
-use std::time::Instant;
+use std::cell::Cell;
 
 use gyre_messages::{StageId, flag};
 use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{
-    Interrupted,
-    reference::POLL_PERIOD,
+    result::result_bytes,
     rule::Rule,
     session::{Pace, Session, Waited},
 };
@@ -45,23 +44,24 @@ impl Examination<'_> {
             });
         }
         session.stops("after the end of the stream")?;
-        let results = session.results()?;
         self.outputs = std::mem::take(&mut session.outputs);
-        session.findings.first_results = results;
-        Ok(session.findings.first_results.len() > 1)
+        let topic = session.output_topic();
+        let results = &mut session.findings.first_results;
+        for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
+            let bytes = result_bytes(topic, output)?;
+            results.entry(output.item().seq).or_insert(bytes);
+        }
+        Ok(results.len() > 1)
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
     pub(super) fn window(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end() as usize;
         let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
-        let (demands, scans) = (
-            session.demands(),
-            session.harness.rig.manifest().window.scans,
-        );
-        let window = scans.min(end);
-        session.wait(demands.item_timeout, |it| it.outputs.len() >= window)?;
-        session.rest(demands.quiet)?;
+        let window = session.harness.rig.manifest().window.scans.min(end);
+        let limit = session.demands().item_timeout;
+        session.wait(limit, |it| it.outputs.len() >= window)?;
+        session.rest()?;
         let sent = session.outputs.len();
         session
             .findings
@@ -75,7 +75,9 @@ impl Examination<'_> {
 impl Session<'_> {
     pub(super) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
-        let waited = self.start(&self.test.candidate.command)?;
+        self.spawn(false)?;
+        let limit = self.demands().start_timeout;
+        let waited = self.wait(limit, |session| session.harness.has_publisher())?;
         let is_open = waited.is_done();
         self.findings
             .require(Rule::StartsInTime, is_open, || match &waited {
@@ -139,7 +141,7 @@ impl Session<'_> {
 
     fn waits_after_the_end(&mut self) -> Result<(), Failure> {
         let sent = self.outputs.len();
-        let lives = self.rest(self.demands().quiet)?;
+        let lives = self.rest()?;
         self.findings.require(Rule::PassesEnd, lives, || {
             "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
                 .to_owned()
@@ -154,18 +156,16 @@ impl Session<'_> {
     /// Requires that a reader which comes now receives the newest items.
     fn gives_history(&mut self) -> Result<(), Failure> {
         let (topic, rig) = (self.output_topic(), &self.harness.rig);
-        let history = self.harness.topics.history(&rig.manifest().window);
-        let wanted = history.min(self.outputs.len());
-        let late = rig.tap(topic)?;
-        let (mut received, since) = (0, Instant::now());
-        while received < wanted && since.elapsed() < self.test.demands.item_timeout {
+        let sizes = gyre_messages::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
+        let wanted = sizes.map_or(0, |it| it.history).min(self.outputs.len());
+        let (late, received) = (rig.tap(topic)?, Cell::new(0));
+        self.wait(self.demands().item_timeout, |_| {
             while late.receive().is_ok_and(|message| message.is_some()) {
-                received += 1;
+                received.set(received.get() + 1);
             }
-            if rig.sleep(&[&late], POLL_PERIOD)? {
-                return Err(Interrupted.into());
-            }
-        }
+            received.get() >= wanted
+        })?;
+        let received = received.get();
         self.findings.require(Rule::GivesHistory, received >= wanted, || {
             format!("a late reader that notified `{topic}_handshake` received {received} of the last {wanted} items: call update_connections, then notify `{topic}_data`")
         });
@@ -174,7 +174,9 @@ impl Session<'_> {
 
     pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
         let limit = self.demands().stop_timeout;
-        let breach = match self.stop()? {
+        self.harness.terminate();
+        self.pace = Pace::Hold;
+        let breach = match self.ended_within(limit)? {
             None => Some(format!(
                 "it has not exited within {limit:.0?} of SIGTERM {when}"
             )),

@@ -13,7 +13,7 @@ use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::SuperviseError;
 
 use crate::conformance::{
-    Candidate, at,
+    Candidate,
     harness::{Harness, Sent},
 };
 
@@ -41,17 +41,17 @@ pub(crate) struct Life<'a> {
 impl<'a> Life<'a> {
     /// Starts the program in a run of its own, with a copy of the state of the observed run's
     /// refinement.
-    pub fn begin(program: &ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
+    pub fn begin(program: &'a ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
         let (candidate, out) = (&program.candidate, program.folder.join("out"));
         if out.exists() {
-            fs::remove_dir_all(&out).map_err(at(&out))?;
+            fs::remove_dir_all(&out).map_err(StageError::file(&out))?;
         }
         if candidate.stage == StageId::Refinement {
             copy_state(&candidate.manifest.out, &out)?;
         }
-        let rig = candidate.rig(out, signals, true)?;
-        let mut harness = Harness::open(rig, candidate.stage)?;
-        harness.start(&candidate.command, &candidate.scheduling)?;
+        let rig = candidate.rig(out, signals)?;
+        let mut harness = Harness::open(rig, candidate)?;
+        harness.start(false)?;
         Ok(Self {
             harness,
             began: Instant::now(),
@@ -96,7 +96,7 @@ impl ShadowProgram {
             let file = fs::OpenOptions::new().create(true).append(true).open(path);
             file?.write_all(&printed)
         });
-        appended.map_err(at(path))
+        appended.map_err(StageError::file(path))
     }
 }
 
@@ -104,11 +104,12 @@ impl ShadowProgram {
 /// the same state.
 fn copy_state(run: &Path, out: &Path) -> Result<(), StageError> {
     let (from, to) = (checkpoint::path(run), checkpoint::path(out));
-    let created = gyre_storage::create_folder(to.parent().unwrap_or(out));
-    let copied = created.map_err(|error| error.source);
-    match copied.and_then(|()| fs::copy(&from, to)) {
+    gyre_storage::create_folder(to.parent().unwrap_or(out))?;
+    match fs::copy(&from, to) {
         // A replaced refinement need not have one.
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(at(&from)(error)),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(StageError::file(&from)(error))
+        }
         _ => Ok(()),
     }
 }

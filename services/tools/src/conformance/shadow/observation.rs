@@ -11,9 +11,9 @@ use gyre_supervise::rig::Recorded;
 
 use crate::conformance::topics::StageTopics;
 
-/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
-/// mode most scans never become an item.
-const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
+/// Items that are not complete. Beyond them the oldest is given up: in live mode most scans never
+/// become an item.
+const MAX_INCOMPLETE: usize = 64;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Observed {
@@ -28,8 +28,6 @@ pub(crate) struct Observed {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Feedback {
-    pub seq: u64,
-    breaks: bool,
     pub motion: Recorded,
     pub pose: Recorded,
 }
@@ -41,11 +39,6 @@ impl Observed {
 
     pub(crate) fn breaks(&self) -> bool {
         self.output.item().is(flag::BREAK)
-    }
-
-    pub(crate) fn bytes(&self) -> usize {
-        let inputs = self.inputs.iter().map(|(_, it)| it.payload.len());
-        inputs.sum::<usize>() + self.output.payload.len()
     }
 }
 
@@ -59,7 +52,6 @@ pub(crate) struct Observation<'run> {
     /// The messages of incomplete items, by the number of the scan at its source, because masking
     /// renumbers scans.
     incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
-    incomplete_bytes: usize,
     /// The last items without a gap: those that the lag reaches from an item and from the one
     /// before.
     recent: VecDeque<Feedback>,
@@ -91,7 +83,6 @@ impl<'run> Observation<'run> {
             forward: stage_topics.forward.len(),
             lag: run.manifest().window.lag as u64,
             incomplete: BTreeMap::new(),
-            incomplete_bytes: 0,
             recent: VecDeque::new(),
             last: None,
             missed: 0,
@@ -106,7 +97,12 @@ impl<'run> Observation<'run> {
             loop {
                 match self.observers[place].take() {
                     Ok(Some(message)) => {
-                        complete.extend(self.add(place, Recorded::from_bytes(message)));
+                        let message = Recorded {
+                            header: message.header,
+                            payload: message.payload,
+                            received_ns: 0,
+                        };
+                        complete.extend(self.add(place, message));
                     }
                     Ok(None) => break,
                     // The run judges the messages of its stages. The item counts as missed.
@@ -131,16 +127,12 @@ impl<'run> Observation<'run> {
         let topics = self.topics.len();
         let messages = self.incomplete.entry(published);
         let messages = messages.or_insert_with(|| vec![None; topics]);
-        self.incomplete_bytes += message.payload.len();
-        let replaced = messages[place].replace(message);
-        self.incomplete_bytes -= replaced.map_or(0, |it| it.payload.len());
+        messages[place] = Some(message);
         if messages.iter().all(Option::is_some) {
             return self.complete(published);
         }
-        while self.incomplete_bytes > MAX_INCOMPLETE_BYTES
-            && let Some((_, messages)) = self.incomplete.pop_first()
-        {
-            self.incomplete_bytes -= bytes(&messages);
+        if self.incomplete.len() > MAX_INCOMPLETE {
+            self.incomplete.pop_first();
         }
         None
     }
@@ -149,14 +141,12 @@ impl<'run> Observation<'run> {
         // Each topic comes in order: a missing message of an earlier item does not come any more.
         let later = self.incomplete.split_off(&published.saturating_add(1));
         let mut earlier = std::mem::replace(&mut self.incomplete, later);
-        self.incomplete_bytes -= earlier.values().map(|it| bytes(it)).sum::<usize>();
         let messages: Option<Vec<_>> = earlier.remove(&published)?.into_iter().collect();
         let mut messages = messages?.into_iter();
         let topics = self.topics.iter().copied();
         let inputs: Vec<_> = topics.zip(messages.by_ref().take(self.forward)).collect();
         let output = messages.next()?;
-        let seq = output.item().seq;
-        self.count_missed(seq);
+        self.count_missed(output.item().seq);
         let mut observed = Observed {
             inputs,
             output,
@@ -165,12 +155,7 @@ impl<'run> Observation<'run> {
         };
         if let (Some(motion), Some(pose)) = (messages.next(), messages.next()) {
             self.add_feedback(&mut observed);
-            self.recent.push_back(Feedback {
-                seq,
-                breaks: observed.breaks(),
-                motion,
-                pose,
-            });
+            self.recent.push_back(Feedback { motion, pose });
             while self.recent.len() as u64 > self.lag + 1 {
                 self.recent.pop_front();
             }
@@ -194,16 +179,11 @@ impl<'run> Observation<'run> {
         let before = &observed.before;
         let has_all = before.len() as u64 > lag;
         // A chain that has just begun is compensated by nothing.
-        let begins_before = before
-            .iter()
-            .any(|it| it.breaks && it.seq.saturating_add(lag) > seq);
+        let mut items = before.iter().map(|it| it.pose.item());
+        let begins_before = items.any(|it| it.is(flag::BREAK) && it.seq.saturating_add(lag) > seq);
         observed.can_open = match observed.breaks() {
             true => seq == 0 || has_all,
             false => has_all && !begins_before,
         };
     }
-}
-
-fn bytes(messages: &[Option<Recorded>]) -> usize {
-    messages.iter().flatten().map(|it| it.payload.len()).sum()
 }

@@ -10,7 +10,6 @@ use gyre_terminal::Failure;
 use serde::Serialize;
 
 use crate::conformance::{
-    at,
     item::work_ns,
     result::{Differences, result_bytes},
 };
@@ -88,7 +87,7 @@ impl Record {
         topic: &'static str,
         rows: Option<&Path>,
     ) -> Result<Self, StageError> {
-        let rows = rows.map(|path| File::create(path).map_err(at(path)));
+        let rows = rows.map(|path| File::create(path).map_err(StageError::file(path)));
         Ok(Self {
             stage,
             topic,

@@ -128,7 +128,7 @@ impl Renumbering {
             return send_start(shadow, observed);
         }
         let run = observed.seq();
-        let is_lagged = |it: &&Feedback| it.seq.checked_add(self.lag) == Some(run);
+        let is_lagged = |it: &&Feedback| it.pose.item().seq.checked_add(self.lag) == Some(run);
         let mut before = observed.before.iter().filter(|_| self.lag > 0);
         let Some(lagged) = before.find(is_lagged) else {
             return Ok(());

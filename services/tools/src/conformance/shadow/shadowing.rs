@@ -26,9 +26,8 @@ use super::{
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
 const BACKLOG: usize = 16;
-/// The maximum of waiting bytes for a refinement. A refinement cannot skip an item, and is
-/// restarted instead.
-const BACKLOG_BYTES: usize = 64 << 20;
+/// The same for a refinement, which cannot skip an item and is restarted instead.
+const BACKLOG_OF_REFINEMENT: usize = 128;
 /// The shortest time between two polls of the run: see [`gyre_stage::observer`].
 const REST: Duration = Duration::from_millis(10);
 /// The same interval while the shadow starts, because its listeners are not notified.
@@ -37,7 +36,6 @@ const STARTING: Duration = Duration::from_millis(5);
 const BACKOFF: Duration = Duration::from_secs(1);
 /// Ends in a row without a compared item after which it is not started again.
 const MAX_FAILURES: u64 = 3;
-const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
 
 pub(crate) struct Shadowing<'a> {
     options: &'a Options,
@@ -102,25 +100,16 @@ impl<'a> Shadowing<'a> {
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
     pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, Failure> {
-        let (began, mut reported) = (Instant::now(), Instant::now());
+        let began = Instant::now();
         loop {
             // Before the poll: the messages before the end are still in the queues.
             let has_ended = self.observation.has_ended();
             self.take(has_ended)?;
             self.attend()?;
             self.lines.drain(..).for_each(|line| observe(&line));
-            let counts = &self.record.counts;
-            if reported.elapsed() >= PROGRESS_PERIOD {
-                reported = Instant::now();
-                let (compared, identical) = (counts.compared, counts.identical);
-                let skipped = counts.skipped;
-                observe(&format!(
-                    "{compared} items compared, {identical} identical, {skipped} skipped"
-                ));
-            }
-            let limits = (self.options.duration, self.options.scans);
-            let is_over = limits.0.is_some_and(|limit| began.elapsed() >= limit);
-            let has_enough = limits.1.is_some_and(|scans| counts.compared >= scans);
+            let (limit, scans) = (self.options.duration, self.options.scans);
+            let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
+            let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
             if is_over || has_enough || self.is_done(has_ended) || self.sleep()? {
                 return self.finish();
             }
@@ -165,12 +154,11 @@ impl<'a> Shadowing<'a> {
 
     fn bound_backlog(&mut self) -> Result<(), StageError> {
         let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
-        let bytes = || self.backlog.iter().map(Observed::bytes).sum::<usize>();
-        let is_full = match starts_again {
-            true => bytes() > BACKLOG_BYTES,
-            false => self.backlog.len() > BACKLOG,
+        let limit = match starts_again {
+            true => BACKLOG_OF_REFINEMENT,
+            false => BACKLOG,
         };
-        if !is_full {
+        if self.backlog.len() <= limit {
             return Ok(());
         }
         let is_open = self.life.as_ref().is_some_and(|life| life.is_open);
@@ -194,15 +182,12 @@ impl<'a> Shadowing<'a> {
             return self.start();
         };
         let is_open = life.attend()?;
+        // Before its messages: those of a dead program are all there.
+        let death = life.harness.death();
         for sent in life.take()? {
             self.receive(sent)?;
         }
-        if let Some(death) = self.life.as_mut().and_then(|life| life.harness.death()) {
-            // Its last messages.
-            let last = self.life.as_ref().map(Life::take).transpose()?;
-            last.into_iter()
-                .flatten()
-                .try_for_each(|it| self.receive(it))?;
+        if let Some(death) = death {
             self.record.counts.deaths += 1;
             return Ok(self.fail(death.to_string())?);
         }

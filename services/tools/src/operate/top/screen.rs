@@ -61,10 +61,6 @@ pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     title[0] = title[0].clone().bold();
     frame.render_widget(Text::from(title), head);
     draw_latency(frame, snapshot, latency);
-    let rows = rows
-        .into_iter()
-        .map(|(row, style)| Line::styled(row, style));
-    let rows = Text::from(rows.collect::<Vec<_>>());
     let block = Block::bordered().title(" processes ");
     frame.render_widget(Paragraph::new(rows).block(block), table);
     frame.render_widget(Line::from(" q quit").dim(), foot);
@@ -87,12 +83,12 @@ fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
 /// Returns a snapshot as text of this width at most, as far as its columns can be left out.
 pub fn text(snapshot: &Snapshot, width: u16) -> String {
     let mut lines = head_lines(snapshot, width);
-    lines.extend(rows(snapshot, width).into_iter().map(|(row, _)| row));
+    lines.extend(rows(snapshot, width).iter().map(Line::to_string));
     lines.join("\n")
 }
 
 /// Returns the table of the processes, row by row.
-fn rows(snapshot: &Snapshot, width: u16) -> Vec<(String, Style)> {
+fn rows(snapshot: &Snapshot, width: u16) -> Vec<Line<'static>> {
     let shown = columns(width);
     let row = |cells: [String; COLUMNS.len()]| {
         let cell = |it: &usize| format!("{:width$}", cells[*it], width = COLUMNS[*it].1.into());
@@ -100,7 +96,7 @@ fn rows(snapshot: &Snapshot, width: u16) -> Vec<(String, Style)> {
         cells.join(" ").trim_end().to_owned()
     };
     let titles = row(COLUMNS.map(|(title, _)| title.to_owned()));
-    let mut rows = vec![(titles, Style::new().bold())];
+    let mut rows = vec![Line::from(titles).bold()];
     for (process, used) in snapshot.status.processes.iter().zip(&snapshot.processes) {
         let style = match process.activity {
             Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
@@ -108,7 +104,7 @@ fn rows(snapshot: &Snapshot, width: u16) -> Vec<(String, Style)> {
             _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
             _ => Style::new(),
         };
-        rows.push((row(cells(snapshot, process, used)), style));
+        rows.push(Line::styled(row(cells(snapshot, process, used)), style));
     }
     rows
 }

@@ -58,13 +58,8 @@ pub struct Snapshots<'run> {
     owed_since: Option<Instant>,
     has_new: bool,
     history: VecDeque<u64>,
-    earlier: Option<Earlier>,
-}
-
-struct Earlier {
-    at: Instant,
-    poses: u64,
-    usage: BTreeMap<u32, Usage>,
+    /// The time, the poses and the usage by process of the snapshot before.
+    earlier: Option<(Instant, u64, BTreeMap<u32, Usage>)>,
 }
 
 impl<'run> Snapshots<'run> {
@@ -131,20 +126,14 @@ impl<'run> Snapshots<'run> {
         let usage: BTreeMap<u32, Usage> = pids
             .filter_map(|pid| Some((pid, Usage::of(pid)?)))
             .collect();
-        let earlier = self.earlier.replace(Earlier {
-            at: now,
-            poses: status.poses,
-            usage: usage.clone(),
-        });
-        let elapsed = earlier.as_ref().map_or(Duration::ZERO, |it| now - it.at);
+        let current = (now, status.poses, usage.clone());
+        let earlier = self.earlier.replace(current.clone());
+        let (at, poses, before) = earlier.unwrap_or(current);
+        let elapsed = now - at;
         let per_s = |count: u64| count as f64 / elapsed.as_secs_f64().max(1e-9);
-        let rate = earlier.as_ref().map_or(0.0, |earlier| {
-            per_s(status.poses.saturating_sub(earlier.poses))
-        });
         let used = |pid: u32| {
             let now = usage.get(&pid).copied().unwrap_or_default();
-            let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
-            let before = before.unwrap_or(now);
+            let before = before.get(&pid).copied().unwrap_or(now);
             Use {
                 cpu: now.processor_share(&before, elapsed),
                 own_bytes: now.own_bytes,
@@ -152,7 +141,7 @@ impl<'run> Snapshots<'run> {
             }
         };
         Ok(Snapshot {
-            rate,
+            rate: per_s(status.poses.saturating_sub(poses)),
             in_flight,
             latency: meter.latency(),
             witnesses,

@@ -13,7 +13,6 @@ use gyre_messages::{Pose, PoseHeader};
 use gyre_run::Scenario;
 use gyre_stage::{
     StageError,
-    control::Control,
     observer::{ObservedRun, Observer},
     run::sweep,
 };
@@ -23,9 +22,12 @@ use gyre_terminal::Failure;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, TICK, drain};
-use crate::stress::{
-    TestedPipeline,
-    helper::{Work, spawn},
+use crate::{
+    operate::status_of,
+    stress::{
+        TestedPipeline,
+        helper::{Work, spawn},
+    },
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.
@@ -51,18 +53,15 @@ impl<'a> Running<'a> {
     pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, Failure> {
         let out = tested.run_out(&setup.name);
         let log = tested.run_out(&format!("{}.txt", setup.name));
-        let unusable =
-            |path: &Path, error: std::io::Error| format!("cannot use {}: {error}", path.display());
-        let runs = tested.out.join("runs");
-        create_folder(&runs).map_err(|error| unusable(&runs, error.source))?;
-        let output = File::create(&log).map_err(|error| unusable(&log, error))?;
-        let errors = output.try_clone().map_err(|error| unusable(&log, error))?;
+        create_folder(&tested.out.join("runs"))?;
+        let output = File::create(&log).map_err(StageError::file(&log))?;
+        let errors = output.try_clone().map_err(StageError::file(&log))?;
         // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));
         Ok(Self {
             setup,
-            process: spawn(&tested.program, &work, output.into(), errors.into())?,
+            process: spawn(&work, output.into(), errors.into())?,
             out,
             log,
             deadline: Instant::now() + START_LIMIT,
@@ -99,29 +98,16 @@ impl<'a> Running<'a> {
     }
 
     pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
-        loop {
-            // A supervisor of the same results may still be there, if an earlier run was killed.
-            if self.is_supervised_by_its_process()
-                && let Ok(run) = ObservedRun::writing_to(&self.out)
-            {
-                match run.observe::<Pose>().map(drop) {
-                    Ok(()) => return Ok(run),
-                    Err(StageError::NoPlace { observers: 0, .. }) => {
-                        return Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into());
-                    }
-                    Err(error @ StageError::NoPlace { .. }) => return Err(error.into()),
-                    // Its topics are not there yet.
-                    Err(_) => {}
-                }
-            }
+        // A supervisor of the same results may still be there, if an earlier run was killed.
+        while status_of(&self.out, self.pid()).is_none() {
             self.require_life()?;
             thread::sleep(POLL_PERIOD);
         }
-    }
-
-    fn is_supervised_by_its_process(&self) -> bool {
-        let status = Control::of(&self.out).and_then(|run| run.status());
-        status.is_ok_and(|status| status.pid == self.pid())
+        let run = ObservedRun::writing_to(&self.out)?;
+        match run.manifest().window.observers {
+            0 => Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into()),
+            _ => Ok(run),
+        }
     }
 
     fn require_life(&mut self) -> Result<(), Failure> {

@@ -174,6 +174,7 @@ mod tests {
             stage: "masking",
             at_s: 1.5,
             recovery_ms: Some(40.0),
+            ended: None,
         };
         let checks = measured
             .iter()

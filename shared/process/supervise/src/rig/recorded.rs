@@ -1,13 +1,15 @@
 //! A message as a value.
 
 use gyre_messages::{Item, Message};
-use gyre_stage::{StageError, source::RecordedMessage};
+use gyre_stage::{StageError, writer::TopicWriter};
+
+use super::Tap;
 
 /// A message outside of shared memory, of any topic of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
     /// The bytes of the header, which starts with an [`Item`].
-    pub(super) header: Vec<u8>,
+    pub header: Vec<u8>,
     pub payload: Vec<u8>,
     /// Time of receipt, `CLOCK_MONOTONIC`, ns; 0 for a synthetic message.
     pub received_ns: i64,
@@ -22,13 +24,18 @@ impl Recorded {
         }
     }
 
-    /// Creates a message of these bytes, whose header starts with an [`Item`].
-    pub fn from_bytes(message: RecordedMessage) -> Self {
-        Self {
-            header: message.header,
-            payload: message.payload,
-            received_ns: 0,
-        }
+    /// Receives the next message; `None` if there is no message yet.
+    pub fn receive(tap: &Tap) -> Result<Option<Self>, StageError> {
+        Ok(tap.receive()?.map(|received| Self {
+            header: received.header_bytes().to_vec(),
+            payload: received.values::<u8>().to_vec(),
+            received_ns: received.received_ns,
+        }))
+    }
+
+    /// Sends it as it is, with its time stamps, and notifies the readers.
+    pub fn send(&self, feed: &TopicWriter) -> Result<(), StageError> {
+        feed.send_unchanged(&self.header, &self.payload)
     }
 
     pub fn header<M: Message>(&self) -> Result<M::Header, StageError> {
@@ -44,10 +51,6 @@ impl Recorded {
     #[must_use]
     pub fn with<M: Message>(&self, header: &M::Header) -> Self {
         Self::of::<M>(header, &self.payload, self.received_ns)
-    }
-
-    pub fn header_bytes(&self) -> &[u8] {
-        &self.header
     }
 
     pub fn item(&self) -> Item {
