@@ -9,7 +9,7 @@ use gyre_estimation::places::{
 };
 use gyre_estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
-use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
 use thiserror::Error;
 
 use crate::place::Place;
@@ -68,7 +68,7 @@ impl LoopCloser {
         submap_reach_m: f64,
         refinement: &RefinementConfig,
         capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, SettingError> {
         let submap = || Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1));
         Ok(Self {
             describer: Describer::new(),

@@ -5,7 +5,7 @@ use super::{
     DeskewedPoints, RefinementConfig, Submap, alignment::align, local_map::LocalMap,
     registration::COARSE_STRIDE, uncertainty,
 };
-use crate::ConfigError;
+use crate::SettingError;
 
 /// Initial guesses come from a search on coarse cells, so more iterations are allowed than from
 /// scan to scan.
@@ -26,7 +26,7 @@ pub struct KeyframeAligner {
 impl KeyframeAligner {
     /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and
     /// reach of the map, and the scales of the covariance.
-    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         let config = RefinementConfig {
             keyframes: 1,
             ..config.clone()

@@ -2,7 +2,7 @@ use std::f64::consts::PI;
 
 use gyre_estimation::places::{Candidate, Describer, Descriptor};
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
-use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
 use nalgebra::{Matrix3, Point2};
 
 use crate::localisation::{Map, registration::Registration};
@@ -101,7 +101,7 @@ impl Localiser {
         map: Map,
         refinement: &RefinementConfig,
         capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, SettingError> {
         Ok(Self {
             registration: Registration::new(refinement, capacity)?,
             describer: Describer::new(),

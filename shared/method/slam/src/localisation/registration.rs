@@ -1,6 +1,6 @@
 use gyre_estimation::places::Registrar;
 use gyre_geometry::{Pose, UncertainMotion};
-use gyre_scan_matching::{ConfigError, MotionMatch, RefinementConfig, Submap};
+use gyre_scan_matching::{MotionMatch, RefinementConfig, SettingError, Submap};
 
 use crate::localisation::sight::Sight;
 
@@ -15,7 +15,7 @@ pub(crate) struct Registration {
 }
 
 impl Registration {
-    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         Ok(Self {
             registrar: Registrar::new(refinement, capacity)?,
             sight: Sight::new(Registrar::CELLS),
