@@ -39,8 +39,6 @@ pub struct RasterFacts {
     pub cell_m: f32,
     pub sampling: Option<Sampling>,
     pub min_range_m: Option<f32>,
-    /// Width of the average of [`Sampling::Averaged`], in cells.
-    pub averaged_cells: Option<f32>,
 }
 
 /// The section `[masking]` of a card: the processing of a raster before the network.
@@ -127,8 +125,6 @@ impl Card {
         raster: &RasterConfig,
     ) -> Vec<String> {
         let (trained, trained_mask) = (&self.raster, &self.masking);
-        let averaged_cells = trained.averaged_cells;
-        let averaged_cells = averaged_cells.filter(|_| raster.sampling == Sampling::Averaged);
         let differences = [
             mismatch("masking.threshold", trained_mask.floor, masking.floor()),
             mismatch(
@@ -147,11 +143,6 @@ impl Card {
                 raster.min_range_m,
             ),
             mismatch("raster.sampling", trained.sampling, raster.sampling),
-            mismatch(
-                "raster.averaged_cells",
-                averaged_cells,
-                raster.averaged_cells,
-            ),
         ];
         differences.into_iter().flatten().collect()
     }

@@ -153,11 +153,7 @@ fn settings_out_of_bounds_and_unknown_ones_are_rejected_by_name() {
     assert_eq!(read("cell_m", 0.4).unwrap(), expected);
     let unknown = read("cel_m", 0.4).unwrap_err();
     assert!(unknown.to_string().contains("cel_m"));
-    let wrong = [
-        ("cell_m", f32::NAN),
-        ("min_range_m", -1.0),
-        ("averaged_cells", 0.0),
-    ];
+    let wrong = [("cell_m", f32::NAN), ("min_range_m", -1.0)];
     let none = RasterConfig { n: 0, ..expected };
     let wrong = wrong.map(|(key, value)| (key, read(key, value).unwrap()));
     for (key, config) in wrong.into_iter().chain([("n", none)]) {
