@@ -95,7 +95,6 @@ struct JointPeak {
 impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
     pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, SettingError> {
-        config.validate()?;
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
         let size = fast_size(Scores::min_size(n, reach));
         let energy = || OverlapEnergy::new(n, Scores::around(reach));

@@ -1,9 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use gyre_samples::{SettingError, check, check_bounds};
-
-use crate::config::{METRES, Overlap, Peak};
+use crate::config::{Overlap, Peak};
 
 /// Configuration of [`ExhaustiveSearch`](crate::ExhaustiveSearch): section `[exhaustive]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,15 +37,6 @@ impl Default for ExhaustiveConfig {
 }
 
 impl ExhaustiveConfig {
-    pub fn validate(&self) -> Result<(), SettingError> {
-        let angles = [f64::MIN_POSITIVE, 180_f64.next_down()];
-        check_bounds! { self, "exhaustive":
-            reach_deg in (angles, "above 0, below 180"),
-            step_deg in ([0.01, self.reach_deg], "0.01 to reach_deg"),
-        }
-        check("exhaustive", "reach_m", self.reach_m, METRES)
-    }
-
     pub fn candidates(&self) -> usize {
         self.angles().count
     }
@@ -98,7 +87,6 @@ impl AngleGrid {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
@@ -110,18 +98,5 @@ mod tests {
         );
         assert!(!grid.is_inner(0) && grid.is_inner(1) && !grid.is_inner(30));
         assert_eq!((grid.beside(30, 2), grid.beside(0, -1)), (30, 0));
-    }
-
-    #[test]
-    fn impossible_values_name_their_key() {
-        let refused = |change: fn(&mut ExhaustiveConfig)| {
-            let mut config = ExhaustiveConfig::default();
-            change(&mut config);
-            config.validate().unwrap_err().to_string()
-        };
-        assert!(refused(|c| c.reach_deg = 180.0).starts_with("exhaustive.reach_deg is 180"));
-        assert!(refused(|c| c.step_deg = f64::NAN).contains("step_deg"));
-        assert!(refused(|c| c.step_deg = 16.0).contains("step_deg"));
-        assert!(refused(|c| c.reach_m = 0.0).contains("reach_m"));
     }
 }
