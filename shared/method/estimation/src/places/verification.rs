@@ -86,7 +86,7 @@ impl LoopVerifier {
         if best.score < MIN_CORRELATION - COARSE_LOSS {
             return found;
         }
-        match registrar.aligner.align(later, earlier, &searched) {
+        match registrar.aligner.align(later, earlier, false, &searched) {
             Some(motion) => {
                 found.motion = motion;
                 found.correlation = registrar.correlation(&motion.motion, None);
