@@ -35,28 +35,15 @@ impl PolarScan<'_> {
             let bins = geometry.bins as f64;
             check_number("row stride in bytes", geometry.stride as f64, bins..=1e9)?;
         }
-        check_number(
-            "range resolution in metres",
-            geometry.range_resolution_m.into(),
-            1e-3..=1e3,
-        )?;
-        check_number(
-            "range offset in metres",
-            geometry.range_offset_m.into(),
-            -1e4..=1e4,
-        )?;
-        check_number(
-            "Doppler shift in seconds",
-            geometry.doppler_s.into(),
-            -1.0..=1.0,
-        )?;
-        match self.azimuth_rad[..geometry.azimuths]
-            .iter()
-            .position(|azimuth| !azimuth.is_finite())
-        {
-            Some(index) => Err(ScanError(format!(
-                "azimuth {index} of the scan is at {} rad",
-                self.azimuth_rad[index]
+        let resolution_m = geometry.range_resolution_m.into();
+        let (offset_m, doppler_s) = (geometry.range_offset_m.into(), geometry.doppler_s.into());
+        check_number("range resolution in metres", resolution_m, 1e-3..=1e3)?;
+        check_number("range offset in metres", offset_m, -1e4..=1e4)?;
+        check_number("Doppler shift in seconds", doppler_s, -1.0..=1.0)?;
+        let mut azimuths = self.azimuth_rad[..geometry.azimuths].iter().enumerate();
+        match azimuths.find(|(_, azimuth)| !azimuth.is_finite()) {
+            Some((index, azimuth)) => Err(ScanError(format!(
+                "azimuth {index} of the scan is at {azimuth} rad"
             ))),
             None => Ok(()),
         }
