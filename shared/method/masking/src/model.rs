@@ -175,7 +175,7 @@ impl Model {
             None => gyre_storage::read_bytes(&file, MAX_BYTES)
                 .map_err(|error| format!("cannot read the model's file {shown}: {error}"))?,
         };
-        let (expected, actual) = (&card.model.sha256, hexadecimal(&Sha256::digest(&bytes)));
+        let (expected, actual) = (&card.model.sha256, format!("{:x}", Sha256::digest(&bytes)));
         if !actual.eq_ignore_ascii_case(expected) {
             return Err(format!(
                 "{shown} has the SHA-256 {actual}, but its card has {expected}: it is damaged or belongs to a different model, so get it again together with its card"
@@ -214,10 +214,6 @@ fn check_raster(path: &Path, trained: &RasterFacts, raster: &RasterConfig) -> Re
 fn names_a_file(model: &[u8]) -> bool {
     let mut texts = model.windows(9);
     texts.any(|text| matches!(text[0], 0 | 8) && text.ends_with(b"location"))
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

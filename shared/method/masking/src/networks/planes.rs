@@ -87,8 +87,9 @@ impl PlanesNetwork {
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];
-        let take = |given: &[usize], values: Cow<'_, [f32]>| (given.to_vec(), values.into_owned());
-        let computed = self.engine.compute(shape, planes, take);
+        let computed = self.engine.compute(shape, planes, |given, values| {
+            (given.to_vec(), values.into_owned())
+        });
         let (given, values) = computed.map_err(|reason| failed(self.name, reason))?;
         match given.strip_prefix(&[1]) == Some(&self.given) {
             true => Ok(values),
