@@ -95,7 +95,7 @@ class Rasteriser:
         self.n, self.cell_m = raster["n"], raster["cell_m"]
         self.min_range_m = raster["min_range_m"]
         averages = raster["sampling"] == "averaged"
-        self.window_m = self.cell_m * raster["averaged_cells"] if averages else 0.0
+        self.window_m = self.cell_m if averages else 0.0
         offset_m = (0.5 * (self.n - 1) - np.arange(self.n)) * self.cell_m
         self.x_m, self.y_m = np.meshgrid(offset_m, offset_m, indexing="ij")
         self.max_range_m = 0.5 * (self.n - 1) * self.cell_m * math.sqrt(2.0)

@@ -226,7 +226,7 @@ fn replace(image: &Path, bytes: &[u8]) {
 
 pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
     prepared(name, |recording| {
-        write_dataset(config, recording, &mut |_, _| ()).unwrap();
+        write_dataset(config, recording, None, &mut |_, _| ()).unwrap();
     })
 }
 

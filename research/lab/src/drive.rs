@@ -1,6 +1,6 @@
 //! The keyframes of a run, with their points and true poses.
 
-use std::{convert::Infallible, path::Path};
+use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
@@ -8,7 +8,7 @@ use gyre_estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_scan_matching::{RefinementConfig, Submap};
-use gyre_slam::{Keyframe, KeyframeSource, RecordReader};
+use gyre_slam::{Keyframe, RecordReader};
 use gyre_terminal::Failure;
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
@@ -88,13 +88,5 @@ impl Drive {
                 &middle.pose.motion.inv_mul(&other.pose.motion),
             );
         }
-    }
-}
-
-impl KeyframeSource for &Drive {
-    type Error = Infallible;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
-        Ok(self.keyframes[index].clone())
     }
 }

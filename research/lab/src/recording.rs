@@ -116,10 +116,21 @@ impl Track {
     /// Returns the pose at a time, in the trajectory's own frame; `None` before the first, after
     /// the last, and in gaps.
     pub fn pose(&self, stamp_ns: i64) -> Option<Pose> {
-        let gap_ns = self.trajectory.gap_ns(stamp_ns);
+        let gap_ns = gap_ns(&self.trajectory, stamp_ns);
         let pose = self.trajectory.near(stamp_ns, Trajectory::ROUNDING_NS);
         pose.filter(|_| gap_ns.is_none_or(|gap_ns| gap_ns <= self.max_gap_ns))
     }
+}
+
+/// Time between the poses around a time, ns: 0 at a pose, `None` outside the time span.
+fn gap_ns(trajectory: &Trajectory, stamp_ns: i64) -> Option<u64> {
+    let stamps = trajectory.stamp_ns.as_ref()?;
+    let after = stamps.partition_point(|s| *s < stamp_ns);
+    let to = *stamps.get(after)?;
+    if to == stamp_ns {
+        return Some(0);
+    }
+    Some(to.abs_diff(stamps[after.checked_sub(1)?]))
 }
 
 /// Returns the last name of a path; `recordings/.` and the like have one only once they are

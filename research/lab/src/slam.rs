@@ -4,7 +4,7 @@
 mod figures;
 mod wrong;
 
-use std::{path::PathBuf, process::ExitCode, time::Instant};
+use std::{convert::Infallible, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
 use gyre_estimation::Constraint;
@@ -76,13 +76,14 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
 /// Closes all loops.
 fn queries(drive: &Drive) -> Result<Vec<Query>, Failure> {
     let mut closer = LoopCloser::new(SUBMAP_REACH_M, &drive.refinement, drive.capacity)?;
-    let (mut source, mut queries) = (drive, Vec::new());
+    let mut read = |index: usize| Ok::<_, Infallible>(drive.keyframes[index].clone());
+    let mut queries = Vec::new();
     for keyframe in &drive.keyframes {
         closer.push(keyframe)?;
     }
     closer.finish();
-    while closer.describe(&mut source)?.is_some() {}
-    while let Some(query) = closer.close(&mut source)? {
+    while closer.describe(&mut read)?.is_some() {}
+    while let Some(query) = closer.close(&mut read)? {
         queries.push(query);
     }
     Ok(queries)

@@ -10,8 +10,7 @@ use gyre_messages::{Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeSource, LoopCloser, Place, Query, RecordLog, RecordReader,
-    SlamConfig,
+    ClosingError, Keyframe, LoopCloser, Place, Query, RecordLog, RecordReader, SlamConfig,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -166,12 +165,12 @@ impl LoopClosing {
     }
 
     fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
-        let mut source = Points(&mut self.keyframes);
-        if let Some(place) = self.closer.describe(&mut source).map_err(failed)? {
+        let mut read = |index: usize| self.keyframes.read(index).map_err(StageError::from);
+        if let Some(place) = self.closer.describe(&mut read).map_err(failed)? {
             self.places.append(&place)?;
             return Ok(Step::Worked(None));
         }
-        if let Some(query) = self.closer.close(&mut source).map_err(failed)? {
+        if let Some(query) = self.closer.close(&mut read).map_err(failed)? {
             self.queries.append(&query)?;
             self.growth.notify()?;
             self.note(&query)?;
@@ -195,16 +194,6 @@ impl LoopClosing {
             self.pending.push_back(header);
         }
         Ok(())
-    }
-}
-
-struct Points<'a>(&'a mut RecordReader<Keyframe>);
-
-impl KeyframeSource for Points<'_> {
-    type Error = StageError;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, StageError> {
-        Ok(self.0.read(index)?)
     }
 }
 

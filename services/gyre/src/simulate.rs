@@ -1,13 +1,10 @@
 //! `gyre simulate`: writes a simulated recording.
 
-use std::{
-    io::IsTerminal, num::NonZeroUsize, path::Path, process::ExitCode,
-    thread::available_parallelism, time::Instant,
-};
+use std::{io::IsTerminal, num::NonZeroUsize, path::Path, process::ExitCode, time::Instant};
 
 use gyre_configuration::{Configuration, strict::path_value};
 use gyre_results::Content;
-use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
+use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -21,12 +18,8 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
         None => Configuration::of_overrides(&overrides)?,
     };
     let started = Instant::now();
-    let threads = arguments
-        .threads
-        .or(available_parallelism().ok())
-        .unwrap_or(NonZeroUsize::MIN);
     let summary = write(
-        threads,
+        arguments.threads,
         &configuration.simulation.unwrap_or_default(),
         &arguments.out,
     )?;
@@ -66,13 +59,12 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
 
 /// If `replace`, it replaces the recording of an earlier run.
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
-    let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    match write(threads, simulation, out) {
+    match write(None, simulation, out) {
         Err(SimulatorError::OtherFiles(_)) if replace => {
             remove_dataset(out).map_err(|error| {
                 format!("cannot replace the recording of an earlier run: {error}, which is another --out")
             })?;
-            write(threads, simulation, out)?;
+            write(None, simulation, out)?;
         }
         result => {
             result?;
@@ -82,7 +74,7 @@ pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result
 }
 
 fn write(
-    threads: NonZeroUsize,
+    threads: Option<NonZeroUsize>,
     simulation: &SimulationConfig,
     out: &Path,
 ) -> Result<Summary, SimulatorError> {
@@ -95,7 +87,7 @@ fn write(
     ) {
         bar.set_style(style);
     }
-    let summary = write_dataset_on(threads, simulation, out, &mut |done, total| {
+    let summary = write_dataset(simulation, out, threads, &mut |done, total| {
         if bar.length() != Some(total as u64) {
             bar.set_length(total as u64);
             // Existing scans do not count for the rate.

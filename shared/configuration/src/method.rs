@@ -53,8 +53,8 @@ macro_rules! sections {
 
 impl MethodConfig {
     sections! {
-        checked: raster points masking rotation translation exhaustive refinement gyro wheels doppler;
-        unchecked: search;
+        checked: raster points masking rotation translation refinement gyro wheels doppler;
+        unchecked: search exhaustive;
         others: dataset slam gnss objects
     }
 

@@ -110,7 +110,6 @@ impl SimulationConfig {
             ("drive.block_m", drive.block_m[1], 30.0, 400.0),
             ("drive.speed_mps", drive.speed_mps, 0.5, 40.0),
             ("drive.from_s", drive.from_s, 0.0, 1e6),
-            ("drive.for_s", drive.for_s.unwrap_or(1.0), 1.0, 1e6),
             ("sensor.bins", bins, 16.0, 20_000.0),
             ("sensor.bin_m", sampling.range_resolution_m, 0.01, 5.0),
             ("sensor.azimuths", azimuths, 60.0, 4000.0),

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
-use crate::path::recorded::{self, Excerpt};
+use crate::path::recorded;
 use crate::path::{BlockLoop, Path};
 
 /// Lateral acceleration in the bends of a block, metres a second squared, which limits the speed.
@@ -23,9 +23,6 @@ pub struct DriveConfig {
     pub file: Option<PathBuf>,
     /// Start in the file, seconds after its first pose.
     pub from_s: f64,
-    /// Maximum duration of the drive along the file, seconds. Default: to the end.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub for_s: Option<f64>,
 }
 
 impl Default for DriveConfig {
@@ -35,7 +32,6 @@ impl Default for DriveConfig {
             speed_mps: 9.5,
             file: None,
             from_s: 0.0,
-            for_s: None,
         }
     }
 }
@@ -48,11 +44,6 @@ impl DriveConfig {
             let block = BlockLoop::new(length_m, width_m, self.speed_mps, LATERAL_MPS2);
             return Ok(Box::new(block));
         };
-        let excerpt = Excerpt {
-            from_s: self.from_s,
-            for_s: self.for_s.unwrap_or(f64::INFINITY),
-            rate_hz,
-        };
-        Ok(Box::new(recorded::read(file, excerpt)?))
+        Ok(Box::new(recorded::read(file, self.from_s, rate_hz)?))
     }
 }

@@ -44,4 +44,4 @@ pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::Simulator;
 pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
-pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};
+pub use writer::{Summary, remove_dataset, write_dataset};

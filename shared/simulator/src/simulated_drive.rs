@@ -166,10 +166,7 @@ impl SimulatedDrive {
     /// Returns the azimuths of a scan that the host loses, in order: see
     /// [`SensorConfig::lost_azimuths`](crate::SensorConfig::lost_azimuths).
     pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
-        match self.output {
-            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, index),
-            OutputFormat::Oxford | OutputFormat::Boreas => Vec::new(),
-        }
+        radiate::lost_azimuths(&self.simulator, index)
     }
 
     pub fn renderer(&self) -> Renderer {

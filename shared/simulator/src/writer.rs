@@ -8,6 +8,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
+use std::thread::available_parallelism;
 
 use gyre_datasets::ImageSource as _;
 use gyre_storage::StorageError;
@@ -30,27 +31,14 @@ pub struct Summary {
     pub duration_s: f64,
 }
 
+/// Writes the dataset of `config` to the folder `out` on `threads` threads, by
+/// default one for each processor, and calls `progress(done, total)` for each image. The files do not depend on the number of threads. Images
+/// of an earlier call with the same configuration are kept; the first and the last of them are
+/// compared with newly rendered ones.
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,
-    progress: &mut dyn FnMut(usize, usize),
-) -> Result<Summary, SimulatorError> {
-    write_dataset_on(
-        std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
-        config,
-        out,
-        progress,
-    )
-}
-
-/// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls
-/// `progress(done, total)` for each image. The files do not depend on the number of threads. Images
-/// of an earlier call with the same configuration are kept; the first and the last of them are
-/// compared with newly rendered ones.
-pub fn write_dataset_on(
-    threads: NonZeroUsize,
-    config: &SimulationConfig,
-    out: &Path,
+    threads: Option<NonZeroUsize>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Summary, SimulatorError> {
     let drive = SimulatedDrive::new(config)?;
@@ -65,7 +53,9 @@ pub fn write_dataset_on(
     let kept = drive.scans() - missing.len();
     progress(kept, drive.scans());
     let mut written = |done| progress(kept + done, drive.scans());
-    write_images(&drive, &missing, threads.get(), &images, &mut written)?;
+    let threads = threads.or(available_parallelism().ok());
+    let threads = threads.map_or(1, NonZeroUsize::get);
+    write_images(&drive, &missing, threads, &images, &mut written)?;
     Ok(summary(&drive, kept))
 }
 

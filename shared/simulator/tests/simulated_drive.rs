@@ -34,7 +34,7 @@ fn config(format: OutputFormat, scans: usize) -> SimulationConfig {
 }
 
 fn write(config: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
-    write_dataset(config, out, &mut |_, _| {})
+    write_dataset(config, out, None, &mut |_, _| {})
 }
 
 fn written(config: &SimulationConfig) -> tempfile::TempDir {
@@ -190,7 +190,7 @@ fn an_interrupted_dataset_is_completed() {
     fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
     let untouched = fs::metadata(&images[1]).unwrap().modified().unwrap();
     let mut seen = Vec::new();
-    let summary = write_dataset(&config, cut.path(), &mut |done, total| {
+    let summary = write_dataset(&config, cut.path(), None, &mut |done, total| {
         seen.push((done, total))
     })
     .unwrap();

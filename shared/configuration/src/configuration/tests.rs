@@ -62,11 +62,11 @@ raster.cell_m=wide | [raster]: cell_m is "wide", but must be a number
 points.capacity=70000 | points.capacity
 points.capacity=0 | points.capacity is 0 | 1 or more
 refinement.kind=global-map | global-map | local-map
-refinement.keyframes=0 | refinement.keyframes = 0 | 1 to 64
-refinement.cell_m=-0.4 | refinement.cell_m = -0.4 | 0.05 to 10
-refinement.reach_m=1.0 | refinement.reach_m = 1 | 8 to 1000 cells
-refinement.min_overlap=1.5 | refinement.min_overlap = 1.5 | 0 to 1
-refinement.variance_scale=nan | refinement.variance_scale = NaN | positive
+refinement.keyframes=0 | refinement.keyframes is 0 | 1 to 64
+refinement.cell_m=-0.4 | refinement.cell_m is -0.4 | 0.05 to 10
+refinement.reach_m=1.0 | refinement.reach_m is 1 | 8 to 1000 cells
+refinement.min_overlap=1.5 | refinement.min_overlap is 1.5 | 0 to 1
+refinement.variance_scale=nan | refinement.variance_scale is NaN | positive
 masking.kind=magic | magic | threshold
 masking.lag=0 | lag
 masking.lag=99 | masking.lag is 99 | 16

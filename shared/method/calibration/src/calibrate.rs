@@ -1,6 +1,6 @@
 //! The method on one page.
 
-use gyre_scan_matching::ConfigError;
+use gyre_scan_matching::SettingError;
 use nalgebra::DVector;
 
 use crate::{
@@ -216,11 +216,11 @@ fn drift_of(
     drive: &Drive,
     at: &Track,
     revisits: &[Revisit],
-) -> Result<Option<Estimate>, ConfigError> {
+) -> Result<Option<Estimate>, SettingError> {
     if revisits.len() < MIN_REVISITS {
         return Ok(None);
     }
-    let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
+    let shifted = |by_rad: f64| -> Result<DVector<f64>, SettingError> {
         let mut shifted = at.change;
         shifted[Fact::Eccentricity as usize] += by_rad;
         let track = drive.mean_track_with(&shifted)?;

@@ -7,7 +7,7 @@ use gyre_radar::{
     OwnedScan, PointExtractor, PolarScan, Sense,
     scan::{ScanError, flag},
 };
-use gyre_scan_matching::{ConfigError, Refiner};
+use gyre_scan_matching::{Refiner, SettingError};
 
 use crate::{
     FactVector, OwnReflections,
@@ -149,19 +149,19 @@ impl Drive {
             .collect()
     }
 
-    pub fn mean_track(&self) -> Result<Track, ConfigError> {
+    pub fn mean_track(&self) -> Result<Track, SettingError> {
         self.mean_track_with(&FactVector::zeros())
     }
 
     /// Returns the mean of the tracks in both directions of time under changed facts: errors of the
     /// processing that depend on the direction cancel.
-    pub(crate) fn mean_track_with(&self, change: &FactVector) -> Result<Track, ConfigError> {
+    pub(crate) fn mean_track_with(&self, change: &FactVector) -> Result<Track, SettingError> {
         let [forward, reversed] = [false, true].map(|reversed| self.track(change, reversed));
         Ok(forward?.mean(&reversed?, self))
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.
-    fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
+    fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, SettingError> {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
         let mut motions = vec![UncertainMotion::identity(); count];

@@ -1,6 +1,6 @@
 use std::convert::Infallible;
 
-use gyre_scan_matching::ConfigError;
+use gyre_scan_matching::SettingError;
 use gyre_slam::ClosingError;
 use thiserror::Error;
 
@@ -11,5 +11,5 @@ pub enum CalibrationError {
     #[error("revisits cannot be found: {0}")]
     Revisits(#[from] ClosingError<Infallible>),
     #[error(transparent)]
-    Refinement(#[from] ConfigError),
+    Refinement(#[from] SettingError),
 }

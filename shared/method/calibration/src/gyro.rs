@@ -110,8 +110,7 @@ pub(crate) fn calibrate_turns(
     match delay_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
         true => Ok(found),
         false => Err(ClockError(format!(
-            "the offset of the clocks is {:.2} \u{b1} {:.2} s and the scale {:.2} \u{b1} {:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
-            delay_s.value, delay_s.sigma, scale.value, scale.sigma
+            "the offset of the clocks is {delay_s:.2} s and the scale {scale:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
         ))),
     }
 }

@@ -38,6 +38,8 @@ pub use section::toml;
 pub use study::Study;
 pub use wheels::{WheelCalibration, calibrate_wheels};
 
+use std::fmt;
+
 use nalgebra::SVector;
 
 /// A configured value that is off by so many standard deviations is wrong.
@@ -60,6 +62,10 @@ impl Estimate {
     /// Returns the estimate with an independent error added, of this standard deviation.
     pub(crate) fn with_error(self, sigma: f64) -> Self {
         Self::new(self.value, self.sigma.hypot(sigma))
+    }
+
+    pub(crate) fn times(self, factor: f64) -> Self {
+        Self::new(self.value * factor, self.sigma * factor)
     }
 
     pub(crate) fn contradicts(&self, configured: f64) -> bool {
@@ -87,6 +93,14 @@ impl Estimate {
             value: (own * self.value + others * other.value) / (own + others),
             sigma: (own + others).powf(-0.5) * apart.max(1.0),
         }
+    }
+}
+
+/// Both with the digits that are asked for, or four.
+impl fmt::Display for Estimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = f.precision().unwrap_or(4);
+        write!(f, "{:.digits$} \u{b1} {:.digits$}", self.value, self.sigma)
     }
 }
 

@@ -77,8 +77,7 @@ fn calibrate_distances(
             distances: fit.turns,
         }),
         false => Err(ClockError(format!(
-            "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
-            delay_s.value, delay_s.sigma
+            "the offset of the clocks is {delay_s:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
         ))),
     }
 }
@@ -128,10 +127,7 @@ impl WheelCalibration {
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
             let verdict = found.verdict(configured.is_used().then_some(value));
-            format!(
-                "{name:<21} {:.4} \u{b1} {:.4}{unit}{verdict}",
-                found.value, found.sigma
-            )
+            format!("{name:<21} {found}{unit}{verdict}")
         };
         let (late, scale) = (&self.delay_s, &self.scale);
         [

@@ -69,11 +69,7 @@ impl Constraint {
                  keyframe, {last}, to the next one"
             ),
             Kind::Loop { .. } if from.max(to) > last => {
-                return Err(EstimationError::UnknownKeyframe {
-                    from,
-                    to,
-                    keyframes,
-                });
+                return Err(EstimationError::unknown([from, to], keyframes));
             }
             _ if !is_finite => {
                 format!("the motion measured from keyframe {from} to {to} is not finite")
@@ -116,7 +112,7 @@ pub(crate) fn keyframe_exists(keyframe: usize, keyframes: usize) -> Result<(), E
 
 /// Returns the squared length of `residual` normalised by `covariance`; infinite if the covariance
 /// is not positive definite.
-pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+pub fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance.cholesky().map_or(f64::INFINITY, |factor| {
         residual.dot(&factor.solve(residual))
     })

@@ -5,15 +5,6 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EstimationError {
-    #[error(
-        "the constraint from keyframe {from} to {to} names a keyframe that has not been added: there are {keyframes}, counted \
-         from 0. Add odometry constraints in the order of the keyframes, and loops after both of their keyframes"
-    )]
-    UnknownKeyframe {
-        from: usize,
-        to: usize,
-        keyframes: usize,
-    },
     /// A constraint or a position that no estimator can take, or a keyframe that is not there, with
     /// the reason.
     #[error("{0}")]
@@ -30,4 +21,13 @@ pub enum EstimationError {
     Singular,
     #[error("there is not enough memory for the equations of {keyframes} keyframes")]
     Memory { keyframes: usize },
+}
+
+impl EstimationError {
+    pub fn unknown([from, to]: [usize; 2], keyframes: usize) -> Self {
+        Self::Refused(format!(
+            "the constraint from keyframe {from} to {to} names a keyframe that has not been added: there are {keyframes}, counted \
+             from 0. Add odometry constraints in the order of the keyframes, and loops after both of their keyframes"
+        ))
+    }
 }

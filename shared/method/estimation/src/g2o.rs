@@ -2,10 +2,7 @@
 //!
 //! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an
 //! information matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance.
-//! The first edge from each keyframe to the next one is read as odometry, all others as independent
-//! loops.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use gyre_geometry::covariance::{pack, unpack};
@@ -15,10 +12,10 @@ use thiserror::Error;
 
 use crate::Constraint;
 
-/// The content of a g2o file. Keyframes are the vertices in the order of their ids.
+/// The content of a g2o file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct G2o {
-    /// The vertices: the poses of all keyframes. Empty if the file has edges alone.
+    /// The vertices: the poses of all keyframes.
     pub poses: Vec<Pose>,
     /// The edges: odometry in the order of the keyframes, then loops in the order of the file.
     pub constraints: Vec<Constraint>,
@@ -29,32 +26,67 @@ pub struct G2o {
 #[error("{0}")]
 pub struct G2oError(String);
 
-impl G2oError {
-    fn at(line: usize, reason: impl std::fmt::Display) -> Self {
-        Self(format!("line {line}: {reason}"))
-    }
-}
-
-struct RawEdge {
-    line: usize,
-    ends: [u64; 2],
-    motion: UncertainMotion,
-}
-
-#[derive(Default)]
-struct Raw {
-    vertices: BTreeMap<u64, Pose>,
-    edges: Vec<RawEdge>,
-    fixed: Vec<(usize, u64)>,
-}
-
 impl G2o {
+    /// Reads a file with the vertices in the order of their ids, from 0, and edges after them. The
+    /// first edge from each keyframe to the next one is odometry; all others are independent loops.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
-        let mut raw = Raw::default();
-        for (number, line) in text.lines().enumerate() {
-            raw.read(number + 1, line)?;
+        let (mut poses, mut odometry, mut loops) = (Vec::new(), Vec::new(), Vec::new());
+        for (line, text) in (1..).zip(text.lines()) {
+            let at = |reason: String| G2oError(format!("line {line}: {reason}"));
+            let mut words = text.split_whitespace();
+            match words.next() {
+                None | Some("FIX") => {}
+                Some("VERTEX_SE2") => {
+                    let needed = "VERTEX_SE2 needs an id, x, y and yaw";
+                    let ([id], [x, y, yaw]) = fields(words, needed).map_err(at)?;
+                    if id != poses.len() {
+                        let next = poses.len();
+                        return Err(at(format!("vertex {id} is in the place of vertex {next}")));
+                    }
+                    poses.push(pose(x, y, yaw));
+                }
+                Some("EDGE_SE2") => {
+                    let needed = "EDGE_SE2 needs two ids, x, y, yaw and the six values of the upper triangle of the information matrix";
+                    let ([from, to], [x, y, yaw, information @ ..]) =
+                        fields::<2, 9>(words, needed).map_err(at)?;
+                    if from.max(to) >= poses.len() {
+                        let missing = from.max(to);
+                        return Err(at(format!("vertex {missing} is not in the file")));
+                    }
+                    let Some(factor) = unpack(&information).cholesky() else {
+                        return Err(at(format!(
+                            "the information matrix of the edge from {from} to {to} is not positive definite"
+                        )));
+                    };
+                    let motion = pose(x, y, yaw);
+                    let covariance = factor.inverse();
+                    let axes = axes(&motion);
+                    let motion = UncertainMotion {
+                        motion,
+                        covariance: axes * covariance * axes.transpose(),
+                    };
+                    match from == odometry.len() && to == from + 1 {
+                        true => odometry.push(Constraint::odometry(from, motion)),
+                        false => loops.push(Constraint::closing(from, to, motion)),
+                    }
+                }
+                Some(tag) => {
+                    let reason = format!("{tag:?} is not read, only VERTEX_SE2, EDGE_SE2 and FIX");
+                    return Err(at(reason));
+                }
+            }
         }
-        raw.resolve()
+        let (last, next) = (odometry.len(), odometry.len() + 1);
+        if next < poses.len() {
+            return Err(G2oError(format!(
+                "there is no edge from vertex {last} to the next one, {next}: a trajectory needs odometry between all its keyframes"
+            )));
+        }
+        odometry.extend(loops);
+        Ok(Self {
+            poses,
+            constraints: odometry,
+        })
     }
 
     /// Returns the text of a g2o file with these poses and constraints. Groups and kinds of
@@ -100,122 +132,20 @@ fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
 }
 
-impl Raw {
-    fn read(&mut self, line: usize, text: &str) -> Result<(), G2oError> {
-        let mut words = text.split_whitespace();
-        match words.next() {
-            None => {}
-            Some(comment) if comment.starts_with('#') => {}
-            Some("VERTEX_SE2") => {
-                let needed = "an id, x, y and yaw";
-                let ([id], [x, y, yaw]) = fields(words, line, "VERTEX_SE2", needed)?;
-                if self.vertices.insert(id, pose(x, y, yaw)).is_some() {
-                    let reason = format!("vertex {id} appears a second time");
-                    return Err(G2oError::at(line, reason));
-                }
-            }
-            Some("EDGE_SE2") => {
-                let needed = "two ids, x, y, yaw and the six values of the upper triangle of the information matrix";
-                let (ends, [x, y, yaw, information @ ..]) =
-                    fields::<2, 9>(words, line, "EDGE_SE2", needed)?;
-                let motion = pose(x, y, yaw);
-                let [from, to] = ends;
-                let Some(factor) = unpack(&information).cholesky() else {
-                    let reason = format!(
-                        "the information matrix of the edge from {from} to {to} is not positive definite"
-                    );
-                    return Err(G2oError::at(line, reason));
-                };
-                let covariance = factor.inverse();
-                let axes = axes(&motion);
-                let motion = UncertainMotion {
-                    motion,
-                    covariance: axes * covariance * axes.transpose(),
-                };
-                self.edges.push(RawEdge { line, ends, motion });
-            }
-            Some("FIX") => {
-                let ([id], []) = fields(words, line, "FIX", "an id")?;
-                self.fixed.push((line, id));
-            }
-            Some(tag) => {
-                return Err(G2oError::at(
-                    line,
-                    format!(
-                        "{tag:?} is not read, only VERTEX_SE2, EDGE_SE2, FIX of the first vertex, and comments"
-                    ),
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    fn resolve(self) -> Result<G2o, G2oError> {
-        if self.edges.is_empty() {
-            return Err(G2oError("there is no EDGE_SE2".to_owned()));
-        }
-        let ids: BTreeSet<u64> = match self.vertices.is_empty() {
-            true => self.edges.iter().flat_map(|edge| edge.ends).collect(),
-            false => self.vertices.keys().copied().collect(),
-        };
-        let keyframes: BTreeMap<u64, usize> = ids.iter().copied().zip(0..).collect();
-        for (line, id) in self.fixed {
-            if keyframes.get(&id) != Some(&0) {
-                let reason = format!("vertex {id} is fixed, but only the first vertex can be");
-                return Err(G2oError::at(line, reason));
-            }
-        }
-        let mut odometry: Vec<Option<Constraint>> = vec![None; ids.len() - 1];
-        let mut loops = Vec::new();
-        for RawEdge { line, ends, motion } in self.edges {
-            let keyframe = |id| {
-                let missing = || G2oError::at(line, format!("vertex {id} is not in the file"));
-                keyframes.get(&id).copied().ok_or_else(missing)
-            };
-            let (from, to) = (keyframe(ends[0])?, keyframe(ends[1])?);
-            match odometry.get_mut(from) {
-                Some(empty @ None) if to == from + 1 => {
-                    *empty = Some(Constraint::odometry(from, motion));
-                }
-                _ => loops.push(Constraint::closing(from, to, motion)),
-            }
-        }
-        let ids: Vec<u64> = ids.into_iter().collect();
-        let gap = |k: usize| {
-            let (from, to) = (ids[k], ids[k + 1]);
-            G2oError(format!(
-                "there is no edge from vertex {from} to the next one, {to}: a trajectory needs odometry between all its keyframes"
-            ))
-        };
-        let odometry = odometry.into_iter().enumerate();
-        let odometry = odometry.map(|(k, constraint)| constraint.ok_or_else(|| gap(k)));
-        let mut constraints: Vec<_> = odometry.collect::<Result<_, _>>()?;
-        constraints.extend(loops);
-        Ok(G2o {
-            poses: self.vertices.into_values().collect(),
-            constraints,
-        })
-    }
-}
-
+/// Returns ids and numbers, or what is `needed`.
 fn fields<'a, const IDS: usize, const NUMBERS: usize>(
     words: impl Iterator<Item = &'a str>,
-    line: usize,
-    tag: &str,
     needed: &str,
-) -> Result<([u64; IDS], [f64; NUMBERS]), G2oError> {
+) -> Result<([usize; IDS], [f64; NUMBERS]), String> {
     let words: Vec<_> = words.collect();
-    let wrong = || {
-        let reason = format!("{tag} needs {needed}, each a finite number");
-        G2oError::at(line, reason)
+    let read = || {
+        let (ids, numbers) = words.split_at_checked(IDS)?;
+        let ids: Option<Vec<usize>> = ids.iter().map(|word| word.parse().ok()).collect();
+        let finite = |word: &&str| word.parse().ok().filter(|number: &f64| number.is_finite());
+        let numbers: Option<Vec<f64>> = numbers.iter().map(finite).collect();
+        let ids: [usize; IDS] = ids?.try_into().ok()?;
+        let numbers: [f64; NUMBERS] = numbers?.try_into().ok()?;
+        Some((ids, numbers))
     };
-    let (ids, numbers) = words.split_at_checked(IDS).ok_or_else(wrong)?;
-    let ids: Option<Vec<u64>> = ids.iter().map(|word| word.parse().ok()).collect();
-    let finite = |word: &&str| word.parse().ok().filter(|number: &f64| number.is_finite());
-    let numbers: Option<Vec<f64>> = numbers.iter().map(finite).collect();
-    let ids = ids.and_then(|ids| ids.try_into().ok()).ok_or_else(wrong)?;
-    let numbers = numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(wrong)?;
-    Ok((ids, numbers))
+    read().ok_or_else(|| format!("{needed}, each a finite number"))
 }

@@ -251,7 +251,7 @@ impl PoseGraph {
         let relative = Relative::predict(&ends[0], &ends[1]);
         let jacobian = [relative.by_from, relative.by_to][end];
         let predicted = jacobian * chain.covariance * jacobian.transpose();
-        let innovation = relative.innovation(&edge.motion);
+        let innovation = edge.motion.error(&relative.motion);
         chi_square(&innovation, &(predicted + edge.motion.covariance))
     }
 

@@ -17,7 +17,9 @@ mod kernel;
 pub mod places;
 mod relative;
 
-pub use constraint::{CHI_SQUARE_99_9, CHI_SQUARE_99_9_PLANE, Constraint, Kind, Outcome, Verdict};
+pub use constraint::{
+    CHI_SQUARE_99_9, CHI_SQUARE_99_9_PLANE, Constraint, Kind, Outcome, Verdict, chi_square,
+};
 pub use error::EstimationError;
 pub use filter::TrajectoryFilter;
 pub use g2o::{G2o, G2oError};

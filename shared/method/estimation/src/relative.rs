@@ -1,6 +1,6 @@
 //! The relative pose of two keyframes, predicted from their poses (Checchin et al., Eq. 3).
 
-use gyre_geometry::{Pose, UncertainMotion, covariance::lever, wrap_angle};
+use gyre_geometry::{Pose, covariance::lever, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 
 #[derive(Debug, Clone, Copy)]
@@ -29,12 +29,6 @@ impl Relative {
             by_to,
         }
     }
-
-    /// Returns (x, y, yaw) of the measured motion minus the predicted motion, yaw in (-pi, pi]: the
-    /// innovation.
-    pub fn innovation(&self, measured: &UncertainMotion) -> Vector3<f64> {
-        measured.error(&self.motion)
-    }
 }
 
 /// Moves a pose by a correction of its x, y and yaw.
@@ -46,7 +40,7 @@ pub(crate) fn corrected(pose: &Pose, correction: &Vector3<f64>) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyre_geometry::{pose, xy_yaw};
+    use gyre_geometry::{UncertainMotion, pose, xy_yaw};
     use proptest::prelude::*;
     use std::f64::consts::{FRAC_PI_2, PI};
 

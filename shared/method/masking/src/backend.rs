@@ -3,10 +3,7 @@
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::{
-    Deserialize, Deserializer, Serialize,
-    de::{Error as _, IntoDeserializer},
-};
+use serde::{Deserialize, Serialize};
 
 /// The library that computes a network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -56,15 +53,4 @@ impl fmt::Display for Provider {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)
     }
-}
-
-pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
-    let name = String::deserialize(source)?;
-    if name == "tract" {
-        return Err(D::Error::custom(
-            "tract is no longer part of Gyre: rten is built in instead and computes other last digits; \
-             set masking.backend to `rten`, or leave it out",
-        ));
-    }
-    Backend::deserialize(name.into_deserializer())
 }

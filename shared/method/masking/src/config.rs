@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::backend::{self, Backend, Provider};
+use crate::backend::{Backend, Provider};
 
 /// The mask and motion compensation: section `[masking]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,7 +25,6 @@ pub struct MaskingConfig {
     /// The library that computes the network, and the network of moving objects: `onnxruntime`;
     /// `rten`, which is built in and slower, and leaves networks of one scan in 8 bits to Gyre
     /// itself; or `auto`: ONNX Runtime where it is found, else rten.
-    #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]

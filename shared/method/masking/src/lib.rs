@@ -4,7 +4,6 @@ pub mod backend;
 mod compensation;
 mod config;
 mod error;
-mod external;
 mod function;
 mod learned;
 pub mod model;

@@ -6,11 +6,10 @@ use std::{
 };
 
 use gyre_radar::{RasterConfig, Sampling};
-use gyre_storage::quoted;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use crate::{MaskingConfig, external::external_file};
+use crate::MaskingConfig;
 
 /// The size limit of models: hundreds of times a mask's.
 const MAX_BYTES: u64 = 1 << 30;
@@ -39,8 +38,6 @@ pub struct RasterFacts {
     pub cell_m: f32,
     pub sampling: Option<Sampling>,
     pub min_range_m: Option<f32>,
-    /// Width of the average of [`Sampling::Averaged`], in cells.
-    pub averaged_cells: Option<f32>,
 }
 
 /// The section `[masking]` of a card: the processing of a raster before the network.
@@ -127,8 +124,6 @@ impl Card {
         raster: &RasterConfig,
     ) -> Vec<String> {
         let (trained, trained_mask) = (&self.raster, &self.masking);
-        let averaged_cells = trained.averaged_cells;
-        let averaged_cells = averaged_cells.filter(|_| raster.sampling == Sampling::Averaged);
         let differences = [
             mismatch("masking.threshold", trained_mask.floor, masking.floor()),
             mismatch(
@@ -147,11 +142,6 @@ impl Card {
                 raster.min_range_m,
             ),
             mismatch("raster.sampling", trained.sampling, raster.sampling),
-            mismatch(
-                "raster.averaged_cells",
-                averaged_cells,
-                raster.averaged_cells,
-            ),
         ];
         differences.into_iter().flatten().collect()
     }
@@ -185,19 +175,18 @@ impl Model {
             None => gyre_storage::read_bytes(&file, MAX_BYTES)
                 .map_err(|error| format!("cannot read the model's file {shown}: {error}"))?,
         };
-        let (expected, actual) = (&card.model.sha256, hexadecimal(&Sha256::digest(&bytes)));
+        let (expected, actual) = (&card.model.sha256, format!("{:x}", Sha256::digest(&bytes)));
         if !actual.eq_ignore_ascii_case(expected) {
             return Err(format!(
                 "{shown} has the SHA-256 {actual}, but its card has {expected}: it is damaged or belongs to a different model, so get it again together with its card"
             ));
         }
-        match external_file(&bytes) {
-            None => Ok(Self { card, file, bytes }),
+        match names_a_file(&bytes) {
+            false => Ok(Self { card, file, bytes }),
             // No checksum covers the other file.
-            Some(other) => Err(format!(
-                "{shown} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
-                 `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",
-                quoted(&other)
+            true => Err(format!(
+                "{shown} keeps weights in another file, which the SHA-256 of its card does not cover: write them into it, in Python by \
+                 `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card"
             )),
         }
     }
@@ -219,6 +208,22 @@ fn check_raster(path: &Path, trained: &RasterFacts, raster: &RasterConfig) -> Re
     }
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+/// Returns whether a model keeps a tensor in another file. Wherever it is in an ONNX file, it has
+/// the key `location`, a text of eight bytes: the length is the byte before it, or ends there with
+/// a zero. A model that calls anything else so is refused too.
+fn names_a_file(model: &[u8]) -> bool {
+    let mut texts = model.windows(9);
+    texts.any(|text| matches!(text[0], 0 | 8) && text.ends_with(b"location"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tensor_in_another_file_is_found_however_its_length_is_written() {
+        assert!(names_a_file(b"j\x14\x0a\x08location\x12\x06m.data"));
+        assert!(names_a_file(b"j\x16\x0a\x88\x80\x00location\x12\x06m.data"));
+        assert!(!names_a_file(b"\x0a\x0aallocation") && !names_a_file(b"no model"));
+    }
 }

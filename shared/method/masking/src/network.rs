@@ -10,10 +10,12 @@ use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::{Backend, MaskingConfig, model::Model, networks::runtime::RuntimeError};
+use crate::networks::{
+    planes::{self, guarded},
+    runtime::RuntimeError,
+};
+use crate::{Backend, MaskingConfig, model::Model};
 use integers::Integers;
-use onnx_runtime::OnnxRuntime;
-use rten::Rten;
 
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
@@ -50,19 +52,17 @@ pub struct Network {
 
 #[derive(Debug)]
 enum Engine {
-    OnnxRuntime(OnnxRuntime),
-    Rten(Rten),
+    Library(planes::Engine),
     Integers(Integers),
 }
 
 impl Network {
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster).map_err(NetworkError::Model)?;
-        let (mut engine, inputs, outputs) = match config.onnx_runtime()? {
+        let (engine, inputs, outputs) = match config.onnx_runtime()? {
             Some(path) => {
-                let engine = OnnxRuntime::load(&path, &model, config)?;
-                let (inputs, outputs) = (engine.inputs(), engine.outputs());
-                (Engine::OnnxRuntime(engine), inputs, outputs)
+                let (engine, inputs, outputs) = onnx_runtime::load(&path, &model, config)?;
+                (Engine::Library(engine), inputs, outputs)
             }
             None => built_in(&model)?,
         };
@@ -71,10 +71,16 @@ impl Network {
         check("gives", OUTPUT, &outputs, shape, &model)?;
         let [_, scans, rows, columns] = shape;
         let masks = Array3::zeros((scans, rows, columns));
-        if let Engine::Rten(engine) = &mut engine {
-            engine.rehearse(&model, masks.clone())?;
+        let mut network = Self { engine, masks };
+        if let Engine::Library(planes::Engine::Rten(..)) = network.engine {
+            let empty = network.masks.clone();
+            network.run(empty.view()).map_err(|error| match error {
+                NetworkError::Run(reason) => rten::rejected(&model, &reason),
+                other => other,
+            })?;
+            network.masks = empty;
         }
-        Ok(Self { engine, masks })
+        Ok(network)
     }
 
     /// Returns the number of scans that it takes and of masks that it gives: 1, or 2 (this scan,
@@ -90,13 +96,16 @@ impl Network {
         rasters: ArrayView3<'_, f32>,
     ) -> Result<ArrayView3<'_, f32>, NetworkError> {
         match &mut self.engine {
-            Engine::OnnxRuntime(engine) => engine.run(rasters, self.masks.view_mut()),
-            Engine::Rten(engine) => engine.run(rasters, self.masks.view_mut()),
-            Engine::Integers(engine) => {
-                engine.run(rasters, self.masks.view_mut());
-                Ok(())
+            Engine::Library(engine) => {
+                let (scans, rows, columns) = rasters.dim();
+                let (cells, masks) = (rasters.as_standard_layout(), self.masks.view_mut());
+                let cells = cells.as_slice().unwrap_or_default();
+                let shape = [1, scans, rows, columns];
+                let computed = engine.compute(shape, cells, |_, factors| fill(masks, &factors));
+                computed.map_err(NetworkError::Run)??;
             }
-        }?;
+            Engine::Integers(engine) => engine.run(rasters, self.masks.view_mut()),
+        }
         Ok(self.masks.view())
     }
 
@@ -110,10 +119,10 @@ impl Network {
 fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
     let file = rten::parse(model)?;
     let (inputs, outputs) = (rten::inputs(&file), rten::outputs(&file));
-    let read = |graph| rten::guarded(|| Integers::read(graph).ok_or("it has other steps")).ok();
+    let read = |graph| guarded(|| Integers::read(graph).ok_or("it has other steps")).ok();
     let engine = match file.graph.as_ref().and_then(read) {
         Some(engine) => Engine::Integers(engine),
-        None => Engine::Rten(Rten::load(model, file)?),
+        None => Engine::Library(rten::load(model, file)?),
     };
     Ok((engine, inputs, outputs))
 }

@@ -1,4 +1,3 @@
-use gyre_masking::networks::PlanesError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,16 +18,6 @@ pub enum ObjectsKind {
 pub struct ObjectsConfig {
     /// `none` or `tracks`.
     pub kind: ObjectsKind,
-}
-
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct ObjectsError(String);
-
-impl From<PlanesError> for ObjectsError {
-    fn from(error: PlanesError) -> Self {
-        Self(error.to_string())
-    }
 }
 
 impl ObjectsConfig {

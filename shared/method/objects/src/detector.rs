@@ -2,11 +2,11 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use gyre_geometry::{Pose, SparsePoint};
-use gyre_masking::networks::PlanesNetwork;
+use gyre_masking::networks::{PlanesError, PlanesNetwork};
 use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::PlacedScan;
 use crate::raster::{Memory, PLANES, SIDE};
-use crate::{ObjectsError, PlacedScan};
 
 const NETWORK: &str = "gyre:models/objects.onnx";
 /// Cells of the output, a side: each is as large as two by two of the input.
@@ -44,7 +44,7 @@ pub(crate) struct Detection {
 }
 
 impl Detector {
-    pub fn new(runtime: Option<&Path>) -> Result<Self, ObjectsError> {
+    pub fn new(runtime: Option<&Path>) -> Result<Self, PlanesError> {
         // The network gives each plane in four, of every other row and column.
         let shapes = [[PLANES, SIDE, SIDE], [4 * VALUES, OUT / 2, OUT / 2]];
         Ok(Self {
@@ -63,7 +63,7 @@ impl Detector {
         scan: &PlacedScan,
         points: &[SparsePoint],
         least: f64,
-    ) -> Result<Vec<Detection>, ObjectsError> {
+    ) -> Result<Vec<Detection>, PlanesError> {
         let deskewed = points.iter().map(|point| point.deskewed(&scan.twist));
         let deskewed: Vec<Point2<f64>> = deskewed.collect();
         self.memory.add(scan, points, &deskewed);

@@ -12,6 +12,6 @@ mod track;
 mod tracker;
 
 pub use assignment::assign;
-pub use config::{ObjectsConfig, ObjectsError, ObjectsKind};
+pub use config::{ObjectsConfig, ObjectsKind};
 pub use object::{Object, PlacedScan};
 pub use tracker::ObjectTracker;

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use gyre_geometry::SparsePoint;
+use gyre_masking::networks::PlanesError;
 
 use crate::assignment::assign;
 use crate::detector::{Detection, Detector};
 use crate::track::Track;
-use crate::{Object, ObjectsError, PlacedScan};
+use crate::{Object, PlacedScan};
 
 /// A place counts as part of a moving vehicle from this likelihood of the network on: a less likely
 /// place keeps no track alive.
@@ -27,7 +28,7 @@ pub struct ObjectTracker {
 impl ObjectTracker {
     /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
     /// rten, which takes several times as long.
-    pub fn new(runtime: Option<&Path>) -> Result<Self, ObjectsError> {
+    pub fn new(runtime: Option<&Path>) -> Result<Self, PlanesError> {
         Ok(Self {
             detector: Detector::new(runtime)?,
             tracks: Vec::new(),
@@ -44,7 +45,7 @@ impl ObjectTracker {
         &mut self,
         scan: &PlacedScan,
         points: &[SparsePoint],
-    ) -> Result<&[Object], ObjectsError> {
+    ) -> Result<&[Object], PlanesError> {
         self.predict(scan.stamp_ns);
         let found = self.detector.detect(scan, points, LEAST_LIKELY)?;
         let rest = self.assign(found);

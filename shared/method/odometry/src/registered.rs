@@ -3,7 +3,7 @@ use std::error::Error as StdError;
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 use gyre_masking::{MaskError, MaskerError};
 use gyre_radar::ScanError;
-use gyre_scan_matching::{ConfigError, JointMatch, Refined, ShapeError};
+use gyre_scan_matching::{JointMatch, Refined, SettingError, ShapeError};
 use thiserror::Error;
 
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ pub enum SetupError {
     )]
     NoPoints,
     #[error(transparent)]
-    Search(#[from] ConfigError),
+    Search(#[from] SettingError),
 }
 
 #[derive(Debug, Error)]

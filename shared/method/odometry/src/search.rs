@@ -1,5 +1,5 @@
 use gyre_scan_matching::{
-    ConfigError, ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation,
+    ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation, SettingError,
     TranslationConfig, TranslationSearch,
 };
 
@@ -25,7 +25,7 @@ impl DecoupledSearch {
         cell_m: f64,
         rotation: &RotationConfig,
         translation: &TranslationConfig,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, SettingError> {
         Ok(Self {
             rotation: SequentialRotation::new(n, rotation)?,
             translation: TranslationSearch::new(n, cell_m, translation)?,

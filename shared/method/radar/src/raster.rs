@@ -64,8 +64,6 @@ pub struct RasterConfig {
     pub min_range_m: f32,
     /// The rule that computes the value of a cell from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
-    /// Depth of the mean of `averaged`, in cells. More than 1 smooths.
-    pub averaged_cells: f32,
 }
 
 impl Default for RasterConfig {
@@ -75,7 +73,6 @@ impl Default for RasterConfig {
             cell_m: 0.8,
             min_range_m: 2.0,
             sampling: Sampling::Averaged,
-            averaged_cells: 1.0,
         }
     }
 }
@@ -87,7 +84,6 @@ impl RasterConfig {
         check_bounds! { self, "raster":
             cell_m in ([1e-3, 100.0], "0.001 to 100"),
             min_range_m in ([0.0, f64::MAX], "0 or more"),
-            averaged_cells in ([0.1, 10.0], "0.1 to 10"),
         }
         Ok(())
     }
@@ -129,7 +125,7 @@ impl Rasteriser {
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {
-            Sampling::Averaged => config.cell_m * config.averaged_cells,
+            Sampling::Averaged => config.cell_m,
             Sampling::Bilinear => 0.0,
         };
         let cells = Cells::new(config.n, config.cell_m, Sense::Clockwise);

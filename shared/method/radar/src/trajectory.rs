@@ -68,17 +68,6 @@ impl Trajectory {
         self.at(within)
             .filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
     }
-
-    /// Time between the poses around a time, ns: 0 at a pose, `None` outside the time span.
-    pub fn gap_ns(&self, stamp_ns: i64) -> Option<u64> {
-        let stamps = self.stamp_ns.as_ref()?;
-        let after = stamps.partition_point(|s| *s < stamp_ns);
-        let to = *stamps.get(after)?;
-        if to == stamp_ns {
-            return Some(0);
-        }
-        Some(to.abs_diff(stamps[after.checked_sub(1)?]))
-    }
 }
 
 #[cfg(test)]
@@ -88,7 +77,7 @@ mod tests {
     use gyre_geometry::pose;
 
     #[test]
-    fn times_within_the_tolerance_are_clamped_and_gaps_are_measured() {
+    fn times_within_the_tolerance_are_clamped() {
         let poses = [1.0, 2.0, 4.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
         let trajectory = Trajectory {
             stamp_ns: Some(vec![0, 100, 150]),
@@ -98,11 +87,6 @@ mod tests {
         assert_eq!(
             [x(-6), x(-5), x(50), x(155), x(156)],
             [None, Some(1.0), Some(1.5), Some(4.0), None]
-        );
-        let gaps = [-1, 0, 1, 100, 101, 150, 151].map(|stamp_ns| trajectory.gap_ns(stamp_ns));
-        assert_eq!(
-            gaps,
-            [None, Some(0), Some(100), Some(0), Some(50), Some(0), None]
         );
     }
 }

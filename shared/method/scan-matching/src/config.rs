@@ -1,19 +1,9 @@
 //! Configuration of the searches. Every key has a default; an error names the key of an invalid
 //! value.
 
-use std::ops::RangeInclusive;
-
+use gyre_samples::{Bounds, SettingError, check, check_bounds};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{section}.{key} = {actual}: expected {expected}")]
-pub struct ConfigError {
-    pub section: &'static str,
-    pub key: &'static str,
-    pub actual: String,
-    pub expected: &'static str,
-}
 
 /// The comparison of two polar spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -55,8 +45,8 @@ pub enum Taper {
 }
 
 /// The interpolation of a peak between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Peak {
     /// A Gaussian over a pedestal, the lowest of the neighbouring samples: errors up to 0.02 of a
     /// step.
@@ -65,13 +55,6 @@ pub enum Peak {
     /// A parabola through three samples along each axis: errors up to 0.1 of a step on narrow
     /// peaks.
     Parabola,
-    /// Mean of all positions within reach, weighted with exp(temperature z), where z is the score
-    /// less the highest score, over the scores' standard deviation (Weston et al., Algorithm 1,
-    /// lines 15 and 19).
-    SoftArgmax {
-        /// Inverse width of the weight; 2 for the angle and 1 for the shift in the paper.
-        temperature: f64,
-    },
 }
 
 /// The normalisation for an overlap that shrinks as the shift grows.
@@ -80,8 +63,6 @@ pub enum Peak {
 pub enum Overlap {
     /// None: the plain correlation, biased towards zero shift.
     None,
-    /// Divides by the share of the cells that overlap.
-    Area,
     /// Divides by the energy of each raster within the overlap, so that each value is a correlation
     /// coefficient of what both scans see.
     #[default]
@@ -145,8 +126,7 @@ pub struct TranslationConfig {
     pub reach_m: f64,
     /// Phase correlation: keeps only the phase of the cross-spectrum (Checchin et al., Eq. 6).
     pub phase_only: bool,
-    /// Normalisation for the shrinking overlap: `none`, `area` or `energy`. No effect with
-    /// `phase_only`.
+    /// Normalisation for the shrinking overlap: `none` or `energy`. No effect with `phase_only`.
     pub overlap: Overlap,
     /// Interpolation of the peak between cells.
     pub peak: Peak,
@@ -164,84 +144,30 @@ impl Default for TranslationConfig {
 }
 
 impl RotationConfig {
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let section = Section("rotation");
-        section.require(
-            self.band_low >= 0.0 && self.band_low < self.band_high,
-            "band_low",
-            &self.band_low,
-            "at least 0 and below band_high",
-        )?;
-        let fits = self.band_high < 0.5;
-        let bounds = "cycles per cell, below 0.5";
-        section.require(fits, "band_high", &self.band_high, bounds)?;
-        section.within("angles", self.angles, 16..=1 << 14, "16 to 16384")?;
-        let radii = self.radii.unwrap_or(2);
-        section.within("radii", radii, 2..=1 << 13, "2 to 8192")?;
-        let fits = self.reach_deg > 0.0 && self.reach_deg <= 90.0;
-        section.require(fits, "reach_deg", &self.reach_deg, "above 0, at most 90")?;
-        section.positive("peak.soft_argmax.temperature", self.peak.temperature())
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let below_band_high = [0.0, self.band_high.next_down()];
+        check_bounds! { self, "rotation":
+            band_low in (below_band_high, "at least 0 and below band_high"),
+            band_high in ([0.0, 0.5_f64.next_down()], "cycles per cell, below 0.5"),
+        }
+        let angles = ([16.0, 16384.0], "16 to 16384");
+        check("rotation", "angles", self.angles as f64, angles)?;
+        let radii = self.radii.unwrap_or(2) as f64;
+        check("rotation", "radii", radii, ([2.0, 8192.0], "2 to 8192"))?;
+        let reach = ([f64::MIN_POSITIVE, 90.0], "above 0, at most 90");
+        check("rotation", "reach_deg", self.reach_deg, reach)
     }
 }
 
 impl TranslationConfig {
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let section = Section("translation");
-        let fits = positive(self.reach_m);
-        section.require(fits, "reach_m", &self.reach_m, "metres, above 0")?;
-        section.positive("peak.soft_argmax.temperature", self.peak.temperature())
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check("translation", "reach_m", self.reach_m, METRES)
     }
 }
 
-impl Peak {
-    fn temperature(&self) -> f64 {
-        match *self {
-            Peak::SoftArgmax { temperature } => temperature,
-            _ => 1.0,
-        }
-    }
-}
-
-pub(crate) fn positive(value: f64) -> bool {
-    value.is_finite() && value > 0.0
-}
-
-#[derive(Clone, Copy)]
-pub(crate) struct Section(pub &'static str);
-
-impl Section {
-    pub fn require(
-        self,
-        fits: bool,
-        key: &'static str,
-        actual: &dyn ToString,
-        expected: &'static str,
-    ) -> Result<(), ConfigError> {
-        match fits {
-            true => Ok(()),
-            false => Err(ConfigError {
-                section: self.0,
-                key,
-                actual: actual.to_string(),
-                expected,
-            }),
-        }
-    }
-
-    pub fn within<T: PartialOrd + ToString>(
-        self,
-        key: &'static str,
-        value: T,
-        bounds: RangeInclusive<T>,
-        expected: &'static str,
-    ) -> Result<(), ConfigError> {
-        self.require(bounds.contains(&value), key, &value, expected)
-    }
-
-    pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
-        self.require(positive(value), key, &value, "a positive number")
-    }
-}
+const ABOVE_0: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
+pub(crate) const METRES: Bounds = (ABOVE_0, "metres, above 0");
+pub(crate) const POSITIVE: Bounds = (ABOVE_0, "a positive number");
 
 #[cfg(test)]
 mod tests {
@@ -250,14 +176,12 @@ mod tests {
 
     #[test]
     fn missing_keys_have_their_defaults() {
-        let text =
-            "form = \"line14\"\nangles = 733\npeak = { soft_argmax = { temperature = 2.0 } }";
+        let text = "form = \"line14\"\nangles = 733\npeak = \"parabola\"";
         let config: RotationConfig = toml::from_str(text).unwrap();
-        let peak = Peak::SoftArgmax { temperature: 2.0 };
         let want = RotationConfig {
             form: RotationForm::ProfileMean,
             angles: 733,
-            peak,
+            peak: Peak::Parabola,
             ..RotationConfig::default()
         };
         assert_eq!(config, want);
@@ -271,7 +195,5 @@ mod tests {
         assert!(wrong.to_string().contains("angels"));
         let wrong = toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err();
         assert!(wrong.to_string().contains("reach"));
-        let text = "peak = { soft_argmax = { t = 1.0 } }";
-        assert!(toml::from_str::<TranslationConfig>(text).is_err());
     }
 }

@@ -8,7 +8,7 @@ use gyre_geometry::wrap_angle;
 use nalgebra::{Rotation2, Vector2};
 use ndarray::ArrayView2;
 
-use crate::config::{ConfigError, Overlap, Peak};
+use crate::config::{Overlap, Peak};
 use crate::correlate::KeptCorrelation;
 use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::fast_size;
@@ -18,7 +18,7 @@ use crate::rotation::{RotationMatch, RotationRunnerUp};
 use crate::scores::{Scores, Shift, reach_cells};
 use crate::translation::{MotionMatch, MotionRunnerUp};
 use crate::warp::Rotation;
-use crate::{ShapeError, cells, kernels};
+use crate::{SettingError, ShapeError, cells, kernels};
 
 use config::AngleGrid;
 pub use config::ExhaustiveConfig;
@@ -89,21 +89,19 @@ struct JointPeak {
     over_angles: LinePeak,
     /// The highest score at `angle_rad`, and the peak beside it in cells (down, right).
     highest: Shift,
-    shift: Vector2<f64>,
     over_shifts: PlanePeak,
 }
 
 impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
-        config.validate()?;
+    pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, SettingError> {
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
         let size = fast_size(Scores::min_size(n, reach));
         let energy = || OverlapEnergy::new(n, Scores::around(reach));
         let turned = || Turned {
             raster: vec![0.0; n * n],
             energy: energy(),
-            scores: Scores::new(n, reach, size),
+            scores: Scores::new(reach, size),
         };
         let (angles, turned) = (config.angles(), [turned(), turned()]);
         Ok(Self {
@@ -197,13 +195,11 @@ impl ExhaustiveSearch {
         let scores = &self.turned[0].scores;
         let highest = scores.highest()?;
         let over_shifts = scores.peak(self.config.peak, highest);
-        let shift = scores.place(self.config.peak, highest, &over_shifts);
         Some(JointPeak {
             best,
             angle_rad,
             over_angles,
             highest,
-            shift,
             over_shifts,
         })
     }
@@ -256,7 +252,7 @@ impl ExhaustiveSearch {
             }),
         };
         let turn = Rotation2::new(found.angle_rad);
-        let place = translation(found.angle_rad, found.shift, self.cell_m);
+        let place = translation(found.angle_rad, found.over_shifts.offset, self.cell_m);
         let guess = guess(self.config.reach_m);
         let hessian = &found.over_shifts.hessian;
         let spread = shift_covariance(VARIANCE_SCALE, score, hessian, self.cell_m, guess);
@@ -350,7 +346,7 @@ impl Turned {
             return Candidate::default();
         };
         let peak = self.scores.peak(kind, highest);
-        let place = translation(angle_rad, self.scores.place(kind, highest, &peak), cell_m);
+        let place = translation(angle_rad, peak.offset, cell_m);
         Candidate {
             score: peak.value,
             place: place - Vector2::repeat(OFFSET * cell_m),

@@ -12,7 +12,7 @@ use gyre_simd::simd;
 const LANES: usize = 16;
 
 /// If less than this share of two rasters overlaps, the score is set to zero.
-pub(crate) const MIN_SHARE: f64 = 1e-3;
+const MIN_SHARE: f64 = 1e-3;
 
 /// The position of a sample among four neighbours: the first of them and the weights toward the
 /// others.

@@ -33,10 +33,11 @@ mod whiten;
 use ndarray::ArrayView2;
 
 pub use config::{
-    ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
+    Magnitude, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
 };
 pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointMatch};
 pub use fft::fast_size;
+pub use gyre_samples::SettingError;
 pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{

@@ -5,7 +5,7 @@ use ndarray::ArrayView2;
 
 use crate::scores::check_raster;
 use crate::warp::Rotation;
-use crate::{ConfigError, ShapeError, cells};
+use crate::{SettingError, ShapeError, cells};
 
 /// The masked normalised correlation of two rasters at one motion, over the cells that lie within a
 /// range of both sensors.
@@ -32,7 +32,7 @@ type Sums = [f32; 3];
 impl MaskedCorrelation {
     /// Plans correlations of rasters of `n` x `n` cells of `cell_m` metres within `range_m` of both
     /// sensors.
-    pub fn new(n: usize, cell_m: f64, range_m: f64) -> Result<Self, ConfigError> {
+    pub fn new(n: usize, cell_m: f64, range_m: f64) -> Result<Self, SettingError> {
         check_raster(n, cell_m)?;
         Ok(Self {
             n,

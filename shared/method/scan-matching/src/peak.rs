@@ -141,34 +141,6 @@ fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
     })
 }
 
-/// The weighted mean of positions, with scores normalised as in [`Peak::SoftArgmax`].
-///
-/// `scored` gives (position, score) and is iterated twice; `highest` is the largest score.
-pub(crate) fn soft_argmax<const D: usize>(
-    temperature: f64,
-    highest: f64,
-    scored: impl Iterator<Item = ([f64; D], f64)> + Clone,
-) -> [f64; D] {
-    let (count, sum, squares) = scored.clone().fold((0.0, 0.0, 0.0), |(n, s, q), (_, c)| {
-        (n + 1.0, s + (c - highest), q + (c - highest).powi(2))
-    });
-    let deviation = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
-    let (mut mean, mut total) = ([0.0; D], 0.0);
-    for (position, score) in scored {
-        let z = if deviation > 0.0 {
-            (score - highest) / deviation
-        } else {
-            0.0
-        };
-        let weight = (temperature * z).exp();
-        total += weight;
-        mean.iter_mut()
-            .zip(position)
-            .for_each(|(m, p)| *m += weight * p);
-    }
-    mean.map(|m| m / total)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,16 +196,5 @@ mod tests {
                 assert_eq!(plane_peak(kind, |_, _| level).offset, Vector2::zeros());
             }
         }
-    }
-
-    #[test]
-    fn soft_argmax_does_not_change_when_scores_are_scaled() {
-        let at = |scale: f64| {
-            let scored = (-20..=20)
-                .map(move |k| ([f64::from(k)], scale * bump(f64::from(k) / 2.0 - 0.4, 1.0)));
-            soft_argmax(8.0, scale * bump(0.1, 1.0), scored)[0]
-        };
-        assert!((at(1.0) - at(1000.0)).abs() < 1e-9);
-        assert!((at(1.0) - 0.8).abs() < 0.2, "{}", at(1.0));
     }
 }

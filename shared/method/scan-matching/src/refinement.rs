@@ -37,7 +37,7 @@ pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
 pub use wheels::{WheelScale, WheelState};
 
-use crate::ConfigError;
+use crate::SettingError;
 use alignment::Alignment;
 use local_map::LocalMap;
 use points::DeskewedPoints;
@@ -123,7 +123,7 @@ pub struct Refiner {
 }
 
 impl Refiner {
-    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         config.validate()?;
         Ok(Self {
             map: LocalMap::new(config),

@@ -6,15 +6,15 @@ use gyre_radar::fourier::{Complex32, ComplexToReal, RealToComplex};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, Peak, RotationConfig, RotationForm};
+use crate::config::{RotationConfig, RotationForm};
 use crate::covariance::guess;
 use crate::fft::{RealLines, RealSpectrum, fast_size};
-use crate::peak::{line_peak, soft_argmax};
+use crate::peak::line_peak;
 use crate::polar::PolarGrid;
 use crate::scores::check_side;
 use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
-use crate::{ShapeError, cells, kernels, taper};
+use crate::{SettingError, ShapeError, cells, kernels, taper};
 
 /// Distance from the turn of a gyro beyond which a maximum counts as spurious, rad.
 const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;
@@ -79,7 +79,7 @@ pub struct RotationSearch {
 }
 
 impl RotationSearch {
-    pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
+    pub fn new(n: usize, config: &RotationConfig) -> Result<Self, SettingError> {
         config.validate()?;
         check_side(n)?;
         let size = fast_size(n);
@@ -261,14 +261,7 @@ impl RotationSearch {
             return self.no_match();
         };
         let peak = line_peak(self.config.peak, |j| self.at(best + j));
-        let shift = match self.config.peak {
-            Peak::SoftArgmax { temperature } => {
-                // Centred on the peak: on a circle the mean about a fixed angle is meaningless.
-                let scored = (-self.reach..=self.reach).map(|j| ([j as f64], self.at(best + j)));
-                best as f64 + soft_argmax(temperature, self.at(best), scored)[0]
-            }
-            _ => best as f64 + peak.offset,
-        };
+        let shift = best as f64 + peak.offset;
         let limit = self.config.reach_deg.to_radians();
         let score = peak.value.min(1.0);
         RotationMatch {

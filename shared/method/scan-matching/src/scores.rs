@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
+use gyre_samples::{SettingError, check};
 use nalgebra::Vector2;
 
-use crate::config::{ConfigError, Overlap, Peak, Section, positive};
-use crate::kernels::{self, MIN_SHARE};
+use crate::config::{METRES, Overlap, Peak};
+use crate::kernels;
 use crate::overlap::OverlapEnergy;
-use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
+use crate::peak::{PlanePeak, SUPPORT, plane_peak};
 
 /// Half width of the neighbourhood where a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
@@ -14,7 +15,6 @@ pub(crate) type Shift = (isize, isize);
 
 /// Scores of all shifts of up to `reach + SUPPORT` cells; maxima are looked for within `reach`.
 pub(crate) struct Scores {
-    n: usize,
     reach: isize,
     /// Row (and column) of the transform for each shift.
     pub wrapped: Arc<[usize]>,
@@ -32,14 +32,13 @@ impl Scores {
         reach + SUPPORT
     }
 
-    /// Scores of n x n rasters, read from transforms of `size` a side.
-    pub fn new(n: usize, reach: usize, size: usize) -> Self {
+    /// Scores that are read from transforms of `size` a side.
+    pub fn new(reach: usize, size: usize) -> Self {
         let around = Self::around(reach) as isize;
         let wrapped: Arc<[usize]> = (-around..=around)
             .map(|s| s.rem_euclid(size as isize) as usize)
             .collect();
         Self {
-            n,
             reach: reach as isize,
             values: vec![0.0; wrapped.len().pow(2)],
             wrapped,
@@ -67,25 +66,10 @@ impl Scores {
     ) {
         match overlap {
             Overlap::None => {}
-            Overlap::Area => self.normalise_area(),
             // A shift by s drops the first s rows of g' and the last s rows of f.
             Overlap::Energy => {
                 kernels::divide_by_share(&mut self.values, &later.left, &turned.left, energy)
             }
-        }
-    }
-
-    fn normalise_area(&mut self) {
-        let side = self.wrapped.len();
-        let around = (side / 2) as isize;
-        for (k, score) in self.values.iter_mut().enumerate() {
-            let (down, right) = ((k / side) as isize - around, (k % side) as isize - around);
-            let share = area_share(self.n, down, right);
-            *score = if share > MIN_SHARE {
-                (f64::from(*score) / share) as f32
-            } else {
-                0.0
-            };
         }
     }
 
@@ -96,7 +80,7 @@ impl Scores {
         f64::from(self.values[((down + around) * side + right + around) as usize])
     }
 
-    fn scored(&self) -> impl Iterator<Item = (Shift, f64)> + Clone {
+    fn scored(&self) -> impl Iterator<Item = (Shift, f64)> {
         let reach = self.reach;
         (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| ((i, j), self.at(i, j))))
     }
@@ -110,19 +94,12 @@ impl Scores {
         (best.1 > 0.0).then_some(best.0)
     }
 
+    /// The peak about the highest score. Its offset is the whole shift.
     pub fn peak(&self, kind: Peak, best: Shift) -> PlanePeak {
-        plane_peak(kind, |i, j| self.at(best.0 + i, best.1 + j))
-    }
-
-    pub fn place(&self, kind: Peak, best: Shift, peak: &PlanePeak) -> Vector2<f64> {
-        match kind {
-            Peak::SoftArgmax { temperature } => {
-                let scored = self
-                    .scored()
-                    .map(|((i, j), score)| ([i as f64, j as f64], score));
-                Vector2::from(soft_argmax(temperature, self.at(best.0, best.1), scored))
-            }
-            _ => Vector2::new(best.0 as f64, best.1 as f64) + peak.offset,
+        let peak = plane_peak(kind, |i, j| self.at(best.0 + i, best.1 + j));
+        PlanePeak {
+            offset: Vector2::new(best.0 as f64, best.1 as f64) + peak.offset,
+            ..peak
         }
     }
 
@@ -141,13 +118,14 @@ impl Scores {
     }
 }
 
-pub(crate) fn check_side(n: usize) -> Result<(), ConfigError> {
-    Section("raster").within("n", n, 16..=8192, "16 to 8192 cells a side")
+pub(crate) fn check_side(n: usize) -> Result<(), SettingError> {
+    let cells = ([16.0, 8192.0], "16 to 8192 cells a side");
+    check("raster", "n", n as f64, cells)
 }
 
-pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), ConfigError> {
+pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), SettingError> {
     check_side(n)?;
-    Section("raster").require(positive(cell_m), "cell_m", &cell_m, "metres, above 0")
+    check("raster", "cell_m", cell_m, METRES)
 }
 
 /// The largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres, cells.
@@ -156,17 +134,16 @@ pub(crate) fn reach_cells(
     cell_m: f64,
     section: &'static str,
     reach_m: f64,
-) -> Result<usize, ConfigError> {
+) -> Result<usize, SettingError> {
     check_raster(n, cell_m)?;
     let reach = (reach_m / cell_m + 1e-9).floor();
-    let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
-    let bounds = "at least one cell, less than half the raster";
-    Section(section).require(fits, "reach_m", &reach_m, bounds)?;
-    Ok(reach as usize)
-}
-
-/// Share of the cells that overlap at a shift.
-fn area_share(n: usize, down: isize, right: isize) -> f64 {
-    let along = |s: isize| 1.0 - s.unsigned_abs() as f64 / n as f64;
-    along(down) * along(right)
+    match (1.0..=(n / 2 - SUPPORT) as f64).contains(&reach) {
+        true => Ok(reach as usize),
+        false => Err(SettingError {
+            section,
+            key: "reach_m",
+            value: reach_m,
+            expected: "at least one cell, less than half the raster",
+        }),
+    }
 }

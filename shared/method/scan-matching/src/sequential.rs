@@ -1,7 +1,7 @@
 use ndarray::ArrayView2;
 
 use crate::{
-    ConfigError, PolarSpectrum, RotationConfig, RotationMatch, RotationSearch, ShapeError,
+    PolarSpectrum, RotationConfig, RotationMatch, RotationSearch, SettingError, ShapeError,
 };
 
 /// Finds the rotations between consecutive scans. The spectrum of each scan is computed once and
@@ -15,7 +15,7 @@ pub struct SequentialRotation {
 }
 
 impl SequentialRotation {
-    pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
+    pub fn new(n: usize, config: &RotationConfig) -> Result<Self, SettingError> {
         let search = RotationSearch::new(n, config)?;
         let (later, earlier) = (search.new_spectrum(), search.new_spectrum());
         Ok(Self {

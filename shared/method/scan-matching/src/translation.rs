@@ -3,7 +3,7 @@ use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, TranslationConfig};
+use crate::config::TranslationConfig;
 use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::{PairSpectrum, fast_size};
 use crate::masked_correlation::keep_seen;
@@ -12,7 +12,7 @@ use crate::peak::PlanePeak;
 use crate::rotation::RotationMatch;
 use crate::scores::{Scores, Shift, reach_cells};
 use crate::warp::Rotation;
-use crate::{ShapeError, cells, kernels, whiten};
+use crate::{SettingError, ShapeError, cells, kernels, whiten};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionRunnerUp {
@@ -77,7 +77,7 @@ pub struct TranslationSearch {
 
 impl TranslationSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
-    pub fn new(n: usize, cell_m: f64, config: &TranslationConfig) -> Result<Self, ConfigError> {
+    pub fn new(n: usize, cell_m: f64, config: &TranslationConfig) -> Result<Self, SettingError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "translation", config.reach_m)?;
         let size = fast_size(Scores::min_size(n, reach));
@@ -91,7 +91,7 @@ impl TranslationSearch {
             turned: vec![0.0; n * n],
             later_energy: OverlapEnergy::new(n, around),
             turned_energy: OverlapEnergy::new(n, around),
-            scores: Scores::new(n, reach, size),
+            scores: Scores::new(reach, size),
         })
     }
 
@@ -146,15 +146,9 @@ impl TranslationSearch {
         let Some(best) = self.scores.highest() else {
             return MotionMatch::none(self.config.reach_m, angle_rad, variance_rad2);
         };
-        let peak = self.scores.peak(self.config.peak, best);
-        let shift = self.scores.place(self.config.peak, best, &peak); // line 19
-        self.motion(
-            shift,
-            &peak,
-            self.scores.runner_up(best),
-            angle_rad,
-            variance_rad2,
-        ) // lines 20 and 21
+        let peak = self.scores.peak(self.config.peak, best); // line 19
+        let runner_up = self.scores.runner_up(best);
+        self.motion(&peak, runner_up, angle_rad, variance_rad2) // lines 20 and 21
     }
 
     /// g'(x) = g(R x), so that f(x) ~ g'(x + R^T t).
@@ -208,14 +202,13 @@ impl TranslationSearch {
     /// t = R t' with t' the shift along the raster's axes: rows run backward, columns to the right.
     fn motion(
         &self,
-        shift: Vector2<f64>,
         peak: &PlanePeak,
         runner_up: Option<(Shift, f64)>,
         angle_rad: f64,
         variance_rad2: f64,
     ) -> MotionMatch {
         let turn = Rotation2::new(angle_rad);
-        let translation = turn * shift * -self.cell_m;
+        let translation = turn * peak.offset * -self.cell_m;
         let score = peak.value.min(1.0);
         let guess = guess(self.config.reach_m);
         let spread = shift_covariance(VARIANCE_SCALE, score, &peak.hessian, self.cell_m, guess);

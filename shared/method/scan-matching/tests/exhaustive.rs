@@ -219,7 +219,7 @@ fn rasters_of_another_shape_and_impossible_reaches_are_rejected() {
         ..config.clone()
     };
     let error = ExhaustiveSearch::new(65, 0.8, &far).err().unwrap();
-    let words = "exhaustive.reach_m = 30: expected";
+    let words = "exhaustive.reach_m is 30, but must be";
     assert!(error.to_string().starts_with(words), "{error}");
     assert!(ExhaustiveSearch::new(3, 0.8, &config).is_err());
     assert!(ExhaustiveSearch::new(65, f64::NAN, &config).is_err());

@@ -59,7 +59,6 @@ fn shifts_up_to_the_reach_are_found_in_every_direction() {
 #[test]
 fn every_form_of_the_search_finds_the_motion() {
     let motion = Motion::degrees(2.3, -0.7, 6.4);
-    let soft = Peak::SoftArgmax { temperature: 6.0 };
     let (rotation, translation) = Configs::default();
     // Weston et al., Algorithm 1, and phase correlation (Checchin et al., Algorithm 1).
     let line14 = RotationConfig {
@@ -82,19 +81,10 @@ fn every_form_of_the_search_finds_the_motion() {
         phase_only: true,
         ..translation.clone()
     };
-    let soft_angle = RotationConfig {
-        peak: soft,
-        ..rotation.clone()
-    };
-    let soft_shift = TranslationConfig {
-        peak: soft,
-        ..translation.clone()
-    };
-    let forms: [(&str, Configs, [f64; 2]); 4] = [
+    let forms: [(&str, Configs, [f64; 2]); 3] = [
         ("default", (rotation, translation), [0.1, 0.1]),
         ("Weston et al.", (line14, plain), [0.4, 1.0]),
         ("Checchin et al.", (phase, phase_shift), [0.4, 1.0]),
-        ("soft-argmax", (soft_angle, soft_shift), [0.4, 1.0]),
     ];
     for (name, configs, [metres, degrees]) in forms {
         let [dx, dy, dyaw] = errors(&recovered(255, 0.4, &configs, motion, 3), motion);

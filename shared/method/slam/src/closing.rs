@@ -9,21 +9,12 @@ use gyre_estimation::places::{
 };
 use gyre_estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
-use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
 use thiserror::Error;
 
 use crate::place::Place;
 use crate::{Keyframe, LoopCandidate, LoopOutcome, Query};
 use cache::Cache;
-
-/// Keyframes by their numbers, wherever they are kept.
-pub trait KeyframeSource {
-    /// The reason why a keyframe cannot be read.
-    type Error;
-
-    /// Reads a keyframe that was given to [`LoopCloser::push`].
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
-}
 
 /// Length of the path between a keyframe and the earlier ones that it is compared with, at least,
 /// m.
@@ -68,7 +59,7 @@ impl LoopCloser {
         submap_reach_m: f64,
         refinement: &RefinementConfig,
         capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, SettingError> {
         let submap = || Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1));
         Ok(Self {
             describer: Describer::new(),
@@ -114,19 +105,20 @@ impl LoopCloser {
         self.index.len()
     }
 
-    /// Describes the next keyframe whose submap is complete; returns `None` without one.
-    pub fn describe<S: KeyframeSource>(
+    /// Describes the next keyframe whose submap is complete; returns `None` without one. `read`
+    /// reads a keyframe that was given to [`LoopCloser::push`].
+    pub fn describe<E>(
         &mut self,
-        source: &mut S,
-    ) -> Result<Option<Place>, ClosingError<S::Error>> {
+        read: &mut impl FnMut(usize) -> Result<Keyframe, E>,
+    ) -> Result<Option<Place>, ClosingError<E>> {
         let next = self.index.len();
         if !self.is_complete(next) {
             return Ok(None);
         }
-        self.draw(source, next, 0).map_err(ClosingError::Source)?;
+        self.draw(read, next, 0).map_err(ClosingError::Source)?;
         let mut descriptor = Descriptor::default();
         self.describer.describe(&self.submaps[0], &mut descriptor);
-        let keyframe = self.cache.get(source, next).map_err(ClosingError::Source)?;
+        let keyframe = self.cache.get(read, next).map_err(ClosingError::Source)?;
         let place = Place {
             path_m: keyframe.path_m,
             motion: keyframe.motion,
@@ -138,10 +130,10 @@ impl LoopCloser {
 
     /// Queries the next keyframe that is described, and verifies its candidates; returns `None`
     /// without one.
-    pub fn close<S: KeyframeSource>(
+    pub fn close<E>(
         &mut self,
-        source: &mut S,
-    ) -> Result<Option<Query>, ClosingError<S::Error>> {
+        read: &mut impl FnMut(usize) -> Result<Keyframe, E>,
+    ) -> Result<Option<Query>, ClosingError<E>> {
         let keyframe = self.next_query;
         // A place that was restored is known before the keyframes behind it.
         if keyframe >= self.index.len() || !self.is_complete(keyframe) {
@@ -150,10 +142,9 @@ impl LoopCloser {
         let mut candidates = Vec::new();
         for candidate in self.candidates(keyframe) {
             if candidates.is_empty() {
-                self.draw(source, keyframe, 0)
-                    .map_err(ClosingError::Source)?;
+                self.draw(read, keyframe, 0).map_err(ClosingError::Source)?;
             }
-            self.draw(source, candidate.place, 1)
+            self.draw(read, candidate.place, 1)
                 .map_err(ClosingError::Source)?;
             candidates.push(self.verify(keyframe, &candidate)?);
         }
@@ -199,19 +190,19 @@ impl LoopCloser {
         found[..found.len().min(CANDIDATES)].to_vec()
     }
 
-    fn draw<S: KeyframeSource>(
+    fn draw<E>(
         &mut self,
-        source: &mut S,
+        read: &mut impl FnMut(usize) -> Result<Keyframe, E>,
         middle: usize,
         submap: usize,
-    ) -> Result<(), S::Error> {
+    ) -> Result<(), E> {
         let around = self.neighbours(middle);
         let submap = &mut self.submaps[submap];
-        let keyframe = self.cache.get(source, middle)?;
+        let keyframe = self.cache.get(read, middle)?;
         submap.start(&keyframe.points, &keyframe.twist);
         let pose = keyframe.pose.motion;
         for other in around.filter(|other| *other != middle) {
-            let other = self.cache.get(source, other)?;
+            let other = self.cache.get(read, other)?;
             let motion = pose.inv_mul(&other.pose.motion);
             submap.add(&other.points, &other.twist, &motion);
         }

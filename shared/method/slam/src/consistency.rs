@@ -4,7 +4,7 @@
 
 use std::cmp::Reverse;
 
-use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
+use gyre_estimation::{CHI_SQUARE_99_9, Constraint, chi_square};
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
 use nalgebra::Matrix3;
 
@@ -55,10 +55,7 @@ impl DeadReckoning {
             .then(&self.motion(a.to, b.to));
         let error = b.motion.error(&predicted.motion);
         let sum = predicted.covariance + b.motion.covariance;
-        let chi_square = sum
-            .cholesky()
-            .map(|factor| error.dot(&factor.solve(&error)));
-        chi_square.is_some_and(|chi_square| chi_square <= CHI_SQUARE_99_9)
+        chi_square(&error, &sum) <= CHI_SQUARE_99_9
     }
 }
 

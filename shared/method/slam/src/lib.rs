@@ -16,7 +16,7 @@ mod trajectory;
 mod variance;
 mod verdict;
 
-pub use closing::{ClosingError, KeyframeSource, LoopCloser};
+pub use closing::{ClosingError, LoopCloser};
 pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
 pub use fixes::{FixCounts, FixRefusal, Fixes};

@@ -5,7 +5,6 @@
 mod localiser;
 mod map;
 mod placement;
-mod registration;
 mod sight;
 
 pub use localiser::{Fix, Localisation, Localiser, Observation, Status};

@@ -303,11 +303,7 @@ impl TrajectoryEstimator {
         let &Constraint { from, to, .. } = closing;
         let keyframes = self.keyframes.len();
         if from.max(to) >= keyframes {
-            return Err(EstimationError::UnknownKeyframe {
-                from,
-                to,
-                keyframes,
-            });
+            return Err(EstimationError::unknown([from, to], keyframes));
         }
         let stretch = |keyframe: usize| (self.keyframes[keyframe].path_m / GROUP_M) as u64;
         let group = Some(stretch(from) << 32 | stretch(to));

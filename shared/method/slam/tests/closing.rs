@@ -1,5 +1,7 @@
 //! Loops depend on the keyframes, and not on when they come or on where the closing is stopped.
 
+use std::convert::Infallible;
+
 use crate::common::{AROUND, Drive};
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{LoopCloser, LoopOutcome, Place, Query, Record, SUBMAP_REACH_M};
@@ -18,13 +20,13 @@ struct Logs {
 
 impl Logs {
     fn advance(&mut self, closer: &mut LoopCloser, drive: &Drive) {
-        let mut source = drive;
-        while let Some(place) = closer.describe(&mut source).unwrap() {
+        let mut read = |index: usize| Ok::<_, Infallible>(drive.keyframes[index].clone());
+        while let Some(place) = closer.describe(&mut read).unwrap() {
             let mut bytes = Vec::new();
             place.encode(&mut bytes);
             self.places.push(bytes);
         }
-        while let Some(query) = closer.close(&mut source).unwrap() {
+        while let Some(query) = closer.close(&mut read).unwrap() {
             let mut bytes = Vec::new();
             query.encode(&mut bytes);
             self.queries.push(bytes);

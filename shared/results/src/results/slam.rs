@@ -227,11 +227,7 @@ fn check(query: &Query, keyframes: usize) -> Result<(), EstimationError> {
     let from = places.max().unwrap_or(to);
     match from.max(to) < keyframes {
         true => Ok(()),
-        false => Err(EstimationError::UnknownKeyframe {
-            from,
-            to,
-            keyframes,
-        }),
+        false => Err(EstimationError::unknown([from, to], keyframes)),
     }
 }
 

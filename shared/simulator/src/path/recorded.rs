@@ -13,33 +13,19 @@ const FASTEST_MPS: f64 = 90.0;
 /// Maximum time between two poses, seconds.
 const LONGEST_PAUSE_S: f64 = 3600.0;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Excerpt {
-    /// Start, seconds after the file's first pose.
-    pub from_s: f64,
-    /// Maximum duration, seconds.
-    pub for_s: f64,
-    /// Poses a second in a file without times.
-    pub rate_hz: f64,
-}
-
-/// Returns a path along a trajectory of any format, in the frame of the excerpt's first pose. It
-/// passes within 5 cm of 95 % of a real drive's poses, whose noise is the rest.
-pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
-    let poses = timed(path, excerpt.rate_hz)?;
+/// Returns a path along a trajectory of any format from `from_s` seconds after its first pose on,
+/// in the frame of the pose there. It passes within 5 cm of 95 % of a real drive's poses, whose
+/// noise is the rest. A file without times has `rate_hz` poses a second.
+pub fn read(path: &Path, from_s: f64, rate_hz: f64) -> Result<SplinePath, SimulatorError> {
+    let poses = timed(path, rate_hz)?;
     let error = |reason: String| {
         SimulatorError::Refused(format!("cannot drive along {}: {reason}", path.display()))
     };
-    let end_s = excerpt.from_s + excerpt.for_s;
-    let within: Vec<_> = poses
-        .iter()
-        .filter(|(s, _)| (excerpt.from_s..=end_s).contains(s))
-        .collect();
+    let within: Vec<_> = poses.iter().filter(|(s, _)| *s >= from_s).collect();
     let [(start_s, origin), _, ..] = within[..] else {
         let last_s = poses.last().map_or(0.0, |(s, _)| *s);
         return Err(error(format!(
-            "it has fewer than two poses after {} s; it lasts {last_s:.1} s",
-            excerpt.from_s
+            "it has fewer than two poses after {from_s} s; it lasts {last_s:.1} s"
         )));
     };
     check_steps(&within).map_err(error)?;

@@ -41,10 +41,7 @@ impl Constant {
         let found = others
             .iter()
             .fold(self.found, |all, next| all.combined(&next.found));
-        let basis = drives().map(|it| {
-            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.label.3);
-            format!("{value:.4} \u{b1} {sigma:.4}")
-        });
+        let basis = drives().map(|it| it.found.times(it.label.3).to_string());
         let mut mean = Self {
             found,
             has_settled: drives().all(|it| it.has_settled),
@@ -65,11 +62,8 @@ pub(super) fn constant(
 ) -> Constant {
     let found = Estimate::new(configured + fact.change.value, fact.change.sigma);
     let part = |estimate: &Estimate| {
-        format!(
-            "{:.3} \u{b1} {:.3}",
-            (configured + estimate.value) * label.3,
-            estimate.sigma * label.3
-        )
+        let part = Estimate::new(configured + estimate.value, estimate.sigma).times(label.3);
+        format!("{part:.3}")
     };
     let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
         (Some(drift), _) => format!(
@@ -141,11 +135,10 @@ impl fmt::Display for Constant {
             _ => "agrees with the configured value",
         };
         let (_, name, unit, scale) = self.label;
-        let [value, sigma, configured] =
-            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * scale);
+        let (found, configured) = (self.found.times(scale), self.configured * scale);
         write!(
             f,
-            "{name:<21} {value:.4} \u{b1} {sigma:.4} {unit}, configured {configured:.4}: {verdict}\n{:<21} {}",
+            "{name:<21} {found} {unit}, configured {configured:.4}: {verdict}\n{:<21} {}",
             "", self.basis
         )
     }

@@ -78,10 +78,7 @@ impl GyroCalibration {
                 "scale = {:.4}\nscale_sigma = {:.4}\n",
                 scale.value, scale.sigma
             ),
-            false => format!(
-                "# scale stays as configured: {:.4} \u{b1} {:.4} is no better\n",
-                scale.value, scale.sigma
-            ),
+            false => format!("# scale stays as configured: {scale} is no better\n"),
         };
         text + &format!(
             "bias_radps = {:.6} # \u{b1} {:.6} in this drive: the next one may begin with another\n",
@@ -118,24 +115,17 @@ impl GyroCalibration {
                 self.correlation
             ),
             format!(
-                "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} drift {:.0} \u{b1} {:.0} ppm{drifts}",
+                "{:<21} {late} s{}\n{:<21} drift {:.0} ppm{drifts}",
                 "gyro, late by",
-                late.value,
-                late.sigma,
                 late.verdict(used(configured.delay_s)),
                 "",
-                drift.value * 1e6,
-                drift.sigma * 1e6
+                drift.times(1e6)
             ),
+            format!("{:<21} {scale}{tells}", "gyro, scale"),
             format!(
-                "{:<21} {:.4} \u{b1} {:.4}{tells}",
-                "gyro, scale", scale.value, scale.sigma
-            ),
-            format!(
-                "{:<21} {:.4} \u{b1} {:.4} deg/s in this drive",
+                "{:<21} {} deg/s in this drive",
                 "gyro, bias",
-                self.bias_radps.value.to_degrees(),
-                self.bias_radps.sigma.to_degrees()
+                self.bias_radps.times(1f64.to_degrees())
             ),
         ]
         .join("\n")

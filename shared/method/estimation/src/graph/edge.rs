@@ -32,7 +32,7 @@ impl Edge {
     pub fn linearise(&self, poses: &[Pose]) -> Linear {
         let [from, to] = self.ends;
         let relative = Relative::predict(&poses[from], &poses[to]);
-        let innovation = relative.innovation(&self.motion);
+        let innovation = self.motion.error(&relative.motion);
         let (a, b) = (relative.by_from, relative.by_to);
         let (weighted_a, weighted_b) = (
             a.transpose() * self.information,

@@ -190,26 +190,23 @@ impl PoseGraph {
         let mut scale = widest;
         for _ in 0..MAX_SCALES {
             let kernel = Kernel::GemanMcClure { scale };
-            self.reweigh(|chi_square| kernel.weight(chi_square));
+            self.reweigh(&kernel, f64::INFINITY);
             self.descend(Weights::Kept, COARSE)?;
             if scale <= CHI_SQUARE_99_9_PLANE {
                 break;
             }
             scale = (0.5 * scale).max(CHI_SQUARE_99_9_PLANE);
         }
-        let chi_squares: Vec<f64> = self.chi_squares().collect();
         let kernel = self.options.kernel;
-        for (measured, chi_square) in self.positions.iter_mut().zip(chi_squares) {
-            measured.is_refused = chi_square > CHI_SQUARE_99_9_PLANE;
-            measured.weigh(&kernel, chi_square);
-        }
+        self.reweigh(&kernel, CHI_SQUARE_99_9_PLANE);
         Ok(())
     }
 
-    fn reweigh(&mut self, weight: impl Fn(f64) -> f64) {
+    fn reweigh(&mut self, kernel: &Kernel, gate: f64) {
         let chi_squares: Vec<f64> = self.chi_squares().collect();
         for (measured, chi_square) in self.positions.iter_mut().zip(chi_squares) {
-            measured.weight = weight(chi_square);
+            measured.is_refused = chi_square > gate;
+            measured.weigh(kernel, chi_square);
         }
     }
 

@@ -72,8 +72,7 @@ impl PoseGraph {
             a.edge.ends.cmp(&b.edge.ends).then_with(by_motion)
         });
         self.state.frame = None;
-        self.system = None;
-        self.factorised = false;
+        self.forget_system();
         self.place_frame();
         if self.state.frame.is_some() {
             let before = self.state.clone();

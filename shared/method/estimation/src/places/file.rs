@@ -38,9 +38,9 @@ impl PlaceIndex {
         bytes.extend((self.len() as u64).to_le_bytes());
         let sieves = self.sieves.chunks_exact(Descriptor::SIEVE_BYTES);
         let spectra = self.spectra.chunks_exact(SPECTRUM_BYTES);
-        for ((place, sieve), spectrum) in self.places.iter().zip(sieves).zip(spectra) {
-            bytes.extend(place.id.to_le_bytes());
-            bytes.extend(place.path_m.to_le_bytes());
+        for (((id, path_m), sieve), spectrum) in self.places.iter().zip(sieves).zip(spectra) {
+            bytes.extend(id.to_le_bytes());
+            bytes.extend(path_m.to_le_bytes());
             bytes.extend_from_slice(sieve);
             bytes.extend_from_slice(cast_slice(spectrum));
         }

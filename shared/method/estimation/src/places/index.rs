@@ -35,17 +35,11 @@ pub struct OrderError {
     pub last_m: f64,
 }
 
-/// The data of a place beside its descriptor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PathPoint {
-    pub id: u64,
-    pub path_m: f64,
-}
-
 /// The descriptors of all places, in the order of the path.
 /// A query allocates nothing.
 pub struct PlaceIndex {
-    pub(super) places: Vec<PathPoint>,
+    /// The id and the path of each place.
+    pub(super) places: Vec<(u64, f64)>,
     pub(super) sieves: Vec<u8>,
     pub(super) spectra: Vec<i8>,
     norms: Vec<f32>,
@@ -87,11 +81,11 @@ impl PlaceIndex {
         path_m: f64,
         descriptor: &Descriptor,
     ) -> Result<usize, OrderError> {
-        let last_m = self.places.last().map_or(0.0, |last| last.path_m);
+        let last_m = self.places.last().map_or(0.0, |(_, last_m)| *last_m);
         if !(path_m.is_finite() && path_m >= last_m) {
             return Err(OrderError { path_m, last_m });
         }
-        self.places.push(PathPoint { id, path_m });
+        self.places.push((id, path_m));
         self.sieves.extend_from_slice(&descriptor.sieve);
         self.spectra.extend_from_slice(&descriptor.spectrum);
         self.norms.push(norm(&descriptor.spectrum));
@@ -107,10 +101,6 @@ impl PlaceIndex {
         self.places.is_empty()
     }
 
-    pub fn place(&self, place: usize) -> Option<(u64, f64)> {
-        self.places.get(place).map(|place| (place.id, place.path_m))
-    }
-
     pub fn descriptor(&self, place: usize) -> Option<Descriptor> {
         let (sieves, spectra) = (Descriptor::SIEVE_BYTES, SPECTRUM_BYTES);
         (place < self.len()).then(|| Descriptor {
@@ -120,7 +110,8 @@ impl PlaceIndex {
     }
 
     pub fn places_until(&self, path_m: f64) -> usize {
-        self.places.partition_point(|place| place.path_m <= path_m)
+        self.places
+            .partition_point(|(_, place_m)| *place_m <= path_m)
     }
 
     /// Finds the places among the first `eligible` ones that look most similar: at most 32, the
@@ -136,7 +127,7 @@ impl PlaceIndex {
         self.query.sift(&descriptor.sieve, sieves);
         self.query
             .rank(&descriptor.spectrum, &self.spectra, &self.norms, 1);
-        let path_m = |candidate: &Candidate| self.places[candidate.place].path_m;
+        let path_m = |candidate: &Candidate| self.places[candidate.place].1;
         keep_apart(&mut self.query.found, |a, b| {
             (path_m(a) - path_m(b)).abs() >= apart_m
         });

@@ -2,7 +2,7 @@
 
 use gyre_geometry::Pose;
 use gyre_scan_matching::{
-    ConfigError, KeyframeAligner, MaskedCorrelation, MotionMatch, RefinementConfig, RotationMatch,
+    KeyframeAligner, MaskedCorrelation, MotionMatch, RefinementConfig, RotationMatch, SettingError,
     Submap, TranslationConfig, TranslationSearch,
 };
 use ndarray::{Array2, ArrayView2};
@@ -29,7 +29,7 @@ pub struct Registrar {
 impl Registrar {
     /// Plans registrations of keyframes of at most `capacity` points. `refinement` is the
     /// refinement of the odometry: its cells and reach, and the scales of its covariance.
-    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         let translation = TranslationConfig {
             reach_m: REACH_M,
             ..TranslationConfig::default()

@@ -1,7 +1,7 @@
 use std::f64::consts::PI;
 
 use gyre_geometry::{UncertainMotion, pose, wrap_angle};
-use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
 
 use super::{Candidate, Registrar};
 
@@ -49,7 +49,7 @@ pub struct Verification {
 pub struct LoopVerifier(Registrar);
 
 impl LoopVerifier {
-    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         Ok(Self(Registrar::new(refinement, capacity)?))
     }
 
@@ -86,7 +86,7 @@ impl LoopVerifier {
         if best.score < MIN_CORRELATION - COARSE_LOSS {
             return found;
         }
-        match registrar.aligner.align(later, earlier, &searched) {
+        match registrar.aligner.align(later, earlier, false, &searched) {
             Some(motion) => {
                 found.motion = motion;
                 found.correlation = registrar.correlation(&motion.motion, None);

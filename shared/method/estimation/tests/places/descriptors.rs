@@ -101,7 +101,6 @@ fn only_eligible_places_are_found_and_those_near_a_better_one_are_left_out() {
         );
     }
     assert_eq!(index.places_until(60.0), 4);
-    assert_eq!(index.place(3), Some((3, 60.0)));
 }
 
 #[test]

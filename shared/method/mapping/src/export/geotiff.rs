@@ -38,28 +38,6 @@ pub fn write_geotiff(
     let top_left = extent.corner_m(source.cell_m())
         + nalgebra::Vector2::new(0.0, rows as f64 * source.cell_m());
     let transformation = transformation(&georeference, &top_left, source.cell_m());
-    let mut bytes = Cursor::new(Vec::new());
-    let failed = |error: TiffError| MapError::Encode(error.to_string());
-    let mut encoder = TiffEncoder::new(&mut bytes)
-        .map_err(failed)?
-        .with_compression(Compression::Deflate(DeflateLevel::Balanced));
-    let mut image = encoder
-        .new_image::<Gray8>(columns as u32, rows as u32)
-        .map_err(failed)?;
-    image
-        .extra_samples(&[ExtraSamples::UnassociatedAlpha])
-        .map_err(failed)?;
-    image.rows_per_strip(TILE_CELLS as u32).map_err(failed)?;
-    let tags = image.encoder();
-    tags.write_tag(Tag::ModelTransformationTag, &transformation[..])
-        .map_err(failed)?;
-    tags.write_tag(Tag::GeoKeyDirectoryTag, &keys(&georeference)[..])
-        .map_err(failed)?;
-    tags.write_tag(GDAL_METADATA, BANDS).map_err(failed)?;
-    if georeference.epsg.is_none() {
-        tags.write_tag(Tag::GeoAsciiParamsTag, LOCAL)
-            .map_err(failed)?;
-    }
     // The encoder compresses data that it gets as a whole, and not data that it gets strip by
     // strip.
     let mut pixels = Vec::with_capacity(2 * columns * rows);
@@ -67,7 +45,23 @@ pub fn write_geotiff(
         pixels.extend_from_slice(bytemuck::cast_slice(cells));
         Ok(())
     })?;
-    image.write_data(&pixels).map_err(failed)?;
+    let mut bytes = Cursor::new(Vec::new());
+    let mut encode = || -> Result<(), TiffError> {
+        let mut encoder = TiffEncoder::new(&mut bytes)?
+            .with_compression(Compression::Deflate(DeflateLevel::Balanced));
+        let mut image = encoder.new_image::<Gray8>(columns as u32, rows as u32)?;
+        image.extra_samples(&[ExtraSamples::UnassociatedAlpha])?;
+        image.rows_per_strip(TILE_CELLS as u32)?;
+        let tags = image.encoder();
+        tags.write_tag(Tag::ModelTransformationTag, &transformation[..])?;
+        tags.write_tag(Tag::GeoKeyDirectoryTag, &keys(&georeference)[..])?;
+        tags.write_tag(GDAL_METADATA, BANDS)?;
+        if georeference.epsg.is_none() {
+            tags.write_tag(Tag::GeoAsciiParamsTag, LOCAL)?;
+        }
+        image.write_data(&pixels)
+    };
+    encode().map_err(|error| MapError::Encode(error.to_string()))?;
     Ok(gyre_storage::write(path, bytes.into_inner())?)
 }
 

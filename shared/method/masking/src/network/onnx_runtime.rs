@@ -1,50 +1,29 @@
 use std::path::Path;
 
-use ndarray::{ArrayView3, ArrayViewMut3, Axis};
 use ort::{
     environment::Environment,
     ep::ExecutionProviderDispatch,
-    session::{Session, builder::SessionBuilder},
-    value::{Outlet, TensorRef, ValueType},
+    session::builder::SessionBuilder,
+    value::{Outlet, ValueType},
 };
 
-use super::{NetworkError, fill};
-use crate::networks::{one_line, runtime};
+use super::NetworkError;
+use crate::networks::{one_line, planes::Engine, runtime};
 use crate::{Backend, MaskingConfig, Provider, model::Model};
 
-#[derive(Debug)]
-pub(super) struct OnnxRuntime {
-    session: Session,
-}
-
-impl OnnxRuntime {
-    pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
-        let environment = runtime::open(path)?;
-        let session = builder(&environment, config)?
-            .commit_from_memory(&model.bytes)
-            .map_err(|error| rejected(model, error.message()))?;
-        Ok(Self { session })
-    }
-
-    pub fn inputs(&self) -> Vec<String> {
-        self.session.inputs().iter().map(describe).collect()
-    }
-
-    pub fn outputs(&self) -> Vec<String> {
-        self.session.outputs().iter().map(describe).collect()
-    }
-
-    pub fn run(
-        &mut self,
-        rasters: ArrayView3<'_, f32>,
-        masks: ArrayViewMut3<'_, f32>,
-    ) -> Result<(), NetworkError> {
-        let failed = |error: ort::Error| NetworkError::Run(one_line(error.message()));
-        let input = TensorRef::from_array_view(rasters.insert_axis(Axis(0))).map_err(failed)?;
-        let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
-        let (_, computed) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
-        fill(masks, computed)
-    }
+/// Loads a model. Returns the engine, and the names of the model's inputs and outputs.
+pub(super) fn load(
+    path: &Path,
+    model: &Model,
+    config: &MaskingConfig,
+) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
+    let environment = runtime::open(path)?;
+    let session = builder(&environment, config)?
+        .commit_from_memory(&model.bytes)
+        .map_err(|error| rejected(model, error.message()))?;
+    let [inputs, outputs] =
+        [session.inputs(), session.outputs()].map(|tensors| tensors.iter().map(describe).collect());
+    Ok((Engine::OnnxRuntime(session), inputs, outputs))
 }
 
 fn builder(

@@ -1,28 +1,14 @@
-use std::{
-    fmt::Display,
-    panic::{AssertUnwindSafe, catch_unwind},
-    sync::Arc,
-};
-
-use crate::networks::{one_line, planes::by_rten};
-use ndarray::{Array3, ArrayView3, ArrayViewMut3};
-use rten::{ModelOptions, ThreadPool};
+use rten::ModelOptions;
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, GraphProto, ModelProto, ValueInfoProto,
 };
 
-use super::{NetworkError, fill};
+use super::NetworkError;
+use crate::networks::planes::{Engine, guarded};
 use crate::{Backend, model::Model};
 
 /// The newest operator version where the models of `models/` agree with ONNX Runtime.
 const OPSET: i64 = 26;
-
-/// A network. One thread computes it.
-#[derive(Debug)]
-pub(super) struct Rten {
-    network: Box<rten::Model>,
-    thread: Arc<ThreadPool>,
-}
 
 pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
@@ -44,54 +30,20 @@ pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     }
 }
 
-fn rejected(model: &Model, reason: &str) -> NetworkError {
+pub(super) fn rejected(model: &Model, reason: &str) -> NetworkError {
     NetworkError::load(Backend::Rten, model, reason)
 }
 
-impl Rten {
-    pub fn load(model: &Model, mut file: ModelProto) -> Result<Self, NetworkError> {
-        if let Some(graph) = &mut file.graph {
-            state_kernel_sizes(graph);
-        }
-        let rejected = |reason: String| rejected(model, &reason);
-        let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
-        let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
-        Ok(Self {
-            network: Box::new(network),
-            thread: Arc::new(ThreadPool::with_num_threads(1)),
-        })
+/// Loads a network into rten. Only when it computes does that find operators that do not fit each
+/// other.
+pub(super) fn load(model: &Model, mut file: ModelProto) -> Result<Engine, NetworkError> {
+    if let Some(graph) = &mut file.graph {
+        state_kernel_sizes(graph);
     }
-
-    /// Computes the masks of empty rasters. Only now does rten find operators that do not fit each
-    /// other.
-    pub fn rehearse(&mut self, model: &Model, empty: Array3<f32>) -> Result<(), NetworkError> {
-        match self.run(empty.view(), empty.clone().view_mut()) {
-            Err(NetworkError::Run(reason)) => Err(rejected(model, &reason)),
-            computed => computed,
-        }
-    }
-
-    pub fn run(
-        &mut self,
-        rasters: ArrayView3<'_, f32>,
-        masks: ArrayViewMut3<'_, f32>,
-    ) -> Result<(), NetworkError> {
-        let (scans, rows, columns) = rasters.dim();
-        let shape = [1, scans, rows, columns];
-        let cells: Vec<f32> = rasters.iter().copied().collect();
-        let computed = guarded(|| by_rten(&self.network, &self.thread, shape, &cells));
-        let (_, factors) = computed.map_err(NetworkError::Run)?;
-        fill(masks, &factors)
-    }
-}
-
-/// Calls rten, or what reads a model. A model may have what that does not expect, and then it
-/// panics: this becomes an error too.
-pub(super) fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(result) => result.map_err(|error| one_line(&error.to_string())),
-        Err(_) => Err("it fails on this model".to_owned()),
-    }
+    let rejected = |reason: String| rejected(model, &reason);
+    let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
+    let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
+    Ok(Engine::of_rten(network))
 }
 
 fn newest_operators(file: &ModelProto) -> i64 {
@@ -163,15 +115,4 @@ fn describe(tensor: &ValueInfoProto) -> String {
     let sizes = tensor.shape.iter().flat_map(|shape| &shape.dim);
     let sizes: Vec<_> = sizes.map(size).collect();
     format!("`{name}` {kind} [{}]", sizes.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_panic_of_rten_becomes_an_error() {
-        let panics = || -> Result<(), String> { panic!("as rten may") };
-        assert_eq!(guarded(panics), Err("it fails on this model".to_owned()));
-    }
 }

@@ -1,8 +1,13 @@
 //! A network in the program that is shown planes of cells.
 
-use std::fmt::Display;
-use std::path::Path;
-use std::sync::Arc;
+use std::{
+    borrow::Cow,
+    error::Error,
+    fmt::Display,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::Path,
+    sync::Arc,
+};
 
 use ort::{session::Session, value::TensorRef};
 use rten::{Model, ModelOptions, RunOptions, ThreadPool, ValueView};
@@ -33,7 +38,7 @@ pub struct PlanesNetwork {
 }
 
 #[derive(Debug)]
-enum Engine {
+pub(crate) enum Engine {
     OnnxRuntime(Session),
     Rten(Box<Model>, Arc<ThreadPool>),
 }
@@ -67,9 +72,8 @@ impl PlanesNetwork {
             }
             None => {
                 let model = ModelOptions::with_all_ops().load_static_slice(bytes);
-                let thread = Arc::new(ThreadPool::with_num_threads(1));
                 let model = model.map_err(|error| error.to_string());
-                model.map(|model| Engine::Rten(Box::new(model), thread))
+                model.map(Engine::of_rten)
             }
         };
         Ok(Self {
@@ -83,11 +87,10 @@ impl PlanesNetwork {
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];
-        let (given, values) = match &mut self.engine {
-            Engine::OnnxRuntime(session) => by_onnx_runtime(session, shape, planes),
-            Engine::Rten(model, thread) => by_rten(model, thread, shape, planes),
-        }
-        .map_err(|reason| failed(self.name, reason))?;
+        let computed = self.engine.compute(shape, planes, |given, values| {
+            (given.to_vec(), values.into_owned())
+        });
+        let (given, values) = computed.map_err(|reason| failed(self.name, reason))?;
         match given.strip_prefix(&[1]) == Some(&self.given) {
             true => Ok(values),
             false => Err(failed(self.name, format_args!("it gives {given:?}"))),
@@ -102,35 +105,60 @@ fn failed(network: &'static str, reason: impl Display) -> PlanesError {
     }
 }
 
-type Given = (Vec<usize>, Vec<f32>);
+impl Engine {
+    /// One thread computes the network.
+    pub fn of_rten(model: Model) -> Self {
+        Self::Rten(Box::new(model), Arc::new(ThreadPool::with_num_threads(1)))
+    }
 
-fn by_onnx_runtime(
-    session: &mut Session,
-    shape: [usize; 4],
-    planes: &[f32],
-) -> Result<Given, String> {
-    let mut compute = || -> ort::Result<Given> {
-        let input = TensorRef::from_array_view((shape, planes))?;
-        let outputs = session.run(ort::inputs![input])?;
-        let (shape, values) = outputs[0].try_extract_tensor::<f32>()?;
-        let shape = shape.iter().map(|side| *side as usize).collect();
-        Ok((shape, values.to_vec()))
-    };
-    compute().map_err(|error| one_line(error.message()))
+    /// Computes a network. `take` gets the shape and the values of its output.
+    pub fn compute<T>(
+        &mut self,
+        shape: [usize; 4],
+        planes: &[f32],
+        take: impl FnOnce(&[usize], Cow<'_, [f32]>) -> T,
+    ) -> Result<T, String> {
+        match self {
+            Self::OnnxRuntime(session) => {
+                let compute = || -> ort::Result<T> {
+                    let input = TensorRef::from_array_view((shape, planes))?;
+                    let outputs = session.run(ort::inputs![input])?;
+                    let (shape, values) = outputs[0].try_extract_tensor::<f32>()?;
+                    let shape: Vec<_> = shape.iter().map(|side| *side as usize).collect();
+                    Ok(take(&shape, values.into()))
+                };
+                compute().map_err(|error| one_line(error.message()))
+            }
+            Self::Rten(model, thread) => {
+                let options = RunOptions::default().with_thread_pool(Some(thread.clone()));
+                let run = || -> Result<_, Box<dyn Error>> {
+                    let input = ValueView::from_shape(shape, planes)?;
+                    let output = model.run_one(input.into(), Some(options))?;
+                    Ok(output.into_shape_vec::<f32, 4>()?)
+                };
+                let (shape, values) = guarded(run)?;
+                Ok(take(&shape, values.into()))
+            }
+        }
+    }
 }
 
-/// Computes a network in rten. Returns the shape and the values of its output.
-pub(crate) fn by_rten(
-    model: &Model,
-    thread: &Arc<ThreadPool>,
-    shape: [usize; 4],
-    planes: &[f32],
-) -> Result<Given, String> {
-    let input = ValueView::from_shape(shape, planes).map_err(|error| error.to_string())?;
-    let options = RunOptions::default().with_thread_pool(Some(thread.clone()));
-    let output = model.run_one(input.into(), Some(options));
-    let output = output.map_err(|error| error.to_string())?;
-    let output = output.into_shape_vec::<f32, 4>();
-    let (shape, values) = output.map_err(|error| error.to_string())?;
-    Ok((shape.to_vec(), values))
+/// Calls rten, or what reads a model. A model may have what that does not expect, and then it
+/// panics: this becomes an error too.
+pub(crate) fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(result) => result.map_err(|error| one_line(&error.to_string())),
+        Err(_) => Err("it fails on this model".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_rten_becomes_an_error() {
+        let panics = || -> Result<(), String> { panic!("as rten may") };
+        assert_eq!(guarded(panics), Err("it fails on this model".to_owned()));
+    }
 }

@@ -42,7 +42,7 @@ fn weights_in_another_file_are_rejected_with_the_remedy() {
     fs::write(beside, [0; 36]).unwrap();
     for backend in backends() {
         let words = [
-            "single-31.onnx keeps weights in another file, \"single-31.onnx.data\"",
+            "single-31.onnx keeps weights in another file, which the SHA-256",
             "`onnx.save(onnx.load(NAME), NAME)`",
             "its new SHA-256 into the card",
         ];

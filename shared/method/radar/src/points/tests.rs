@@ -2,7 +2,7 @@
 
 use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
 use crate::raster::tests::scene::Sensor;
-use crate::scan::{OwnedScan, ScanError, Sense, flag};
+use crate::scan::{OwnedScan, Sense, flag};
 use gyre_geometry::{SparsePoint, Twist};
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
@@ -255,10 +255,7 @@ fn tiny_scans_have_no_points_and_inconsistent_ones_are_rejected() {
     let rejected = PointExtractor::new(&PointsConfig::default())
         .unwrap()
         .extract(&scan.view(), 0, &mut [UNSET]);
-    assert!(matches!(
-        rejected,
-        Err(ScanError::Length { what: "image", .. })
-    ));
+    assert!(rejected.unwrap_err().to_string().contains("image has"));
 }
 
 #[test]

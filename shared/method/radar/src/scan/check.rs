@@ -7,36 +7,8 @@ use std::ops::RangeInclusive;
 const MAX_STEP_BACK_NS: i64 = 5_000_000;
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ScanError {
-    #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
-    Length {
-        what: &'static str,
-        expected: usize,
-        actual: usize,
-    },
-    #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
-    Geometry {
-        what: &'static str,
-        value: f64,
-        bounds: RangeInclusive<f64>,
-    },
-    #[error(
-        "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
-    )]
-    StampOrder { row: usize, back_s: f64 },
-    #[error(
-        "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
-    )]
-    StampSpan {
-        row: usize,
-        after_s: f64,
-        max_s: f64,
-    },
-    #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
-    StampApart { apart_s: f64 },
-    #[error("azimuth {index} of the scan is at {value} rad")]
-    Azimuth { index: usize, value: f32 },
-}
+#[error("{0}")]
+pub struct ScanError(String);
 
 impl PolarScan<'_> {
     /// Checks that the slices are as long as the geometry requires, and that every number is within
@@ -63,29 +35,16 @@ impl PolarScan<'_> {
             let bins = geometry.bins as f64;
             check_number("row stride in bytes", geometry.stride as f64, bins..=1e9)?;
         }
-        check_number(
-            "range resolution in metres",
-            geometry.range_resolution_m.into(),
-            1e-3..=1e3,
-        )?;
-        check_number(
-            "range offset in metres",
-            geometry.range_offset_m.into(),
-            -1e4..=1e4,
-        )?;
-        check_number(
-            "Doppler shift in seconds",
-            geometry.doppler_s.into(),
-            -1.0..=1.0,
-        )?;
-        match self.azimuth_rad[..geometry.azimuths]
-            .iter()
-            .position(|azimuth| !azimuth.is_finite())
-        {
-            Some(index) => Err(ScanError::Azimuth {
-                index,
-                value: self.azimuth_rad[index],
-            }),
+        let resolution_m = geometry.range_resolution_m.into();
+        let (offset_m, doppler_s) = (geometry.range_offset_m.into(), geometry.doppler_s.into());
+        check_number("range resolution in metres", resolution_m, 1e-3..=1e3)?;
+        check_number("range offset in metres", offset_m, -1e4..=1e4)?;
+        check_number("Doppler shift in seconds", doppler_s, -1.0..=1.0)?;
+        let mut azimuths = self.azimuth_rad[..geometry.azimuths].iter().enumerate();
+        match azimuths.find(|(_, azimuth)| !azimuth.is_finite()) {
+            Some((index, azimuth)) => Err(ScanError(format!(
+                "azimuth {index} of the scan is at {azimuth} rad"
+            ))),
             None => Ok(()),
         }
     }
@@ -101,9 +60,10 @@ impl PolarScan<'_> {
             .map_or(0, |first| stamp_ns.saturating_sub(*first));
         match apart_ns.saturating_abs() <= MAX_INTERVAL_NS {
             true => Ok(()),
-            false => Err(ScanError::StampApart {
-                apart_s: apart_ns as f64 * 1e-9,
-            }),
+            false => Err(ScanError(format!(
+                "the scan's stamp is {:.3} s from that of its first row",
+                seconds(apart_ns)
+            ))),
         }
     }
 }
@@ -117,51 +77,50 @@ pub fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError>
     for (row, stamp) in stamp_ns.iter().copied().enumerate() {
         let (back_ns, after_ns) = (latest.saturating_sub(stamp), stamp.saturating_sub(first));
         if back_ns > MAX_STEP_BACK_NS {
-            return Err(ScanError::StampOrder {
-                row,
-                back_s: back_ns as f64 * 1e-9,
-            });
+            return Err(ScanError(format!(
+                "row {row}: stamp is {:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged",
+                seconds(back_ns)
+            )));
         }
         if after_ns > max_sweep_ns {
-            return Err(ScanError::StampSpan {
-                row,
-                after_s: after_ns as f64 * 1e-9,
-                max_s: max_sweep_ns as f64 * 1e-9,
-            });
+            return Err(ScanError(format!(
+                "row {row}: stamp is {:.3} s after that of the first row, so the rows are not one sweep of at most {:.3} s: the clock was set in between, or a stamp is damaged",
+                seconds(after_ns),
+                seconds(max_sweep_ns)
+            )));
         }
         latest = latest.max(stamp);
     }
     Ok(())
 }
 
-fn check_length(what: &'static str, actual: usize, expected: usize) -> Result<(), ScanError> {
+fn seconds(ns: i64) -> f64 {
+    ns as f64 * 1e-9
+}
+
+fn check_length(what: &str, actual: usize, expected: usize) -> Result<(), ScanError> {
     match actual >= expected {
         true => Ok(()),
-        false => Err(ScanError::Length {
-            what,
-            expected,
-            actual,
-        }),
+        false => Err(ScanError(format!(
+            "the scan's {what} has {actual} elements, but its geometry requires {expected}"
+        ))),
     }
 }
 
-fn check_number(
-    what: &'static str,
-    value: f64,
-    bounds: RangeInclusive<f64>,
-) -> Result<(), ScanError> {
+fn check_number(what: &str, value: f64, bounds: RangeInclusive<f64>) -> Result<(), ScanError> {
     match bounds.contains(&value) {
         true => Ok(()),
-        false => Err(ScanError::Geometry {
-            what,
-            value,
-            bounds,
-        }),
+        false => Err(ScanError(format!(
+            "the scan's {what} is {value}, expected {} to {}",
+            bounds.start(),
+            bounds.end()
+        ))),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
@@ -179,10 +138,12 @@ mod tests {
             sweep(|stamps| stamps[200] -= 3_000_000).is_ok(),
             "an adjusted clock"
         );
-        let order =
-            |result, bad| matches!(result, Err(ScanError::StampOrder { row, .. }) if row == bad);
-        let time =
-            |result, bad| matches!(result, Err(ScanError::StampSpan { row, .. }) if row == bad);
+        let names = |result: Result<(), ScanError>, row: usize, words: &str| {
+            let sentence = result.unwrap_err().to_string();
+            sentence.starts_with(&format!("row {row}: ")) && sentence.contains(words)
+        };
+        let order = |result, row| names(result, row, "before that of an earlier row");
+        let time = |result, row| names(result, row, "after that of the first row");
         assert!(order(sweep(|stamps| stamps[0] += 300_000_000), 1));
         assert!(order(sweep(|stamps| stamps[200] -= YEAR_NS), 200));
         assert!(order(sweep(|stamps| stamps[399] -= 20_000_000), 399));

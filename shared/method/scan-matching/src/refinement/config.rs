@@ -1,7 +1,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, Section};
+use gyre_samples::{SettingError, check, check_bounds};
+
+use crate::config::POSITIVE;
 
 /// Tolerance of the limit of acceleration for the noise of matches, m.
 pub(super) const JITTER_M: f64 = 0.8;
@@ -83,20 +85,23 @@ impl Default for RefinementConfig {
 }
 
 impl RefinementConfig {
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let section = Section("refinement");
-        section.within("keyframes", self.keyframes, 1..=64, "1 to 64")?;
-        section.within("cell_m", self.cell_m, 0.05..=10.0, "metres, 0.05 to 10")?;
-        let fits = (8.0..=1000.0).contains(&(self.reach_m / self.cell_m));
-        section.require(fits, "reach_m", &self.reach_m, "8 to 1000 cells of cell_m")?;
-        let share = |key, value| section.within(key, value, 0.0..=1.0, "a share, 0 to 1");
-        share("min_overlap", self.min_overlap)?;
-        share("firm_overlap", self.firm_overlap)?;
-        section.positive("acceleration_mps2", self.acceleration_mps2)?;
-        section.positive("yaw_acceleration_degps2", self.yaw_acceleration_degps2)?;
-        section.positive("variance_scale", self.variance_scale)?;
-        section.positive("drift_scale", self.drift_scale)?;
-        section.within("yaw_sigma_deg", self.yaw_sigma_deg, 0.0..=90.0, "0 to 90")?;
-        share("scale_sigma", self.scale_sigma)
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let keyframes = ([1.0, 64.0], "1 to 64");
+        check("refinement", "keyframes", self.keyframes as f64, keyframes)?;
+        let cells = [8.0, 1000.0].map(|cells| cells * self.cell_m);
+        let share = ([0.0, 1.0], "a share, 0 to 1");
+        check_bounds! { self, "refinement":
+            cell_m in ([0.05, 10.0], "metres, 0.05 to 10"),
+            reach_m in (cells, "8 to 1000 cells of cell_m"),
+            min_overlap in share,
+            firm_overlap in share,
+            acceleration_mps2 in POSITIVE,
+            yaw_acceleration_degps2 in POSITIVE,
+            variance_scale in POSITIVE,
+            drift_scale in POSITIVE,
+            yaw_sigma_deg in ([0.0, 90.0], "0 to 90"),
+            scale_sigma in share,
+        }
+        Ok(())
     }
 }

@@ -5,16 +5,14 @@ use super::{
     DeskewedPoints, RefinementConfig, Submap, alignment::align, local_map::LocalMap,
     registration::COARSE_STRIDE, uncertainty,
 };
-use crate::ConfigError;
+use crate::SettingError;
 
 /// Initial guesses come from a search on coarse cells, so more iterations are allowed than from
 /// scan to scan.
 const ITERATIONS: usize = 20;
 
-/// Aligns the middle keyframes of two submaps.
-///
-/// [`align`](Self::align) takes the points of these two scans alone: laid together by odometry, the
-/// neighbours in the submaps would carry its errors into the result.
+/// Aligns the middle keyframes of two submaps, with the points of these two scans alone: laid
+/// together by odometry, the neighbours in the submaps would carry its errors into the result.
 #[derive(Debug)]
 pub struct KeyframeAligner {
     config: RefinementConfig,
@@ -26,7 +24,7 @@ pub struct KeyframeAligner {
 impl KeyframeAligner {
     /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and
     /// reach of the map, and the scales of the covariance.
-    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
         let config = RefinementConfig {
             keyframes: 1,
             ..config.clone()
@@ -40,37 +38,22 @@ impl KeyframeAligner {
     }
 
     /// Returns the pose of the later keyframe in the earlier one's frame, from an initial guess;
-    /// `None` if the points do not determine it.
+    /// `None` if the points do not determine it. `whole` takes all points of the earlier submap:
+    /// where its keyframes lie better to each other than one scan measures.
     pub fn align(
         &mut self,
         later: &Submap,
         earlier: &Submap,
+        whole: bool,
         initial: &Pose,
     ) -> Option<UncertainMotion> {
-        self.align_to(later, &earlier.keyframe, initial)
-    }
-
-    /// As [`align`](Self::align), with all points of the earlier submap: where its keyframes lie
-    /// better to each other than one scan measures.
-    pub fn align_to_submap(
-        &mut self,
-        later: &Submap,
-        earlier: &Submap,
-        initial: &Pose,
-    ) -> Option<UncertainMotion> {
-        self.align_to(later, &earlier.all, initial)
-    }
-
-    fn align_to(
-        &mut self,
-        later: &Submap,
-        earlier: &DeskewedPoints,
-        initial: &Pose,
-    ) -> Option<UncertainMotion> {
+        let (points, earlier) = match whole {
+            true => (&later.keyframe, &earlier.all),
+            false => (&later.keyframe, &earlier.keyframe),
+        };
         self.map.clear();
         self.map
             .insert(0, earlier, &Pose::identity(), Vector2::zeros());
-        let points = &later.keyframe;
         self.thinned.clear();
         self.thinned.extend(points, &Pose::identity());
         self.thinned.thin(COARSE_STRIDE);

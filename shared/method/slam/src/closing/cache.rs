@@ -1,4 +1,3 @@
-use super::KeyframeSource;
 use crate::Keyframe;
 
 /// Submaps of the query and of the candidates, some of 17 keyframes, lie side by side in it.
@@ -16,16 +15,16 @@ impl Cache {
         }
     }
 
-    pub fn get<S: KeyframeSource>(
+    pub fn get<E>(
         &mut self,
-        source: &mut S,
+        read: &mut impl FnMut(usize) -> Result<Keyframe, E>,
         index: usize,
-    ) -> Result<&Keyframe, S::Error> {
+    ) -> Result<&Keyframe, E> {
         let slot = &mut self.slots[index % SLOTS];
         let kept = slot.take().filter(|(kept, _)| *kept == index);
         let keyframe = match kept {
             Some((_, keyframe)) => keyframe,
-            None => source.keyframe(index)?,
+            None => read(index)?,
         };
         Ok(&slot.insert((index, keyframe)).1)
     }

@@ -1,11 +1,11 @@
 use std::f64::consts::PI;
 
-use gyre_estimation::places::{Candidate, Describer, Descriptor};
+use gyre_estimation::places::{Candidate, Describer, Descriptor, Registrar};
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
-use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
 use nalgebra::{Matrix3, Point2};
 
-use crate::localisation::{Map, registration::Registration};
+use crate::localisation::{Map, sight::Sight};
 
 /// Two poses are the same within this angle, rad.
 const SAME_RAD: f64 = 5.0 * PI / 180.0;
@@ -33,6 +33,9 @@ const GATE: f64 = 16.27;
 /// Distance from the nearest keyframe of the map beyond which there is no fix, m.
 const REACH_M: f64 = 15.0;
 const LOST_AFTER_S: f64 = 3.0;
+/// Factor of the covariance of a registration with the map over a registration with the scans just
+/// before.
+const VARIANCE_SCALE: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
@@ -85,7 +88,8 @@ pub struct Localiser {
     map: Map,
     describer: Describer,
     descriptor: Descriptor,
-    registration: Registration,
+    registrar: Registrar,
+    sight: Sight,
     candidates: Vec<Candidate>,
     hypotheses: Vec<Hypothesis>,
     scan: Submap,
@@ -101,9 +105,10 @@ impl Localiser {
         map: Map,
         refinement: &RefinementConfig,
         capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, SettingError> {
         Ok(Self {
-            registration: Registration::new(refinement, capacity)?,
+            registrar: Registrar::new(refinement, capacity)?,
+            sight: Sight::new(Registrar::CELLS),
             describer: Describer::new(),
             descriptor: Descriptor::default(),
             candidates: Vec::with_capacity(CANDIDATES),
@@ -141,11 +146,16 @@ impl Localiser {
         Localisation { status, fix }
     }
 
+    fn look(&mut self, points: &[SparsePoint], twist: &Twist) {
+        self.scan.start(points, twist);
+        self.registrar.set_later(&self.scan);
+        self.sight.look(&self.scan);
+    }
+
     /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of
     /// the map look like it.
     pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
-        self.scan.start(points, twist);
-        self.registration.set_scan(&self.scan);
+        self.look(points, twist);
         self.describer.describe(&self.scan, &mut self.descriptor);
         self.choose_candidates();
         self.hypotheses.clear();
@@ -191,9 +201,9 @@ impl Localiser {
     fn search(&mut self, candidate: usize) {
         let Candidate { place, yaw_rad, .. } = self.candidates[candidate];
         self.draw(place);
-        self.registration.set_place(&self.place);
+        self.registrar.set_earlier(&self.place);
         for yaw_rad in [yaw_rad, wrap_angle(yaw_rad + PI)] {
-            let found = self.registration.search(yaw_rad);
+            let found = self.registrar.search(yaw_rad, self.sight.seen());
             let second = found
                 .runner_up
                 .map(|other| (other.x_m, other.y_m, other.score));
@@ -241,9 +251,13 @@ impl Localiser {
     /// Aligns the scan with the submap of a keyframe; the fix has no margin.
     fn align(&mut self, keyframe: usize, from: &Pose) -> Option<Fix> {
         self.draw(keyframe);
-        self.registration.set_place(&self.place);
+        self.registrar.set_earlier(&self.place);
         let initial = self.map.pose(keyframe).inv_mul(from);
-        let (motion, correlation) = self.registration.align(&self.scan, &self.place, &initial)?;
+        let aligner = &mut self.registrar.aligner;
+        let mut motion = aligner.align(&self.scan, &self.place, true, &initial)?;
+        motion.covariance *= VARIANCE_SCALE;
+        let seen = self.sight.seen();
+        let correlation = self.registrar.correlation(&motion.motion, seen);
         let of_keyframe = UncertainMotion {
             motion: self.map.pose(keyframe),
             covariance: Matrix3::zeros(),
@@ -258,8 +272,7 @@ impl Localiser {
 
     fn follow(&mut self, track: &Track, observation: &Observation<'_>) -> Localisation {
         let predicted = track.pose.then(&observation.motion);
-        self.scan.start(observation.points, &observation.twist);
-        self.registration.set_scan(&self.scan);
+        self.look(observation.points, &observation.twist);
         let place = Point2::from(predicted.motion.translation.vector);
         let (keyframe, distance_m) = self.map.nearest(place);
         let is_inside = distance_m <= REACH_M;

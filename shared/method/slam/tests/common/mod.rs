@@ -1,11 +1,10 @@
 //! A drive several times around a block with scattered reflectors, seen from each keyframe.
 #![allow(dead_code, reason = "each test uses a part")]
 
-use std::convert::Infallible;
 use std::f64::consts::TAU;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_slam::{Keyframe, KeyframeSource};
+use gyre_slam::Keyframe;
 use nalgebra::{Matrix3, Point2, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -86,13 +85,5 @@ impl Drive {
                 SparsePoint::from([x as f32, y as f32, 0.0, 0.8, 0.0])
             })
             .collect()
-    }
-}
-
-impl KeyframeSource for &Drive {
-    type Error = Infallible;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
-        Ok(self.keyframes[index].clone())
     }
 }

@@ -20,11 +20,13 @@ use layout::Layout;
 const EXACT: f32 = (1 << 24) as f32;
 
 #[derive(Clone)]
-enum Float {
+enum Value {
     Raster {
         divisor: f32,
         shape: Vec<usize>,
     },
+    /// Integers of an image.
+    Integers(Layout),
     /// Integers of an image, times their scale.
     Of(Layout),
     Weights(Weights),
@@ -35,12 +37,6 @@ enum Float {
     /// The logistic function of integers.
     Squashed(Layout),
     /// The factors: their integers have been computed.
-    Factors,
-}
-
-#[derive(Clone)]
-enum Integer {
-    Of(Layout),
     Factors,
 }
 
@@ -61,8 +57,8 @@ pub fn read(graph: &GraphProto) -> Option<Integers> {
     let mut sizes = tensors::shape_of(output)?.into_iter();
     let cells = sizes.try_fold(1_usize, usize::checked_mul)?;
     let computed = reader.output.filter(|it| it.places.len() == cells)?;
-    match reader.floats.get(output.name.as_deref()?)? {
-        Float::Factors => Some(Integers {
+    match reader.values.get(output.name.as_deref()?)? {
+        Value::Factors => Some(Integers {
             images: reader.images,
             steps: reader.steps,
             output: computed,
@@ -73,8 +69,7 @@ pub fn read(graph: &GraphProto) -> Option<Integers> {
 
 struct Reader<'a> {
     constants: Constants<'a>,
-    floats: HashMap<&'a str, Float>,
-    integers: HashMap<&'a str, Integer>,
+    values: HashMap<&'a str, Value>,
     images: Vec<Image>,
     steps: Vec<Step>,
     output: Option<Output>,
@@ -85,14 +80,13 @@ impl<'a> Reader<'a> {
         let [input] = &graph.input[..] else {
             return None;
         };
-        let raster = Float::Raster {
+        let raster = Value::Raster {
             divisor: 1.0,
             shape: tensors::shape_of(input)?,
         };
         Some(Self {
             constants: Constants::of(graph),
-            floats: HashMap::from([(input.name.as_deref()?, raster)]),
-            integers: HashMap::new(),
+            values: HashMap::from([(input.name.as_deref()?, raster)]),
             images: Vec::new(),
             steps: Vec::new(),
             output: None,
@@ -103,22 +97,20 @@ impl<'a> Reader<'a> {
         let [output] = &node.output[..] else {
             return None;
         };
-        if node.op_type.as_deref()? == "QuantizeLinear" {
-            let integer = self.quantised(node)?;
-            self.integers.insert(output, integer);
-        } else {
-            let float = self.float(node)?;
-            self.floats.insert(output, float);
-        }
+        let value = match node.op_type.as_deref()? {
+            "QuantizeLinear" => self.quantised(node)?,
+            _ => self.float(node)?,
+        };
+        self.values.insert(output, value);
         Some(())
     }
 
-    fn float(&mut self, node: &NodeProto) -> Option<Float> {
+    fn float(&mut self, node: &NodeProto) -> Option<Value> {
         let attributes = Attributes(&node.attribute);
         Some(match node.op_type.as_deref()? {
             "DequantizeLinear" => self.dequantised(node)?,
             "Div" => match self.input(node, 0)? {
-                Float::Raster { divisor, shape } => Float::Raster {
+                Value::Raster { divisor, shape } => Value::Raster {
                     divisor: divisor * self.constants.number(node.input.get(1)?)?,
                     shape,
                 },
@@ -126,39 +118,39 @@ impl<'a> Reader<'a> {
             },
             "Conv" if attributes.are_of_plain_convolution() => {
                 match (self.input(node, 1)?, self.input(node, 2)?) {
-                    (Float::Weights(weights), Float::Weights(bias)) => {
-                        Float::Convolved(self.layout(node, 0)?, weights, bias)
+                    (Value::Weights(weights), Value::Weights(bias)) => {
+                        Value::Convolved(self.layout(node, 0)?, weights, bias)
                     }
                     _ => return None,
                 }
             }
-            "MaxPool" if attributes.are_of_plain_pool() => Float::Pooled(self.layout(node, 0)?),
+            "MaxPool" if attributes.are_of_plain_pool() => Value::Pooled(self.layout(node, 0)?),
             "Resize" if attributes.are_of_linear_resize() => {
                 let layout = self.layout(node, 0)?;
                 let [_, channels, rows, columns] = layout.shape[..].try_into().ok()?;
                 let sizes = self.constants.sizes(node.input.get(3)?)?;
                 (sizes == [1, channels, 2 * rows, 2 * columns])
-                    .then_some(Float::Enlarged(layout))?
+                    .then_some(Value::Enlarged(layout))?
             }
             "Concat" if attributes.integer("axis") == Some(1) && node.input.len() == 2 => {
-                Float::Joined([self.layout(node, 0)?, self.layout(node, 1)?])
+                Value::Joined([self.layout(node, 0)?, self.layout(node, 1)?])
             }
-            "Sigmoid" => Float::Squashed(self.layout(node, 0)?),
+            "Sigmoid" => Value::Squashed(self.layout(node, 0)?),
             _ => {
                 let layout = self.layout(node, 0)?;
                 let places = &self.images[layout.image];
-                Float::Of(layout.moved(node, &self.constants, places)?)
+                Value::Of(layout.moved(node, &self.constants, places)?)
             }
         })
     }
 
-    fn input(&self, node: &NodeProto, index: usize) -> Option<Float> {
-        self.floats.get(node.input.get(index)?.as_str()).cloned()
+    fn input(&self, node: &NodeProto, index: usize) -> Option<Value> {
+        self.values.get(node.input.get(index)?.as_str()).cloned()
     }
 
     fn layout(&self, node: &NodeProto, index: usize) -> Option<Layout> {
         match self.input(node, index)? {
-            Float::Of(layout) => Some(layout),
+            Value::Of(layout) => Some(layout),
             _ => None,
         }
     }
@@ -170,25 +162,25 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn dequantised(&self, node: &NodeProto) -> Option<Float> {
+    fn dequantised(&self, node: &NodeProto) -> Option<Value> {
         let input = node.input.first()?.as_str();
-        let Some(integer) = self.integers.get(input) else {
-            return Some(Float::Weights(self.constants.weights(node)?));
+        let Some(value) = self.values.get(input) else {
+            return Some(Value::Weights(self.constants.weights(node)?));
         };
-        match integer {
-            Integer::Of(layout) if layout.quantisation == self.quantisation(node)? => {
-                Some(Float::Of(layout.clone()))
+        match value {
+            Value::Integers(layout) if layout.quantisation == self.quantisation(node)? => {
+                Some(Value::Of(layout.clone()))
             }
-            Integer::Factors => Some(Float::Factors),
-            Integer::Of(_) => None,
+            Value::Factors => Some(Value::Factors),
+            _ => None,
         }
     }
 
-    fn quantised(&mut self, node: &NodeProto) -> Option<Integer> {
+    fn quantised(&mut self, node: &NodeProto) -> Option<Value> {
         let to = self.quantisation(node)?;
         let layout = match self.input(node, 0)? {
-            Float::Of(layout) if layout.quantisation == to => layout,
-            Float::Raster { divisor, shape } if to.zero == 0.0 => {
+            Value::Of(layout) if layout.quantisation == to => layout,
+            Value::Raster { divisor, shape } if to.zero == 0.0 => {
                 let [_, 1, rows, columns] = shape[..] else {
                     return None;
                 };
@@ -200,7 +192,7 @@ impl<'a> Reader<'a> {
                 });
                 layout
             }
-            Float::Convolved(layout, weights, bias) => {
+            Value::Convolved(layout, weights, bias) => {
                 let kernel = kernel(&layout, &weights, &bias, to)?;
                 let shape = |[_, rows, columns]: [usize; 3]| [kernel.offsets.len(), rows, columns];
                 let (from, image, layout) = self.made_from(&layout, to, shape)?;
@@ -211,28 +203,28 @@ impl<'a> Reader<'a> {
                 });
                 layout
             }
-            Float::Pooled(layout) if layout.quantisation == to => {
+            Value::Pooled(layout) if layout.quantisation == to => {
                 let shape =
                     |[channels, rows, columns]: [usize; 3]| [channels, rows / 2, columns / 2];
                 let (from, image, layout) = self.made_from(&layout, to, shape)?;
                 self.steps.push(Step::Pool { from, to: image });
                 layout
             }
-            Float::Enlarged(layout) if layout.quantisation == to && to.zero == 0.0 => {
+            Value::Enlarged(layout) if layout.quantisation == to && to.zero == 0.0 => {
                 let shape =
                     |[channels, rows, columns]: [usize; 3]| [channels, 2 * rows, 2 * columns];
                 let (from, image, layout) = self.made_from(&layout, to, shape)?;
                 self.steps.push(Step::Enlarge { from, to: image });
                 layout
             }
-            Float::Joined(layouts) => self.joined(&layouts, to)?,
-            Float::Squashed(layout) => {
+            Value::Joined(layouts) => self.joined(&layouts, to)?,
+            Value::Squashed(layout) => {
                 self.output = Some(self.factors(&layout, to));
-                return Some(Integer::Factors);
+                return Some(Value::Factors);
             }
             _ => return None,
         };
-        Some(Integer::Of(layout))
+        Some(Value::Integers(layout))
     }
 
     /// Adds an image that is made from an existing one. Returns the numbers of both and the values.

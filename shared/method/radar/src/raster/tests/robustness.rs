@@ -2,7 +2,7 @@
 
 use super::scene::{STAMP_NS, Sensor, raster};
 use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
-use crate::scan::{OwnedScan, ScanError, Sense};
+use crate::scan::{OwnedScan, Sense};
 use gyre_geometry::Twist;
 use nalgebra::Point2;
 use ndarray::{Array2, ArrayViewMut2, s};
@@ -95,10 +95,8 @@ fn a_scan_that_is_shorter_than_its_geometry_is_rejected() {
     let rejected = rasteriser.rasterise(&view, 0, None, Array2::zeros((33, 33)).view_mut());
     assert!(rejected.unwrap_err().to_string().contains("stamp table"));
     scan.geometry.stride = usize::MAX;
-    assert!(matches!(
-        try_raster(&scan, None),
-        Err(RasterError::Scan(ScanError::Length { what: "image", .. }))
-    ));
+    let rejected = try_raster(&scan, None).unwrap_err().to_string();
+    assert!(rejected.contains("image has"), "{rejected}");
 }
 
 #[test]
@@ -106,16 +104,13 @@ fn numbers_out_of_bounds_are_rejected() {
     for resolution_m in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let mut scan = sensor(4, 10).scan();
         scan.geometry.range_resolution_m = resolution_m;
-        let rejected = try_raster(&scan, None).unwrap_err();
-        let is_named = matches!(rejected, RasterError::Scan(ScanError::Geometry { .. }));
-        assert!(is_named, "{resolution_m}");
+        let rejected = try_raster(&scan, None).unwrap_err().to_string();
+        assert!(rejected.contains("range resolution"), "{rejected}");
     }
     let mut scan = sensor(4, 10).scan();
     scan.azimuth_rad[2] = f32::NAN;
-    assert!(matches!(
-        try_raster(&scan, None),
-        Err(RasterError::Scan(ScanError::Azimuth { index: 2, .. }))
-    ));
+    let rejected = try_raster(&scan, None).unwrap_err().to_string();
+    assert!(rejected.starts_with("azimuth 2 of"), "{rejected}");
 }
 
 #[test]
@@ -153,11 +148,7 @@ fn settings_out_of_bounds_and_unknown_ones_are_rejected_by_name() {
     assert_eq!(read("cell_m", 0.4).unwrap(), expected);
     let unknown = read("cel_m", 0.4).unwrap_err();
     assert!(unknown.to_string().contains("cel_m"));
-    let wrong = [
-        ("cell_m", f32::NAN),
-        ("min_range_m", -1.0),
-        ("averaged_cells", 0.0),
-    ];
+    let wrong = [("cell_m", f32::NAN), ("min_range_m", -1.0)];
     let none = RasterConfig { n: 0, ..expected };
     let wrong = wrong.map(|(key, value)| (key, read(key, value).unwrap()));
     for (key, config) in wrong.into_iter().chain([("n", none)]) {
