@@ -5,11 +5,12 @@ mod check;
 mod sensors;
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
 
+use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
 use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_datasets::DatasetOptions;
@@ -17,10 +18,44 @@ use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_storage as storage;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
 
-use crate::cli::CalibrateArguments;
 use sensors::{Gyro, Wheels};
+
+#[derive(Debug, Args)]
+pub struct CalibrateArguments {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Another drive of the same radar, read in the same way: the file has the constants from all
+    /// drives together. May be repeated.
+    #[arg(long, value_name = "RECORDING")]
+    pub with: Vec<PathBuf>,
+    /// The folder of calibration.toml and calibration.svg.
+    #[arg(long, default_value = "out/calibrate")]
+    pub out: PathBuf,
+    /// The log of a gyro, a table as CSV: its clock and its axes are found too. Default: what lies
+    /// beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub gyro: Option<PathBuf>,
+    /// The log of the wheels, a table as CSV: its clock and its scale are found too. Default: what
+    /// lies beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub wheels: Option<PathBuf>,
+    /// Length of the path by an odometer or GNSS, m: without it the range resolution is
+    /// undetermined.
+    #[arg(long, value_parser = length, conflicts_with = "with")]
+    pub distance_m: Option<f64>,
+    /// Maximum number of scans of a drive. Their points are kept in memory.
+    #[arg(long, default_value = "2000")]
+    pub scans: usize,
+}
+
+/// Parses a length: a positive number.
+fn length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok();
+    let length = length.filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| "a number above 0 is needed".to_owned())
+}
 
 const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";

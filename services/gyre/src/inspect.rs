@@ -1,13 +1,24 @@
 //! `gyre inspect`: reports the contents of a dataset.
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
+use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
 use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
-use crate::cli::InspectArguments;
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
+    #[arg(long)]
+    pub trajectory: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
 
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments.trajectory.as_deref().map(read_trajectory);

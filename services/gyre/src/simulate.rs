@@ -1,17 +1,51 @@
 //! `gyre simulate`: writes a simulated recording.
 
 use std::{
-    io::IsTerminal, num::NonZeroUsize, path::Path, process::ExitCode,
-    thread::available_parallelism, time::Instant,
+    io::IsTerminal,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread::available_parallelism,
+    time::Instant,
 };
 
+use clap::Args;
 use gyre_configuration::{Configuration, strict::path_value};
 use gyre_results::Content;
-use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
+use gyre_simulator::{
+    OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on,
+};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::cli::SimulateArguments;
+#[derive(Debug, Args)]
+pub struct SimulateArguments {
+    /// The configuration, a TOML file or a name that `gyre config` lists: its section
+    /// `[simulation]` is used. Default: the defaults of that section.
+    pub configuration: Option<PathBuf>,
+    /// The folder of the recording. The files of an earlier call with the same configuration are
+    /// kept and completed.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Number of scans (simulation.scans).
+    #[arg(long)]
+    pub scans: Option<usize>,
+    /// Drive along this file: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv.
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Seed (simulation.seed).
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The format of the files: oxford, boreas or radiate (simulation.output.format).
+    #[arg(long)]
+    pub format: Option<OutputFormat>,
+    /// Threads to render on. Default: all processors. The files are the same whatever their number.
+    #[arg(long)]
+    pub threads: Option<NonZeroUsize>,
+    /// Override a key, as in simulation.drive.speed_mps=5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
 
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;

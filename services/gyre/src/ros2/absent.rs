@@ -8,7 +8,8 @@ use gyre_stage::{Launch, StageCounters, StageError};
 use gyre_stages::live_radar::Sizes;
 use gyre_terminal::Failure;
 
-use crate::{cli::Ros2Arguments, features::absent};
+use super::Ros2Arguments;
+use crate::features::absent;
 
 const PART: &str = "ROS 2";
 

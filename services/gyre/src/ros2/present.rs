@@ -15,7 +15,7 @@ use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake:
 use gyre_stages::live_radar::Sizes;
 use gyre_terminal::{Failure, print};
 
-use crate::cli::Ros2Arguments;
+use super::Ros2Arguments;
 
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     // A wrong folder is reported at once.
