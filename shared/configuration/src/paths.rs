@@ -1,7 +1,7 @@
 //! The paths of a configuration: relative to it, or files of the program.
 
 use std::{
-    env, fs,
+    env,
     path::{Path, PathBuf},
 };
 
@@ -33,7 +33,8 @@ pub struct Named {
     notes: Notes,
 }
 
-/// Keys, and sentences about their paths, for as long as no others take their places.
+/// Keys, and sentences about paths in the current folder, for as long as no others take their
+/// places.
 type Notes = Vec<(String, String)>;
 
 impl Named {
@@ -183,45 +184,21 @@ impl Places<'_> {
         }
         let beside = self.folder.map(|folder| folder.join(written));
         let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
-        let own = gyre_shipped::find(written);
+        let own = || gyre_shipped::find(written);
+        let found = beside.clone().filter(is_beside).or_else(own);
         let here = self.here.as_deref().map(|here| here.join(written));
-        let here = here.filter(|here| here.exists());
-        let (found, sentence) = match (beside.clone().filter(is_beside), own, here) {
-            (Some(beside), ..) => (Some(beside), None),
-            (None, Some(own), here) => {
-                let sentence = here.filter(|here| differs(&own, here)).map(|here| {
-                    let here = here.display();
-                    format!("{key}: {path} is that of the program, and {here} differs: to use that, name it by its whole path")
-                });
-                (Some(own), sentence)
-            }
-            (None, None, Some(here)) => {
+        match (found, here.filter(|here| here.exists())) {
+            (None, Some(here)) => {
                 let sentence = format!(
                     "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
                     self.file.display()
                 );
-                (Some(here), Some(sentence))
+                self.notes.push((key.to_owned(), sentence));
+                put(path, here)
             }
-            (None, None, None) => {
-                let sentence = format!(
-                    "{key}: there is no {path} beside {}, in the program or in the current folder",
-                    self.file.display()
-                );
-                (beside, Some(sentence))
-            }
-        };
-        if let Some(found) = found {
-            put(path, found)?;
+            (found, _) => found.or(beside).map_or(Ok(()), |found| put(path, found)),
         }
-        let key = key.to_owned();
-        self.notes.extend(sentence.map(|sentence| (key, sentence)));
-        Ok(())
     }
-}
-
-fn differs(own: &Path, file: &Path) -> bool {
-    let own = gyre_shipped::bytes(own);
-    own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))
 }
 
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
@@ -239,6 +216,8 @@ fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
+
     use super::*;
 
     /// A folder with a configuration in `robot/` and the current folder `here/`.
@@ -272,15 +251,11 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_the_program_is_found_from_any_folder_and_another_one_here_is_named() {
+    fn a_file_of_the_program_goes_before_one_in_the_current_folder() {
         let own = Path::new("gyre:models/gyre-255.toml");
-        let (_folder, named) = read(&[], MODEL);
-        assert_eq!(at(&named, "masking.model"), own);
-        assert!(named.notes(&named.table).is_empty());
         let (_folder, named) = read(&["here/models/gyre-255.toml"], MODEL);
         assert_eq!(at(&named, "masking.model"), own);
-        let note = &named.notes(&named.table)[0];
-        assert!(note.contains("is that of the program, and"), "{note}");
+        assert!(named.notes(&named.table).is_empty());
     }
 
     #[test]
@@ -296,15 +271,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_nowhere_is_said_to_be_missing_beside_the_configuration() {
+    fn what_is_nowhere_is_beside_the_configuration() {
         let (folder, named) = read(&[], "[slam]\nmap = 'town.map'\n");
         assert_eq!(at(&named, "slam.map"), folder.path().join("robot/town.map"));
-        let note = &named.notes(&named.table)[0];
-        let expected = format!(
-            "no town.map beside {}/robot/run.toml",
-            folder.path().display()
-        );
-        assert!(note.contains(&expected), "{note}");
     }
 
     #[test]
