@@ -10,6 +10,7 @@ use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
+pub(crate) use server::configuration;
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {

@@ -12,9 +12,12 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-use crate::export::{
-    arguments::ScanForm,
-    source::{Lost, Scans, Source},
+use crate::{
+    export::{
+        arguments::ScanForm,
+        source::{Lost, Scans, Source},
+    },
+    radar_server::configuration,
 };
 
 const CONFIGURATION: &str = "/radar_data/configuration_data";
@@ -88,25 +91,12 @@ impl Losses {
         if geometry.sense != Sense::Clockwise {
             return Err("Navtech's radars turn clockwise, and this one does not: --scans none leaves its scans out".into());
         }
-        let (azimuths, bins) = (geometry.azimuths, geometry.bins);
-        let small = |number: usize| {
-            u16::try_from(number).map_err(|_| {
-                format!("scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's messages, which count both in 16 bits")
-            })
-        };
-        let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
+        let encoder = Encoder::of(&scan.azimuth_rad[..geometry.azimuths], scans.encoder_counts);
         self.without_encoder = !encoder.is_exact;
-        let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
         Ok(Radar {
-            azimuth_samples: small(azimuths)?,
             bin_size: 0,
-            range_in_bins: small(bins)?,
-            encoder_size: encoder.counts,
-            rotation_mhz: turns_per_1000_s.round().min(f64::from(u16::MAX)) as u16,
             packet_rate: 0,
-            range_gain: 1.0,
-            range_offset: 0.0,
-            range_resolution_m: Some(geometry.range_resolution_m),
+            ..configuration(scans.dataset.as_ref(), geometry, encoder.counts)?
         })
     }
 
