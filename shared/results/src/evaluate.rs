@@ -22,6 +22,7 @@ use crate::{
 };
 
 pub use arguments::EvaluateArguments;
+pub use objects::rows;
 
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {

@@ -28,6 +28,8 @@ pub struct ScanWriter {
     losses: Losses,
     scans: Scans,
     scan: OwnedScan,
+    /// The number of the scan if it has been read, and is to be written.
+    first: Option<usize>,
     lost: Lost,
     rows: PlacedRows,
     messages: ScanMessages,
@@ -173,10 +175,11 @@ impl ScanWriter {
             print::note("the run was of a radar, and has no scans: --record keeps them");
             return Ok(None);
         };
-        let Some(scan) = first(&mut scans)? else {
+        let mut losses = Losses::default();
+        let mut scan = OwnedScan::with_limits(scans.dataset.limits());
+        let Some(first) = scans.next(&mut scan, &mut losses)? else {
             return Ok(None);
         };
-        let mut losses = Losses::default();
         let radar = losses.radar(&scans, &scan)?;
         losses.add_constants(&scan.geometry, scans.eccentricity_rad);
         let configuration = bag.topic(CONFIGURATION, Kept::ForLater)?;
@@ -194,6 +197,7 @@ impl ScanWriter {
             lost: source.lost()?,
             rows: PlacedRows::default(),
             scan,
+            first: Some(first),
             scans,
             is_described: false,
         }))
@@ -201,17 +205,11 @@ impl ScanWriter {
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
-        while let Some(index) = self.scans.played.next() {
-            match self.scans.read(index, &mut self.scan) {
-                Ok(()) => return self.write(index, bag).map(Some),
-                Err(error @ ReadError::Io { .. }) => return Err(error.into()),
-                Err(error) => {
-                    print::note(format_args!("scan {index} is left out: {error}"));
-                    self.losses.unreadable += 1;
-                }
-            }
-        }
-        Ok(None)
+        let next = match self.first.take() {
+            None => self.scans.next(&mut self.scan, &mut self.losses)?,
+            first => first,
+        };
+        next.map(|index| self.write(index, bag)).transpose()
     }
 
     /// Prints the differences between the bag and its source.
@@ -250,6 +248,25 @@ impl ScanWriter {
 }
 
 impl Scans {
+    /// Reads the next scan that can be read, and returns its number; `None` at the end.
+    fn next(
+        &mut self,
+        scan: &mut OwnedScan,
+        losses: &mut Losses,
+    ) -> Result<Option<usize>, Failure> {
+        while let Some(index) = self.played.next() {
+            match self.read(index, scan) {
+                Ok(()) => return Ok(Some(index)),
+                Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+                Err(error) => {
+                    print::note(format_args!("scan {index} is left out: {error}"));
+                    losses.unreadable += 1;
+                }
+            }
+        }
+        Ok(None)
+    }
+
     /// Reads a scan with the angles as the encoder counts them.
     fn read(&mut self, index: usize, scan: &mut OwnedScan) -> Result<(), ReadError> {
         scan.geometry = self.dataset.read(index, scan.slot())?;
@@ -266,18 +283,6 @@ impl Scans {
         }
         Ok(())
     }
-}
-
-fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
-    let mut scan = OwnedScan::with_limits(scans.dataset.limits());
-    for index in scans.played.clone() {
-        match scans.read(index, &mut scan) {
-            Ok(()) => return Ok(Some(scan)),
-            Err(error @ ReadError::Io { .. }) => return Err(error.into()),
-            Err(_) => {}
-        }
-    }
-    Ok(None)
 }
 
 #[cfg(test)]

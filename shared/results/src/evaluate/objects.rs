@@ -94,7 +94,8 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     Ok(object_errors(&scans))
 }
 
-fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
+/// Reads a table as CSV by the names of its columns.
+pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
     let file = gyre_storage::open(path)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let mut reader = csv::ReaderBuilder::new()
