@@ -3,9 +3,8 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::Configuration;
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
-use gyre_terminal::inputs::Inputs;
+use gyre_terminal::inputs::{Inputs, configuration};
 use gyre_terminal::{Failure, print};
 
 #[derive(Debug, Args)]
@@ -23,12 +22,8 @@ pub struct InspectArguments {
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments.trajectory.as_deref().map(read_trajectory);
     let trajectory = trajectory.transpose()?;
-    let Inputs { set, .. } = &arguments.inputs;
     let given = arguments.inputs.given_recording()?;
-    let configuration = match &given.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, set)?,
-        None => Configuration::of_overrides(set)?,
-    };
+    let configuration = configuration(given.configuration.as_deref(), &arguments.inputs.set)?;
     let path = given.data.unwrap_or(configuration.source.data);
     let options = configuration.dataset;
     if path.as_os_str().is_empty() {

@@ -10,12 +10,12 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::{Configuration, strict::path_value};
+use gyre_configuration::strict::path_value;
 use gyre_results::Content;
 use gyre_simulator::{
     OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on,
 };
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::configuration, print};
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Debug, Args)]
@@ -50,10 +50,7 @@ pub struct SimulateArguments {
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
-    let configuration = match &arguments.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, &overrides)?,
-        None => Configuration::of_overrides(&overrides)?,
-    };
+    let configuration = configuration(arguments.configuration.as_deref(), &overrides)?;
     let started = Instant::now();
     let threads = arguments
         .threads

@@ -42,9 +42,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
 /// configuration nothing is measured in it.
 fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     let given = inputs.given_recording()?;
-    let configuration = match &given.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, &inputs.set)?,
-        None => Configuration::of_overrides(&inputs.set)?,
-    };
+    let named = given.configuration.as_deref();
+    let configuration = gyre_terminal::inputs::configuration(named, &inputs.set)?;
     Ok(configuration.streaming(given.data.as_deref()))
 }
