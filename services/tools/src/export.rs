@@ -21,7 +21,7 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
+pub use arguments::{ExportArguments, FrameArguments, ScanForm};
 use scans::ScanWriter;
 use source::{Place, Source};
 
