@@ -107,15 +107,8 @@ fn visit(
     mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
 ) -> Result<(), ConfigurationError> {
     for key in KEYS {
-        let paths = match value_mut(table, key) {
-            Some(Value::Array(paths)) => paths.as_mut_slice(),
-            Some(path) => std::slice::from_mut(path),
-            None => continue,
-        };
-        for path in paths {
-            if let Value::String(path) = path {
-                each(path, key)?;
-            }
+        if let Some(Value::String(path)) = value_mut(table, key) {
+            each(path, key)?;
         }
     }
     let Some(Value::Table(stages)) = table.get_mut("stages") else {
