@@ -2,6 +2,7 @@
 
 mod help;
 mod link;
+mod ros2;
 
 use std::{io::IsTerminal, path::PathBuf};
 
@@ -23,13 +24,13 @@ use gyre_tools::report::ReportArguments;
 
 use crate::{
     batch::BatchArguments, calibrate::CalibrateArguments, conformance::ConformanceArguments,
-    inspect::InspectArguments, record::RecordArguments, ros2::Ros2Arguments,
-    shadow::ShadowArguments, simulate::SimulateArguments, stress::StressArguments,
-    watch::WatchArguments,
+    inspect::InspectArguments, record::RecordArguments, shadow::ShadowArguments,
+    simulate::SimulateArguments, stress::StressArguments, watch::WatchArguments,
 };
 
 pub use help::command;
 pub use link::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
+pub use ros2::Ros2Arguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///

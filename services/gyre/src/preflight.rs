@@ -19,7 +19,7 @@ use gyre_terminal::{Failure, print};
 use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
 
-use crate::{ros2, split};
+use crate::split;
 
 pub struct Preflight {
     pub scans: Scans,
@@ -219,7 +219,10 @@ impl Scans {
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
-        SourceKind::Ros2 => ros2::ask(source, options),
+        #[cfg(feature = "ros2")]
+        SourceKind::Ros2 => crate::ros2::ask(source, options),
+        #[cfg(not(feature = "ros2"))]
+        SourceKind::Ros2 => Err(crate::features::absent("ROS 2").into()),
         _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
             source, options,
         )?)?),
