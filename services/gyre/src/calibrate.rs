@@ -7,7 +7,7 @@ mod sensors;
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use clap::Args;
@@ -19,6 +19,7 @@ use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_storage as storage;
 use gyre_terminal::{Failure, inputs::Inputs, print};
+use gyre_tools::bar::Bar;
 
 use sensors::{Gyro, Wheels};
 
@@ -59,7 +60,6 @@ fn length(text: &str) -> Result<f64, String> {
 
 const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
-const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
@@ -245,7 +245,7 @@ fn read(
         }
         print::note(sentence);
     }
-    let mut last_line = Instant::now();
+    let mut progress = Bar::new(Some(count));
     for (done, number) in played.take(count).enumerate() {
         let pushed = match dataset.read(number, scan.slot()) {
             Ok(geometry) => {
@@ -255,12 +255,10 @@ fn read(
             Err(error) => Err(error.to_string()),
         };
         if let Err(reason) = pushed {
-            print::note(format_args!("left out scan {number}: {reason}"));
+            progress.say(&format!("left out scan {number}: {reason}"));
         }
-        if last_line.elapsed() >= EVERY {
-            print::note(format_args!("read {done} of {count} scans"));
-            last_line = Instant::now();
-        }
+        progress.scans(done as u64, done as u64, "read".to_owned());
     }
+    progress.finish();
     Ok((drive, scan.geometry))
 }

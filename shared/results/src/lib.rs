@@ -21,4 +21,4 @@ pub use out::{
     write_page,
 };
 pub use results::{Results, map_options, truth_of, write};
-pub use summary::{Form, Problem, Session, Summary};
+pub use summary::{Form, HARDLY_MEASURED, Session, Summary};

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, paths::shipped};
-use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
+use gyre_results::{Form, HARDLY_MEASURED, Holds, Identity, Out, OutError, SUMMARY};
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
 use gyre_tools::batch::{End, Outcome};
@@ -107,7 +107,7 @@ fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
     let problem = summary["problem"].as_str();
     let outcome = match problem {
         None => Outcome::Complete,
-        Some(problem) if problem.contains(Problem::OF_MOTIONS) => Outcome::Unsure,
+        Some(problem) if problem.contains(HARDLY_MEASURED) => Outcome::Unsure,
         Some(_) => Outcome::Corrupt,
     };
     Ok(End {

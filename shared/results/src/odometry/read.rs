@@ -113,7 +113,9 @@ impl MotionRow {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::{Item, MotionEstimate, PoseHeader};
+    use gyre_messages::{
+        Item, MotionEstimate, PoseHeader, RefinementRecord, initial_guess, outcome,
+    };
 
     use super::*;
     use crate::odometry::{HEADER, motion, write_row};
@@ -142,6 +144,12 @@ mod tests {
                 drift_share: 0.25,
                 scale_sigma: 0.01,
                 interval_ns: 250_000_000,
+                refinement: RefinementRecord {
+                    outcome: outcome::REFINED,
+                    initial_guess: initial_guess::YAW_OFFSET,
+                    stationary: 1,
+                    ..RefinementRecord::default()
+                },
                 ..MotionEstimate::default()
             },
             ..PoseHeader::default()
@@ -152,6 +160,8 @@ mod tests {
     #[test]
     fn what_was_written_is_read_whatever_columns_are_beside_it() {
         let (poses, text) = (poses(), csv(&poses()));
+        assert!(text.contains(",refined,yaw-offset,"));
+        assert!(text.ends_with(",1,0.250000000,0.010000000\n"));
         assert_eq!(parse(text.as_bytes()).unwrap(), motions(&poses));
         let wider = text.lines().map(|line| format!("new,{line},newer\n"));
         let wider: String = wider.collect();
