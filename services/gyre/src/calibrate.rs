@@ -12,7 +12,7 @@ use std::{
 
 use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
-use gyre_configuration::{Configuration, Played, describe_masks_in_process};
+use gyre_configuration::{Configuration, Played, describe_masks};
 use gyre_datasets::DatasetOptions;
 use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
@@ -230,9 +230,7 @@ fn read(
     arguments: &CalibrateArguments,
 ) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks_in_process(configuration)?
-        .iter()
-        .for_each(print::note);
+    describe_masks(configuration)?.iter().for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.scans());

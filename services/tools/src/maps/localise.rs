@@ -120,11 +120,12 @@ struct Found {
 
 impl Found {
     fn add(&mut self, scan: &RegisteredScan<'_>, found: &Localisation) {
-        self.counts.add(scan, found.status);
+        let stamp_ns = scan.observation.stamp_ns;
+        self.counts.add(scan.number, stamp_ns, found.status);
         let is_fix = matches!(found.status, Status::Found | Status::Tracked);
         match (&found.fix, self.pieces.last_mut()) {
             (Some(fix), Some(piece)) if is_fix => {
-                self.stamps_ns.push(scan.observation.stamp_ns);
+                self.stamps_ns.push(stamp_ns);
                 piece.push(fix.pose.motion);
             }
             (_, Some(piece)) if piece.is_empty() => {}
