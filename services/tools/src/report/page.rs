@@ -24,8 +24,6 @@ const PICTURES: [[&str; 3]; 3] = [
     ["Errors", "errors.svg", "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion"],
     ["Uncertainty", "bands.svg", "The error of each pose within three standard deviations that its covariance states"],
 ];
-/// Larger maps are left out, bytes.
-const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
 const BAR: f64 = 160.0;
 
@@ -139,10 +137,6 @@ fn pictures(subjects: &[Subject], [title, name, caption]: [&str; 3]) -> String {
         let bytes = run.picture(name)?;
         let picture = match str::from_utf8(&bytes) {
             Ok(text) => svg(text, title),
-            Err(_) if bytes.len() > LARGEST_MAP => {
-                let path = escaped(&run.folder.join(name).display().to_string());
-                format!("<p>too large for this page: {path}</p>")
-            }
             Err(_) => png(&bytes, title),
         };
         Some(format!("{}{picture}\n", title_of(subject, subjects)))
