@@ -1,7 +1,6 @@
 //! `gyre simulate`: writes a simulated recording.
 
 use std::{
-    io::IsTerminal,
     num::NonZeroUsize,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -16,7 +15,7 @@ use gyre_simulator::{
     OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on,
 };
 use gyre_terminal::{Failure, inputs::configuration, print};
-use indicatif::{ProgressBar, ProgressStyle};
+use gyre_tools::bar::Bar;
 
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
@@ -117,24 +116,11 @@ fn write(
     simulation: &SimulationConfig,
     out: &Path,
 ) -> Result<Summary, SimulatorError> {
-    let bar = match std::io::stderr().is_terminal() {
-        true => ProgressBar::new(0),
-        false => ProgressBar::hidden(),
-    };
-    if let Ok(style) = ProgressStyle::with_template(
-        "simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",
-    ) {
-        bar.set_style(style);
-    }
+    let mut bar = None;
     let summary = write_dataset_on(threads, simulation, out, &mut |done, total| {
-        if bar.length() != Some(total as u64) {
-            bar.set_length(total as u64);
-            // Existing scans do not count for the rate.
-            bar.set_position(done as u64);
-            bar.reset_eta();
-        }
-        bar.set_position(done as u64);
+        let bar = bar.get_or_insert_with(|| Bar::new(Some(total)));
+        bar.scans(done as u64, done as u64, "simulated".to_owned());
     });
-    bar.finish_and_clear();
+    bar.iter().for_each(Bar::finish);
     summary
 }
