@@ -3,7 +3,6 @@
 
 pub mod difference;
 mod validation;
-mod without_effect;
 
 use std::{
     collections::BTreeMap,
