@@ -5,10 +5,7 @@ use std::{
     io::{self, IsTerminal, Write},
 };
 
-use crate::{
-    failure::Failure,
-    wrap::{WIDTH, wrap},
-};
+use crate::{Failure, WIDTH, wrap};
 
 /// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
 pub fn line(text: impl Display) -> Result<(), Failure> {

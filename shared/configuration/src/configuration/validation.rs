@@ -12,7 +12,7 @@ use gyre_slam::SlamKind;
 
 use super::Configuration;
 use crate::{
-    error::ConfigurationError,
+    ConfigurationError,
     method::MethodConfig,
     strict::{value, within},
 };
