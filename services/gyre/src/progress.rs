@@ -73,13 +73,9 @@ impl Progress {
         let Some(received) = received_of(manifest) else {
             return;
         };
-        let Some(report) = silence.update(&received, clock::now_ns()) else {
-            return;
-        };
-        if report.is_new {
-            self.bar.say(&report.sentence);
+        if let Some(sentence) = silence.update(&received, clock::now_ns()) {
+            self.bar.say(&sentence);
         }
-        self.bar.label(report.sentence);
     }
 
     /// Reports the progress of a follower if the run has to wait for it.

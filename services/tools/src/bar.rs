@@ -62,13 +62,6 @@ impl Bar {
         }
     }
 
-    /// Shows a message in the bar alone.
-    pub fn label(&self, message: String) {
-        if let Some(bar) = &self.bar {
-            bar.set_message(message);
-        }
-    }
-
     pub fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(wrap(line, WIDTH).join("\n")),
