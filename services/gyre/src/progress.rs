@@ -4,8 +4,8 @@ mod silence;
 
 use std::{fmt::Display, time::Instant};
 
-use gyre_messages::{FollowerId, Item, PoseHeader};
-use gyre_stage::{Manifest, clock, follower::Progress as Following, source::received_of};
+use gyre_messages::{Item, PoseHeader};
+use gyre_stage::{Manifest, clock, source::received_of};
 use gyre_supervise::Event;
 use gyre_tools::bar::Bar;
 
@@ -47,7 +47,8 @@ impl Progress {
             Event::Stalled(stall) => self.bar.say(&stall.to_string()),
             Event::Following { follower, progress } => {
                 self.radar = None;
-                self.following(follower, *progress);
+                let (done, total) = (progress.done, progress.total);
+                self.bar.show(format!("{follower}: {done} of {total}"));
             }
             Event::Watched => self.silence(),
             Event::Stopping => self.radar = None,
@@ -76,20 +77,6 @@ impl Progress {
         if let Some(sentence) = silence.update(&received, clock::now_ns()) {
             self.bar.say(&sentence);
         }
-    }
-
-    /// Reports the progress of a follower if the run has to wait for it.
-    fn following(&mut self, follower: &str, progress: Following) {
-        let (work, records) = match FollowerId::by_name(follower) {
-            Some(FollowerId::LoopClosure) => ("loop closing", "keyframes"),
-            Some(FollowerId::Objects) => ("objects", "scans"),
-            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => {
-                (follower, "keyframes")
-            }
-        };
-        let Following { done, total } = progress;
-        self.bar
-            .show(format!("{work}: {done} of {total} {records}"));
     }
 
     /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen
