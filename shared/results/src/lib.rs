@@ -15,7 +15,7 @@ mod results;
 mod summary;
 
 pub use georeference::georeference;
-pub use identity::{Holds, Identity, Programs};
+pub use identity::{Identity, Programs};
 pub use out::{
     Content, FILES, Out, OutError, REPLACED, SIMULATED_TRUTH, SUMMARY, absolute, require_results,
     write_page,
