@@ -58,6 +58,13 @@ struct Losses {
     constants: Vec<(&'static str, f32)>,
 }
 
+/// Returns the sentences that hold.
+macro_rules! sentences {
+    ($($holds:expr => $sentence:literal;)*) => {
+        [$($holds.then(|| format!($sentence)),)*].into_iter().flatten().collect()
+    };
+}
+
 impl Losses {
     fn add(&mut self, scan: &PolarScan<'_>) {
         let is_measured = |flags: u8| flags & flag::MEASURED != 0;
@@ -109,54 +116,23 @@ impl Losses {
         let constants = self.constants.iter();
         let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
         let settings: String = settings.collect();
-        let sentences = [
-            (
-                unreadable > 0,
-                format!("{unreadable} scans cannot be read, and are not in the bag"),
-            ),
-            (
-                self.without_encoder,
-                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
-                    .to_owned(),
-            ),
-            (
-                self.chirps,
-                "Navtech's messages do not contain the directions of chirps: the bag lacks them"
-                    .to_owned(),
-            ),
-            (
-                interpolated > 0,
-                format!(
-                    "interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing"
-                ),
-            ),
-            (
-                placed > 0,
-                format!(
-                    "{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to the angles of the other scans"
-                ),
-            ),
-            (
-                not_placed > 0,
-                format!(
-                    "{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
-                ),
-            ),
-            (
-                retimed > 0,
-                format!(
-                    "{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
-                ),
-            ),
-            (
-                !settings.is_empty(),
-                format!(
-                    "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}"
-                ),
-            ),
-        ];
-        let lost = sentences.into_iter().filter(|(is_lost, _)| *is_lost);
-        lost.map(|(_, sentence)| sentence).collect()
+        sentences!(
+            unreadable > 0 => "{unreadable} scans cannot be read, and are not in the bag";
+            self.without_encoder =>
+                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn";
+            self.chirps =>
+                "Navtech's messages do not contain the directions of chirps: the bag lacks them";
+            interpolated > 0 =>
+                "interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing";
+            placed > 0 =>
+                "{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to the angles of the other scans";
+            not_placed > 0 =>
+                "{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right";
+            retimed > 0 =>
+                "{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away";
+            !settings.is_empty() =>
+                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}";
+        )
     }
 }
 
