@@ -12,7 +12,7 @@ use gyre_configuration::Configuration;
 use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint, CheckpointError},
-    keyframes::{KeyframesError, complete_poses},
+    keyframes::complete_poses,
     objects::LoggedObjects,
     scans::{LoggedScan, complete_scans},
 };
@@ -108,10 +108,8 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed = (!configuration.slam.is_on()
-            || has_ended::<Query>(out, "finds the loops")?)
-            && (!configuration.objects.is_on()
-                || has_ended::<LoggedObjects>(out, "tracks the objects")?);
+        let is_followed = (!configuration.slam.is_on() || has_ended::<Query>(out)?)
+            && (!configuration.objects.is_on() || has_ended::<LoggedObjects>(out)?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -218,12 +216,12 @@ pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
 
-/// A damaged log may be removed, and is then computed again in these words.
-fn has_ended<R: gyre_slam::Record>(out: &Out, again: &str) -> Result<bool, Failure> {
+/// A damaged log may be removed, and is then computed again.
+fn has_ended<R: gyre_slam::Record>(out: &Out) -> Result<bool, Failure> {
     match RecordReader::<R>::open(out.path()) {
         Ok(records) => Ok(records.has_ended()),
         Err(error @ LogError::Damaged { .. }) => {
-            Err(format!("{error}: remove it, and the same command {again} anew").into())
+            Err(format!("{error}: remove it, and the same command computes it again").into())
         }
         Err(error) => Err(error.into()),
     }
@@ -258,11 +256,11 @@ fn known_poses(
 ) -> Result<u64, Failure> {
     let slam = &configuration.slam;
     let complete = match slam.is_on() {
-        true => complete_poses(out.path(), content.poses).map_err(damaged)?,
+        true => complete_poses(out.path(), content.poses)?,
         false => content.poses,
     };
     let complete = match configuration.objects.is_on() {
-        true => complete_scans(out.path(), complete).map_err(|error| damaged(error.into()))?,
+        true => complete_scans(out.path(), complete)?,
         false => complete,
     };
     if !configuration.starts(StageId::Refinement) {
@@ -333,16 +331,6 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
         "gyre: {reason}: that run is kept as {old}, and a new one begins in {new} (run.earlier)"
     ));
     Ok(Out::lock(path)?)
-}
-
-fn damaged(error: KeyframesError) -> Failure {
-    match error {
-        KeyframesError::Log(LogError::Damaged { .. }) => format!(
-            "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
-        )
-        .into(),
-        _ => error.into(),
-    }
 }
 
 fn state(out: &Path) -> [PathBuf; 12] {
