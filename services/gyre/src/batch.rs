@@ -77,8 +77,7 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         None => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
         Some(_) => None,
     };
-    fs::create_dir_all(&arguments.out)
-        .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;
+    gyre_storage::create_folder(&arguments.out)?;
     let batch = Batch {
         program: own(),
         list: &list,

@@ -5,7 +5,7 @@ mod inspection;
 mod inspector;
 pub mod picture;
 
-use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::describe_masks;
@@ -50,8 +50,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     describe_masks(&configuration)?.iter().for_each(print::note);
     let out = &arguments.out;
     Content::MASKS.require_place(out)?;
-    fs::create_dir_all(out)
-        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    gyre_storage::create_folder(out)?;
     if !arguments.json {
         print::line(inspection::HEADER)?;
     }
