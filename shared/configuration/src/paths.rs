@@ -30,12 +30,10 @@ const RECORDING: &str = "record.file";
 #[derive(Clone, Debug)]
 pub struct Named {
     pub table: Table,
-    notes: Notes,
+    /// Keys, and sentences about paths in the current folder, for as long as no others take their
+    /// places.
+    notes: Vec<(String, String)>,
 }
-
-/// Keys, and sentences about paths in the current folder, for as long as no others take their
-/// places.
-type Notes = Vec<(String, String)>;
 
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
@@ -56,14 +54,30 @@ impl Named {
             Some(_) => named.to_owned(),
             None => std::path::absolute(named).unwrap_or_else(|_| named.to_owned()),
         };
-        let mut places = Places {
-            folder: file.parent().filter(|_| own.is_none()),
-            file: named,
-            here,
-            notes: Vec::new(),
-        };
-        visit(&mut table, |path, key| places.replace(path, key))?;
-        let notes = places.notes;
+        let folder = file.parent().filter(|_| own.is_none());
+        let mut notes = Vec::new();
+        visit(&mut table, |path, key| {
+            let written = Path::new(path.as_str());
+            if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
+                return Ok(());
+            }
+            let beside = folder.map(|folder| folder.join(written));
+            let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
+            let own = || gyre_shipped::find(written);
+            let found = beside.clone().filter(is_beside).or_else(own);
+            let here = here.as_deref().map(|here| here.join(written));
+            match (found, here.filter(|here| here.exists())) {
+                (None, Some(here)) => {
+                    let sentence = format!(
+                        "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
+                        named.display()
+                    );
+                    notes.push((key.to_owned(), sentence));
+                    put(path, here)
+                }
+                (found, _) => found.or(beside).map_or(Ok(()), |found| put(path, found)),
+            }
+        })?;
         Ok(Self { table, notes })
     }
 
@@ -160,38 +174,6 @@ pub fn unknown(named: &Path) -> ConfigurationError {
 
 fn is_name(named: &Path) -> bool {
     named.extension().is_none() && named.file_name() == Some(named.as_os_str())
-}
-
-struct Places<'a> {
-    file: &'a Path,
-    folder: Option<&'a Path>,
-    here: Option<PathBuf>,
-    notes: Notes,
-}
-
-impl Places<'_> {
-    fn replace(&mut self, path: &mut String, key: &str) -> Result<(), ConfigurationError> {
-        let written = Path::new(path.as_str());
-        if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
-            return Ok(());
-        }
-        let beside = self.folder.map(|folder| folder.join(written));
-        let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
-        let own = || gyre_shipped::find(written);
-        let found = beside.clone().filter(is_beside).or_else(own);
-        let here = self.here.as_deref().map(|here| here.join(written));
-        match (found, here.filter(|here| here.exists())) {
-            (None, Some(here)) => {
-                let sentence = format!(
-                    "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
-                    self.file.display()
-                );
-                self.notes.push((key.to_owned(), sentence));
-                put(path, here)
-            }
-            (found, _) => found.or(beside).map_or(Ok(()), |found| put(path, found)),
-        }
-    }
 }
 
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
