@@ -13,12 +13,6 @@ use crate::cli::RunArguments;
 
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
-    if arguments.from.is_some() && given.data.is_none() {
-        return Err(
-            "--from plays a recording of a run: name it, as in `gyre run NAME.mcap --from masked`"
-                .into(),
-        );
-    }
     let overrides = overrides(arguments, &given)?;
     let mut configuration = given.read(&overrides)?;
     if given.data.is_some() {
