@@ -50,7 +50,8 @@ impl Configuration {
             ("source", "silence_s", source.silence_s),
             ("record", "split_s", self.record.split_s),
         ] {
-            if !(number >= 0.0 && number.is_finite()) {
+            let is_valid = number >= 0.0 && number.is_finite();
+            if !is_valid {
                 let reason = format!("{key} is {number}, but must be 0 or more");
                 return Err(value(section, reason));
             }
