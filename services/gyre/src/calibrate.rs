@@ -12,8 +12,7 @@ use std::{
 
 use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
-use gyre_configuration::{Configuration, Played, describe_masks};
-use gyre_datasets::DatasetOptions;
+use gyre_configuration::{Configuration, Played, describe_masks, with_stored_options};
 use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
@@ -166,13 +165,13 @@ impl Recorded {
         configuration.odometry.wheels.kind = WheelsKind::None;
         let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
-        let eccentricity_rad = options(configuration)?.azimuth_eccentricity_rad;
+        let dataset = with_stored_options(configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
             drive,
             configured: Configured {
                 geometry,
-                eccentricity_rad: eccentricity_rad.unwrap_or(0.0).into(),
+                eccentricity_rad: dataset.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
@@ -212,15 +211,6 @@ impl Recorded {
         print::line(format_args!("{}: {}", self.name, study.found))?;
         storage::write(picture, svg(&study.drive, &study.calibration))?;
         Ok(study)
-    }
-}
-
-/// The options of the dataset, merged with the recording's own `dataset.toml`.
-fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
-    let own = configuration.dataset;
-    match configuration.streamed() {
-        Some(_) => Ok(own),
-        None => Ok(own.or(&gyre_recording::stored_options(&configuration.source.data)?)),
     }
 }
 
